@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 from scipy.signal import lfilter
+from scipy.stats import chi2, qmc
 from scipy.stats import f as fisher
-from scipy.stats import qmc
 from scipy.stats import t as student
 
 from ppafo.errors import IdentificationError
@@ -34,7 +34,7 @@ class Free:
     """A number that the fit moves: start, bounds and typical size ``scale``, SI units.
 
     ``deviation`` is the standard deviation of its prior about its start; infinite for a number that is sought, finite
-    for a tolerance.
+    for a tolerance. Tolerances of one ``family``, such as friction in each recording, are tested together.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Free:
     high: float
     scale: float
     deviation: float = math.inf
+    family: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -277,26 +278,28 @@ class _Work:
             self._last = key, self.at(point[:, None])[:, 0]
         return self._last[1]
 
-    def jacobian(self, point: Floats, weight: Floats) -> Floats:
-        """Return the derivative of the residuals [SI] by scaled numbers, central differences of one batch.
+    def jacobian(self, point: Floats, weight: Floats, *, is_central: bool = True) -> Floats:
+        """Return the derivative of the residuals [SI] by scaled numbers, differences of one batch.
 
-        ``weight`` [1/SI] by row sets the lengths of the differences of the next one.
+        ``weight`` [1/SI] by row sets the lengths of the differences of the next one. Differences to one side take half
+        the runs, and say well enough where to search.
         """
         above, below = np.minimum(point + self.step, self.high), np.maximum(point - self.step, self.low)
-        moved = np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
-        values = self.at(point[:, None] + moved)
+        sides = [above, below] if is_central else [np.where(above - point >= point - below, above, below)]
+        values = self.at(np.concatenate([point[:, None] + np.diag(side - point) for side in sides], axis=1))
         centre, count = self.one(point), len(point)
         slopes = np.empty((len(centre), count))
         for place in range(count):
-            (last, up), (first, down) = (
-                (values[:, at], end) if np.isfinite(values[:, at]).all() else (centre, float(point[place]))
-                for at, end in ((place, float(above[place])), (count + place, float(below[place])))
-            )
+            tried = [(float(side[place]), values[:, place + number * count]) for number, side in enumerate(sides)]
+            ran = [(end, own) for end, own in tried if np.isfinite(own).all()]
+            if not is_central and not ran:
+                return self.jacobian(point, weight)
+            (up, last), (down, first) = [*ran, (float(point[place]), centre)][:2]
             # Neither side runs: at a bound, or where a device is none.
-            if not up > down:
-                number = self.numbers[place]
+            if up == down:
+                free = self.numbers[place]
                 raise IdentificationError(
-                    f"{number.name}: no run succeeds near {point[place] * number.scale:.6g}; give other bounds or "
+                    f"{free.name}: no run succeeds near {point[place] * free.scale:.6g}; give other bounds or "
                     "another start"
                 )
             slopes[:, place] = (last - first) / (up - down)
@@ -358,7 +361,9 @@ def _search(work: _Work, start: Floats) -> Floats:
             return np.concatenate([work.one(x) * weight, (x - work.mean) * work.prior])
 
         def slopes(x: Floats, weight: Floats = weight) -> Floats:
-            return np.concatenate([work.jacobian(x, weight) * weight[:, None], np.diag(work.prior)])
+            return np.concatenate(
+                [work.jacobian(x, weight, is_central=not work.is_motion) * weight[:, None], np.diag(work.prior)]
+            )
 
         # The first pass is robust: a number can lose its gradient at a bound while the clock is still wrong.
         result = least_squares(
@@ -642,7 +647,30 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
         p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
         if p < _SIGNIFICANCE and (found is None or p < found.p):
             found = Conflict(group=STATED, number=str(names[place]), standard_errors=ratio, p=p)
+    families = np.array([one.family for one in work.numbers])[free]
+    for family in dict.fromkeys(families[prior > 0.0].tolist()):
+        own = np.flatnonzero((families == family) & (prior > 0.0))
+        if family and len(own) > 1 and found is None:
+            found = _of_family(names[own], shift[own] * np.sqrt(prior[own]), root[own] * np.sqrt(prior[own])[:, None])
     return found
+
+
+def _of_family(names: NDArray[np.str_], moved: Floats, root: Floats) -> Conflict | None:
+    """Return the tolerance of a family that parts most where all of it are beyond their limits, one by one or together.
+
+    ``moved`` are tolerances, ``root`` a root of their covariance, both over their standard deviations [-]. Where two
+    numbers are sought of them, two directions are free.
+    """
+    known, axes = np.linalg.eigh(np.eye(len(names)) - root @ root.T)
+    tested = known > _PARTING
+    count = int(tested.sum())
+    if not count:
+        return None
+    # What is stated is known, and no estimate: so this is chi-square, not F.
+    p = float(chi2.sf(float(np.sum(np.square(axes.T @ moved)[tested] / known[tested])), count))
+    ratios = np.abs(moved) / np.sqrt(np.maximum(1.0 - np.square(root).sum(axis=1), _PARTING))
+    most = int(np.argmax(ratios))
+    return Conflict(STATED, str(names[most]), float(ratios[most]), p) if p < _SIGNIFICANCE else None
 
 
 def _unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:
