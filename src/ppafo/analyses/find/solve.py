@@ -132,7 +132,7 @@ class Outcome:
     @property
     def is_met(self) -> NDArray[np.bool_]:
         """True for each value that meets the condition."""
-        return self.condition.is_kept(self.metrics)
+        return np.asarray(self.condition.is_kept(self.metrics), dtype=np.bool_)
 
     @property
     def changes(self) -> int:
