@@ -360,7 +360,12 @@ VANE = Layout(FILE, OF_A_VANE, lambda _: scenario_file(), lambda _: whole_scenar
 
 
 def list_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package."""
+    """Return the names of the scenarios that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_scenarios()[:3]
+    ('step-response', 'swing-foot', 'torque-task-anti-windup')
+    """
     return FILE.names()
 
 
