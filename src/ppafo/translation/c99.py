@@ -21,7 +21,8 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed
 from ppafo.translation.scopes import Scopes, scopes_of
-from ppafo.translation.typed import (
+from ppafo.translation.typed import Function, Module, Statement, Term
+from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
     INT,
@@ -29,13 +30,9 @@ from ppafo.translation.typed import (
     INT32,
     LIBRARY,
     Array,
-    Function,
     Items,
-    Module,
     Row,
     Shared,
-    Statement,
-    Term,
     Type,
     is_empty,
     types_in,

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
-from ppafo.translation.typed import Function, Statement, Term, Type
+from ppafo.translation.typed import Function, Statement, Term
+from ppafo.translation.value_types import Type
 
 Block = tuple[Statement, ...]
 

@@ -18,24 +18,19 @@ from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
 from ppafo.translation.scopes import Names, changed, needed
-from ppafo.translation.typed import (
+from ppafo.translation.typed import FUNCTIONS, Function, Module, Statement, Term, converted
+from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
-    FUNCTIONS,
     INT,
     LIBRARY,
     Array,
-    Function,
     Handed,
     Items,
-    Module,
     Row,
     Scalar,
     Shared,
-    Statement,
-    Term,
     Type,
-    converted,
     entries_of,
     is_empty,
     joined,

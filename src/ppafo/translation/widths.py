@@ -10,20 +10,8 @@ from typing import NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
-from ppafo.translation.typed import (
-    BOOL,
-    INT,
-    INT16,
-    INT32,
-    Function,
-    Items,
-    Module,
-    Row,
-    Statement,
-    Term,
-    Type,
-    types_in,
-)
+from ppafo.translation.typed import Function, Module, Statement, Term
+from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, Type, types_in
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64

@@ -37,7 +37,7 @@ from ppafo.simulation.ensemble.running import (
     thermal_totals,
     totals,
 )
-from ppafo.translation.typed import FLOAT, INT, Array, Row, Shared, Type
+from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:

@@ -111,7 +111,7 @@ from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
-from ppafo.translation.native import asked, complaint
+from ppafo.translation.compiling import asked, complaint
 from ppafo.units import to_si
 from ppafo.version import __version__
 
