@@ -81,6 +81,7 @@ from ppafo.engine.package_key import COMPOSED, package_key
 from ppafo.errors import PpafoError, ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
 from ppafo.exports.c_library.files import (
     OUTPUTS,
     Library,
@@ -89,16 +90,6 @@ from ppafo.exports.c_library.files import (
     conditions_of,
     conditions_of_program,
     run_words,
-)
-from ppafo.exports.c_library.program import (
-    COUNTS,
-    IN_PARTS,
-    TOGETHER,
-    WHOLE,
-    ExportedProgram,
-    c_text,
-    outline_of,
-    places_of,
 )
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
@@ -336,6 +327,8 @@ def program_of(library: Library, item: Scenario) -> bytes:
 
 def _known_digest(library: Library) -> str:
     """The digest of a library's text, whatever the values of its settings are."""
+    from ppafo.exports.c_library.program import outline_of  # most digests are kept
+
     # What decides the translation unit: what its functions are made from, and what translates them.
     names = [item.name for item in library.settings]
     outline = _unit(library, outline_of(library.program, names, library.further, LANES))
@@ -351,6 +344,8 @@ def _known_digest(library: Library) -> str:
 
 def source_of(library: Library) -> str:
     """The translation unit of a library. Values of settings are not in it: other numbers, same program."""
+    from ppafo.exports.c_library.program import c_text
+
     names = [item.name for item in library.settings]
     return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
 
