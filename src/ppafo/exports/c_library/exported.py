@@ -11,7 +11,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind
-from ppafo.simulation.ensemble.running import has_channels
+from ppafo.metrics.readable import has_channels
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
 """Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.

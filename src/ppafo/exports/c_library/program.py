@@ -25,14 +25,8 @@ from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
 from ppafo.metrics.metric import ReadAt, Readings
+from ppafo.metrics.readable import ThermalTotals, Totals, real_totals, thermal_totals, totals
 from ppafo.model.columns import over_runs
-from ppafo.simulation.ensemble.running import (
-    ThermalTotals,
-    Totals,
-    real_totals,
-    thermal_totals,
-    totals,
-)
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
 
