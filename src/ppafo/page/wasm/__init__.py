@@ -236,7 +236,7 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
         if item.name in changed:
             found[item.path] = dict(_CHANGED)
         elif is_of_device(item.path):
-            found[item.path] = dict(_of_set(parameter_set, device, item))
+            found[item.path] = dict(_of_set(parameter_set, device, item, follows=item.path in library.links))
         else:
             # Times and the angle of a locked vane have no key of their own in every file, and are the task's anyway.
             is_given = value_at(origin.content, item.path) is not None or item.path in (*TIMES, LOCKED_ANGLE)
@@ -246,8 +246,8 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -> dict[str, Any]:
-    """Origin of a number of the device: the set's where it has this very value."""
+def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting, *, follows: bool) -> dict[str, Any]:
+    """Origin of a number of the device: the set's where it has this very value, the default's where it ``follows``."""
     if parameter_set is None:
         return _CHANGED
     path = item.path
@@ -255,7 +255,7 @@ def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -
         path = f"valves.{device.valve_name}.{path.removeprefix('valve.')}"
     entry, declared = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or declared is None:
-        return _DEFAULT if item.value == item.quantity.default else _CHANGED
+        return _DEFAULT if follows or item.value == item.quantity.default else _CHANGED
     if entry_in_si(entry, declared, atmospheric_pressure(parameter_set)) != item.value:
         return _CHANGED
     if entry.source == SOURCE:
