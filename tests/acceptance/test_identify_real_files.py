@@ -38,10 +38,10 @@ def cylinder(raw_files: Path) -> Identification:
     return identify(raw_files / "cylinder-problem.toml").found
 
 
-def test_the_known_area_lies_inside_the_interval_and_within_a_quarter_percent(cylinder: Identification) -> None:
+def test_the_known_area_lies_inside_the_interval_and_within_three_tenths_of_a_percent(cylinder: Identification) -> None:
     area = cylinder.results[0]["static_torque.area"]
     assert area.low <= KNOWN_AREA <= area.high
-    assert abs(area.value / KNOWN_AREA - 1.0) < 0.0025
+    assert abs(area.value / KNOWN_AREA - 1.0) < 0.003
     assert area.half_width < 0.01 * area.value
 
 

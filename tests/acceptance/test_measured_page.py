@@ -102,7 +102,7 @@ def test_the_recordings_are_those_of_the_source_file() -> None:
 
 def test_a_first_fit_of_a_real_device_finds_the_known_area() -> None:
     area = identify(measured.EXAMPLE / "cylinder.toml").found.results[0]["static_torque.area"]
-    assert area.value == pytest.approx(KNOWN_AREA, rel=0.0025)
+    assert area.value == pytest.approx(KNOWN_AREA, rel=0.003)
     assert area.low <= KNOWN_AREA <= area.high
 
 
