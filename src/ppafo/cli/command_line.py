@@ -54,13 +54,13 @@ class Command:
     listed: str = ""
     default_folder: str = ""
     first_line: str = ""
-    found: Callable[..., Any] | None = None
+    found: types.FunctionType | None = None
     """The verb itself, of another package, in place of where it is."""
 
-    def function(self) -> Callable[..., Any]:
+    def function(self) -> types.FunctionType:
         """Load and return the verb."""
-        function: Callable[..., Any] = self.found or kind_at(self.verb)
-        return function
+        verb: types.FunctionType = self.found or kind_at(self.verb)
+        return verb
 
     @property
     def summary(self) -> str:
@@ -103,7 +103,7 @@ class Reading:
     choices: tuple[str, ...] | None = None
 
 
-def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[str, str]:
+def _help_by_parameter(verb: types.FunctionType, names: Sequence[str]) -> dict[str, str]:
     """Return the lines ``name: help`` of the docstring; more indented lines go on with them."""
     found: dict[str, str] = {}
     latest = ""
@@ -141,7 +141,7 @@ def reading_of(annotation: Any) -> Reading:
             return Reading(word, is_flag, is_repeated or word.is_repeated)
 
 
-def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
+def parameters_of(verb: types.FunctionType) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
     annotations = annotations_of(verb)
     for parameter in inspect.signature(verb).parameters.values():
