@@ -59,7 +59,12 @@ def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Cal
 def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:
     """Text of an entry, from the types of its parameters in order and the lines of its body."""
     head = ENTRY.format(", ".join(parameters.values()))
-    return "\n".join([head, f"def {name}({', '.join(parameters)}):", *(f"    {line}" for line in lines), ""])
+    return "\n".join([head, f"def {name}({', '.join(parameters)}):", *indent(lines), ""])
+
+
+def indent(lines: Iterable[str]) -> list[str]:
+    """The lines, one level further in."""
+    return [f"    {line}" for line in lines]
 
 
 def entry_types(source: str) -> dict[str, list[str]]:
