@@ -40,12 +40,28 @@ _END_OF_WALK = 5.0
 """Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
 
 PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]], ...] = (
-    (Kind("Ankle angle", "rad", "angle"), 10.0, (), {"angle": ("", ACTUAL)}),
+    (
+        Kind("Ankle angle", "rad", "angle"),
+        10.0,
+        (),
+        {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)},
+    ),
     (
         Kind("Pressure", "Pa_a", "pressure"),
         5.0,
         (0.0,),
-        {"pressure_1": ("chamber 1", CHAMBER_1), "pressure_2": ("chamber 2", CHAMBER_2)},
+        {
+            "pressure_1": ("chamber 1", CHAMBER_1),
+            "pressure_2": ("chamber 2", CHAMBER_2),
+            "reference_pressure_1": ("reference, chamber 1", REFERENCE),
+            "reference_pressure_2": ("reference, chamber 2", REFERENCE),
+        },
+    ),
+    (
+        Kind("Pressure in chamber 1 less chamber 2", "Pa_d", "pressure change"),
+        5.0,
+        (),
+        {"reference_pressure_difference": ("reference", REFERENCE), "pressure_difference": ("actual", ACTUAL)},
     ),
     (
         Kind("Actuator torque", "N m", "torque"),

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, MotionKind
@@ -59,13 +60,15 @@ def model_name(name: str) -> str:
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
-def profile_table(prescribed: Quantity, purpose: str) -> Any:
-    """Return the section of a profile; ``purpose`` ends the names of its models."""
+def profile_table(prescribed: Quantity, purpose: str, further: dict[str, Any] | None = None) -> Any:
+    """Return the section of a profile with ``further`` fields; ``purpose`` ends the names of its models."""
     return one_of(
         [
             table(
                 f"{model_name(name)}{purpose}",
-                kind_field(name, kind.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
+                kind_field(name, kind.summary)
+                | (further or {})
+                | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
             for name, kind in PROFILES.loaded().items()
         ]
@@ -178,7 +181,8 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
             fields[profile.name] = (profile.layout(), Field(description=profile.summary))
         motions.append(table(f"{model_name(name)}Motion", fields))
     words = tuple(declaration.PRESSURE_WORDS)
-    reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
+    controlled = optional(Literal[tuple(CONTROLLED)], "what it is a value of; torque unless given")
+    reference = profile_table(CONTROLLED[TORQUE].level, "Reference", {"of": controlled})
     # The one whole number of the file: half a seed means nothing.
     seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
     sensors = quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
@@ -195,7 +199,8 @@ def _scenario_file(*_kinds: Any) -> type[BaseModel]:
             Field(description="what commands the valve"),
         ),
         "reference": optional(
-            reference, "torque that the controller follows; only one that follows none, as constant, may leave it out"
+            reference,
+            "what the controller follows, a torque unless it says of what; one that follows none may leave it out",
         ),
         "sensors": optional(table("Sensors", sensors), "sensors of the controller; ideal unless given"),
     }

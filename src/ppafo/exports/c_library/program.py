@@ -29,6 +29,7 @@ from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_o
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind, ReadAt, Readings
 from ppafo.model.columns import over_runs
+from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.ensemble.running import (
     ThermalTotals,
     Totals,
@@ -145,7 +146,8 @@ def exported(program: Program) -> ExportedProgram:
     missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
     states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
     if REQUEST not in states if program.walks else not program.has_reference:
-        missing.add("reference")
+        missing |= {kind.reference for kind in CONTROLLED.values()}
+    missing |= {kind.reference for name, kind in CONTROLLED.items() if name != program.controlled}
     offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
     metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
     # By name: the same metrics in another order are the same program.

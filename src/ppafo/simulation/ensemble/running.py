@@ -22,7 +22,6 @@ from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, Th
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
 
-REFERENCE = "reference"
 _WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 _SAME = 1.0e-6
 
@@ -249,7 +248,7 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
     }
     return (
         not missing.intersection(kind.channels)
-        and (has_reference or REFERENCE not in kind.channels)
+        and (not kind.of_reference or (has_reference and kind.of_reference == program.controlled))
         and all(has[need] for need in kind.needs)
     )
 
