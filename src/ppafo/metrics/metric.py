@@ -159,22 +159,28 @@ def has_reference(recording: Recording) -> bool:
     return controlled_in(recording) is not None
 
 
+def reference_of(recording: Recording) -> Floats:
+    """Return the reference of a recording, which has one."""
+    return next(recording[kind.reference] for kind in CONTROLLED.values() if kind.reference in recording)
+
+
 def followed(recording: Recording) -> tuple[Floats, Floats]:
     """Return the reference of a recording, which has one, and what follows it."""
-    kind = next(kind for kind in CONTROLLED.values() if kind.reference in recording)
-    return recording[kind.reference], recording[kind.channel]
+    channel = next(kind.channel for kind in CONTROLLED.values() if kind.reference in recording)
+    return reference_of(recording), recording[channel]
 
 
 def extent(recording: Recording) -> float:
     """Return how far the reference goes: from 0 for a torque, else from what is controlled at the start."""
+    if CONTROLLED[TORQUE].reference in recording:
+        return float(np.max(np.abs(recording[CONTROLLED[TORQUE].reference])))
     reference, value = followed(recording)
-    origin = 0.0 if CONTROLLED[TORQUE].reference in recording else value[0]
-    return float(np.max(np.abs(reference - origin)))
+    return float(np.max(np.abs(reference - value[0])))
 
 
 def hold_start(recording: Recording) -> int | None:
     """Return the sample from which on the reference stays at its final level; None where it never rests there."""
-    (reference, _), tolerance = followed(recording), SAME_LEVEL * extent(recording)
+    reference, tolerance = reference_of(recording), SAME_LEVEL * extent(recording)
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
     # One sample at rest has no time over which a mean could be taken.

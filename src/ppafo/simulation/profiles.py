@@ -7,6 +7,7 @@ import numpy as np
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.rows import rebuilt
+from ppafo.model.catalog import VALVES
 from ppafo.model.columns import over_runs
 from ppafo.model.controlled import ANGLE
 from ppafo.model.declaration import Quantity
@@ -88,6 +89,12 @@ def reference_problem(scenario: Scenario) -> str:
         return (
             f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' moves the angle by itself; "
             "take motion.kind = 'free' or 'leg'"
+        )
+    valve = scenario.device.valve.kind
+    if VALVES[valve].vents_at_rest:
+        return (
+            f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at a command of 0 and holds no "
+            "angle; take one that is closed there, such as device.valve = 'proportional'"
         )
     actuator, run = scenario.device.actuator, scenario.run
     stops = actuator.angle_min, actuator.angle_max

@@ -47,16 +47,22 @@ class CascadeParameters(NamedTuple):
 
 
 class CascadeState(NamedTuple):
-    """Integral of the torque asked for [N m], reference and angle one sample ago [rad], their rates, number of samples."""
+    """Integral of the torque asked for [N m]; reference and angle one sample ago [rad], and their rates.
+
+    ``quickening`` is the filtered rate of the reference's rate [rad/s^2], ``started`` the number of samples, 2 at most.
+    """
 
     integral: float
     reference: float
     angle: float
     rate: float
     asked: float
+    quickening: float
     started: float
 
 
+SMOOTHING = 8.0
+"""How much slower the filter on the reference's acceleration is than the one on the measured rate: it may jump."""
 SLOW = 0.05
 """rad/s: rate of the reference from which on all of the friction is made up for."""
 
@@ -76,7 +82,10 @@ def cascade_update(
     rate = state.rate + (turned - period * state.rate) / (period + parameters.rate_filter)
     asked = (reference - state.reference) / period * min(state.started, 1.0)
     # A rate of the reference has one before it from the third sample on.
-    quickening = (asked - state.asked) / period * max(state.started - 1.0, 0.0)
+    jerk = ((asked - state.asked) * max(state.started - 1.0, 0.0) - period * state.quickening) / (
+        period + SMOOTHING * parameters.rate_filter
+    )
+    quickening = state.quickening + jerk
     integral = state.integral + parameters.angle_integral * error * period
     against = gravity_torque(measurement.angle, parameters.gravity_torque)
     against += parameters.inertia * quickening + parameters.friction_torque * max(-1.0, min(1.0, asked / SLOW))
@@ -90,6 +99,7 @@ def cascade_update(
         angle=measurement.angle,
         rate=rate,
         asked=asked,
+        quickening=quickening,
         started=min(state.started + 1.0, 2.0),
     )
 
@@ -100,7 +110,7 @@ CASCADE = ControllerKind(
     source="cascade of a position and a pressure loop: Bone and Ning 2007; gains by Skogestad 2003",
     quantities=quantities_of(CascadeParameters),
     parameters=CascadeParameters,
-    initial=CascadeState(integral=0.0, reference=0.0, angle=0.0, rate=0.0, asked=0.0, started=0.0),
+    initial=CascadeState(integral=0.0, reference=0.0, angle=0.0, rate=0.0, asked=0.0, quickening=0.0, started=0.0),
     update=cascade_update,
     controls=(ANGLE,),
 )
