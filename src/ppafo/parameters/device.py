@@ -147,12 +147,44 @@ class Flow:
     ]
 
 
+OPPOSITES = {
+    "plantarflexion": "dorsiflexion",
+    "flexion": "extension",
+    "abduction": "adduction",
+    "inversion": "eversion",
+    "pronation": "supination",
+    "internal rotation": "external rotation",
+}
+OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
+"""What movements of a joint are called, and those against them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """What the actuator turns, in words: the joint, what a growing angle is called there, and a falling one."""
+
+    name: str = "ankle"
+    positive: str = "plantarflexion"
+    negative: str = "dorsiflexion"
+
+    def said(self, text: str) -> str:
+        """Return a text about an ankle as one about this joint."""
+        words = zip(("ankle", "plantarflexion", "dorsiflexion"), (self.name, self.positive, self.negative), strict=True)
+        for usual, own in words:
+            text = text.replace(usual, own).replace(usual.capitalize(), own.capitalize())
+        return text
+
+
+ANKLE = Joint()
+"""The joint of a set that names none."""
+
+
 @dataclass(frozen=True, slots=True)
 class Device:
     """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware.
 
     ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
-    ``links`` say which of its numbers follow others that are varied.
+    ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
     """
 
     name: str
@@ -166,6 +198,7 @@ class Device:
     valve_name: str
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
+    joint: Joint = ANKLE
 
     def check_vane(self, what: str) -> None:
         """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""
