@@ -11,6 +11,7 @@ from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
+from ppafo.parameters.joint import ANKLE, Joint
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -145,38 +146,6 @@ class Flow:
     linear_ratio: Annotated[
         float, Number("", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999)
     ]
-
-
-OPPOSITES = {
-    "plantarflexion": "dorsiflexion",
-    "flexion": "extension",
-    "abduction": "adduction",
-    "inversion": "eversion",
-    "pronation": "supination",
-    "internal rotation": "external rotation",
-}
-OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
-"""What movements of a joint are called, and those against them."""
-
-
-@dataclass(frozen=True, slots=True)
-class Joint:
-    """What the actuator turns, in words: the joint, what a growing angle is called there, and a falling one."""
-
-    name: str = "ankle"
-    positive: str = "plantarflexion"
-    negative: str = "dorsiflexion"
-
-    def said(self, text: str) -> str:
-        """Return a text about an ankle as one about this joint."""
-        words = zip(("ankle", "plantarflexion", "dorsiflexion"), (self.name, self.positive, self.negative), strict=True)
-        for usual, own in words:
-            text = text.replace(usual, own).replace(usual.capitalize(), own.capitalize())
-        return text
-
-
-ANKLE = Joint()
-"""The joint of a set that names none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,8 @@ from ppafo.model.effects.kind import SECTION
 from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import alternatives
-from ppafo.parameters.device import ANKLE, OPPOSITES, VANE, Device, Joint
+from ppafo.parameters.device import VANE, Device
+from ppafo.parameters.joint import ANKLE, OPPOSITES, Joint
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
     Accepted,

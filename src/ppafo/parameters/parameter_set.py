@@ -15,7 +15,6 @@ from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import RELIEVING_PATH, SPECIES_PATH, alternatives, quantities
-from ppafo.parameters.device import ANKLE, Joint
 from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
@@ -29,6 +28,7 @@ from ppafo.parameters.graph import (
     follows,
     gauge_link,
 )
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
 from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, one_line
-from ppafo.parameters.device import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (

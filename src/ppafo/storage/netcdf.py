@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, one_line
-from ppafo.parameters.device import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes, write_file

@@ -9,7 +9,7 @@ import pytest
 from ppafo.analyses.sets.values import shown_values
 from ppafo.errors import ParameterError
 from ppafo.parameters import load_device, load_parameter_set
-from ppafo.parameters.device import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 from ppafo.report.recording_figure import draw_stored_result
 from ppafo.running import simulate

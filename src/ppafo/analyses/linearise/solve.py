@@ -30,7 +30,7 @@ from ppafo.model.plant import (
 )
 from ppafo.model.ports import at_valve, friction_at_rest
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
-from ppafo.parameters.device import Joint
+from ppafo.parameters.joint import Joint
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
