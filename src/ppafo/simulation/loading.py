@@ -405,7 +405,12 @@ VANE = Layout(FILE, OF_A_VANE, scenario_file, lambda _: whole_scenario_file(), b
 
 
 def list_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package."""
+    """Return the names of the scenarios that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_scenarios()[:3]
+    ('step-response', 'swing-foot', 'torque-task-anti-windup')
+    """
     return FILE.names()
 
 
