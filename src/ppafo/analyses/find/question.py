@@ -45,6 +45,12 @@ def find(
     highest: find the highest value
     grid: number of evenly spaced values to try first; default 64
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"
+    >>> print(ppafo.find(task, vary="supply.pressure=20..90 psi_g", such_that=metric).said[0])
+    supply.pressure = 54.7758 psi_g is the lowest value that meets rms_error <= 0.5 N m: rms_error is 0.5 N m there
+    (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
     from ppafo.analyses.find.answer import finding_of
