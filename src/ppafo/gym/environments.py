@@ -27,6 +27,7 @@ from ppafo.gym.episodes import (
 )
 from ppafo.gym.pictures import picture
 from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
+from ppafo.model.controlled import TORQUE
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
 from ppafo.simulation.loading import load_scenario
@@ -141,6 +142,11 @@ class World:
             own = () if duration is None else (f"run.duration={float(duration)!r} s",)
             chosen = load_scenario(file, over(words, own, ScenarioError))
             chosen.device.check_vane("an environment")
+            if task == "torque" and chosen.controlled != TORQUE:
+                raise ScenarioError(
+                    f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
+                    "another scenario, or the task 'angle'"
+                )
             self.episodes = scenario_episodes(chosen, settings.randomise, varied, settings.targets)
         bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = Judging(

@@ -9,6 +9,7 @@ from ppafo.analyses.linearise.point import Point, settled
 from ppafo.engine.run import Run
 from ppafo.model.orifice import FlowCurve
 from ppafo.model.plant import Openings
+from ppafo.parameters.joint import Joint
 
 EQUAL = 1.0e-12
 """Two sides that differ by less than this, over the larger one, are equal."""
@@ -57,8 +58,8 @@ def _direction(name: str, values: Mapping[str, float]) -> float:
     return 1.0e-6 * max(1.0, abs(values[name])) * (1.0 if name in first else -0.5)
 
 
-def sides_of(run: Run, point: Point) -> dict[str, str]:
-    """Which side of each limit the point lies on, in words by place."""
+def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
+    """Which side of each limit the point lies on, in words by place; ``joint`` names what moves."""
     at, plant = point.values, run.plant
     openings: Openings = run.program.valve.instant(run.valve, settled(run, at), at["command"])
     room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
@@ -70,13 +71,18 @@ def sides_of(run: Run, point: Point) -> dict[str, str]:
     }
     said = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
     said["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
-    motion = {None: "prescribed", 0.0: "at rest", 1.0: "slides in plantarflexion", -1.0: "slides in dorsiflexion"}
+    motion = {
+        None: "prescribed",
+        0.0: "at rest",
+        1.0: f"slides in {joint.positive}",
+        -1.0: f"slides in {joint.negative}",
+    }
     vane = motion[point.way]
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "against a stop" if is_at_stop else "sticks: friction holds it"
     valve = f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {max(openings):.4g}" if any(openings) else ""
-    return {"valve": valve or "closed", "ankle": vane, **said}
+    return {"valve": valve or "closed", joint.name: vane, **said}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:

@@ -66,7 +66,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         if not is_same:
             edges.append(edge)
     a, b, c, d, rates, outputs = matrices
-    sides = sides_of(run, point)
+    sides = sides_of(run, point, scenario.device.joint)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
     return LinearModel(
