@@ -251,4 +251,5 @@ KIND = ValveKind(
     settings=TimedSolenoid,
     choose=choose,
     lag=lag,
+    vents_at_rest=True,
 )
