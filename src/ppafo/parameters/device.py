@@ -3,14 +3,15 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
-from ppafo.model.declaration import Number, attribute_among
+from ppafo.model.declaration import Number, held
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
+from ppafo.parameters.joint import ANKLE, Joint
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -72,10 +73,11 @@ class Actuator:
     kind: str = VANE
     settings: Mapping[str, float] = field(default_factory=dict)
     table: Any = None
+    HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
-        return attribute_among(self, name, "settings")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,10 +134,11 @@ class Valve:
     kind: str
     orifice: Orifice | SonicOrifice
     settings: Mapping[str, float]
+    HELD: ClassVar[tuple[str, ...]] = ("settings", "orifice")
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting, or a number of the orifice, by its name."""
-        return attribute_among(self, name, "settings", "orifice")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,7 +155,7 @@ class Device:
     """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware.
 
     ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
-    ``links`` say which of its numbers follow others that are varied.
+    ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
     """
 
     name: str
@@ -166,6 +169,7 @@ class Device:
     valve_name: str
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
+    joint: Joint = ANKLE
 
     def check_vane(self, what: str) -> None:
         """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""

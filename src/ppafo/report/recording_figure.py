@@ -1,12 +1,14 @@
 """The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, one_line
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
@@ -40,12 +42,28 @@ _END_OF_WALK = 5.0
 """Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
 
 PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]], ...] = (
-    (Kind("Ankle angle", "rad", "angle"), 10.0, (), {"angle": ("", ACTUAL)}),
+    (
+        Kind("Ankle angle", "rad", "angle"),
+        10.0,
+        (),
+        {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)},
+    ),
     (
         Kind("Pressure", "Pa_a", "pressure"),
         5.0,
         (0.0,),
-        {"pressure_1": ("chamber 1", CHAMBER_1), "pressure_2": ("chamber 2", CHAMBER_2)},
+        {
+            "pressure_1": ("chamber 1", CHAMBER_1),
+            "pressure_2": ("chamber 2", CHAMBER_2),
+            "reference_pressure_1": ("reference, chamber 1", REFERENCE),
+            "reference_pressure_2": ("reference, chamber 2", REFERENCE),
+        },
+    ),
+    (
+        Kind("Pressure in chamber 1 less chamber 2", "Pa_d", "pressure change"),
+        5.0,
+        (),
+        {"reference_pressure_difference": ("reference", REFERENCE), "pressure_difference": ("actual", ACTUAL)},
     ),
     (
         Kind("Actuator torque", "N m", "torque"),
@@ -77,11 +95,13 @@ def recording_figure(
     remark: str = "",
     atmosphere: float = STANDARD_ATMOSPHERE,
     valve: str = "",
+    joint: Joint = ANKLE,
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
     ``remark`` stands below the panels, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
-    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn.
+    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn, ``joint`` what it
+    turns.
     """
     panels = []
     for kind, span, always_shown, lines in PANELS:
@@ -93,12 +113,13 @@ def recording_figure(
             look = look_of_valve(valve) if line is ACTUAL else line
             # A command holds between two samples; all else goes on in between.
             style = {"linestyle": look.line, "drawstyle": "steps-post" if channel == "command" else "default"}
-            label = name if len(shown) > 1 else ""
+            label = joint.said(name) if len(shown) > 1 else ""
             marks.append(Mark("line", recording.time, recording[channel] + shift, (), label, look.colour, style))
         if marks:
             ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
             then = partial(_set_limits, ends, span, always_shown)
-            panels.append(Panel(TIME, kind, marks, then=then, shares_x=True))
+            named = replace(kind, words=joint.said(kind.words))
+            panels.append(Panel(TIME, named, marks, then=then, shares_x=True))
     if not panels:
         drawn = ", ".join(channel for *_, lines in PANELS for channel in lines)
         raise DataError(f"{recording.label}: has nothing to draw; a figure shows {drawn}")
@@ -130,7 +151,8 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
         raise _other_form(file, "scenario.name", name, "a text")
     atmosphere = stated_atmosphere(file, document, "scenario", "device")
     valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
-    return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve)
+    joint = stated_joint(file, document, "scenario", "device")
+    return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve, joint)
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
@@ -155,6 +177,19 @@ def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> 
     """
     given = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
     return STANDARD_ATMOSPHERE if given is None else given
+
+
+def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint:
+    """Return what the device at some keys of a file's document turns, in words; the ankle where it does not say.
+
+    DataError names the key that is of another form.
+    """
+    words = _under(file, document, *device, "joint")
+    found = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
+    for name, word in found.items():
+        if not isinstance(word, str):
+            raise _other_form(file, ".".join((*device, "joint", name)), word, "a text")
+    return Joint(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in found.items()})
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:

@@ -13,7 +13,8 @@ from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
-from ppafo.model.declaration import Number, attribute_among
+from ppafo.model.controlled import TORQUE
+from ppafo.model.declaration import Number, held
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
@@ -33,10 +34,11 @@ class ProfileChoice:
 
     kind: str
     settings: Mapping[str, float]
+    HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
-        return attribute_among(self, name, "settings")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,10 +84,11 @@ class FreeMotion:
     leg: Leg | None = None
     profile: ClassVar[None] = None
     locked_angle: ClassVar[None] = None
+    HELD: ClassVar[tuple[str, ...]] = ("leg",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a number of the leg by its name."""
-        return attribute_among(self, name, "leg")
+        return held(self, name)
 
     @property
     def motion_kind(self) -> MotionKind:
@@ -271,10 +274,11 @@ class Control:
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
+    HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
-        return attribute_among(self, name, "settings")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,7 +305,8 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
+    The reference is a torque [N m], or of what else is ``controlled``: an angle [rad], or pressures [Pa] (
+    ``model.controlled``). Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
     supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
     beside the device's.
     """
@@ -320,6 +325,7 @@ class Scenario:
     gas_model: GasModel | None = None
     supply_line: SupplyLine | None = None
     links: Graph = field(default_factory=dict, compare=False)
+    controlled: str = TORQUE
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""
