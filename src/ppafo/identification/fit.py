@@ -657,9 +657,13 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
             found = Conflict(group=STATED, number=str(names[place]), standard_errors=ratio, p=p)
     families = np.array([one.family for one in work.numbers])[free]
     for family in dict.fromkeys(families[prior > 0.0].tolist()):
-        own = np.flatnonzero((families == family) & (prior > 0.0))
-        if family and len(own) > 1 and found is None:
-            found = _of_family(names[own], shift[own] * np.sqrt(prior[own]), root[own] * np.sqrt(prior[own])[:, None])
+        members = np.flatnonzero((families == family) & (prior > 0.0))
+        if family and len(members) > 1 and found is None:
+            found = _of_family(
+                names[members],
+                shift[members] * np.sqrt(prior[members]),
+                root[members] * np.sqrt(prior[members])[:, None],
+            )
     return found
 
 
