@@ -17,6 +17,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.controlled import TORQUE
 from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.model.orifice import FlowCurve
@@ -249,6 +250,11 @@ def equilibrium(scenario: Scenario) -> Point:
     whole = plan_run(scenario)
     if whole.leg is not None and whole.program.shank is not CONSTANT:
         raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
+    if scenario.controlled != TORQUE and scenario.controller.kind != OPEN_LOOP:
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{scenario.controlled}': an equilibrium is found for a torque; take --at "
+            "with a time"
+        )
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
     is_open_loop = scenario.controller.kind == OPEN_LOOP
