@@ -204,5 +204,5 @@ def test_what_knows_a_torque_alone_says_so() -> None:
         equilibrium(pressure)
     with pytest.raises(ScenarioError, match="a controller at the wire is sent a torque"):
         plant_of(pressure)
-    with pytest.raises(ScenarioError, match="follows a reference of torque, not of chamber 1 pressure"):
+    with pytest.raises(ScenarioError, match="a fixed-point controller follows a torque alone"):
         firmware(pressure)
