@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.linearise.solve import equilibrium
+from ppafo.analyses.linearise.point import equilibrium
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.run import plant_of
 from ppafo.processor.firmware import firmware
