@@ -54,7 +54,8 @@ class ProfileKind:
     value, rate and second derivative at a time [s]; ``bounds(parameters)`` the lowest and highest value of all time.
     A quantity with unit ``""`` takes the unit of what is prescribed. A profile that ``is_monotone`` only rises, only
     falls or rests, so that both ends of a stretch of time have its extremes. One that ``is_smooth`` has no corners, at
-    which a foot on a shank that moves so would be struck.
+    which a foot on a shank that moves so would be struck. ``until_jump(parameters, time)`` is the time [s], above 0,
+    until the second derivative of a smooth one jumps; None where it never does.
     """
 
     name: str
@@ -65,6 +66,7 @@ class ProfileKind:
     bounds: Callable[..., tuple[float, float]]
     is_monotone: bool = False
     is_smooth: bool = False
+    until_jump: Callable[..., float] | None = None
 
 
 class PythonController(Protocol):
