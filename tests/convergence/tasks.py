@@ -79,7 +79,7 @@ def cylinders(chance: Chance) -> Document:
     # The set has a valve in the form of ISO 6358, which a form with an area would need more than an area for.
     conductance = logarithmic(chance, 5e-10, 1e-8)
     lines += [f"valve.sonic_conductance={conductance} m^3/(s Pa)", f"valve.critical_ratio={chance.uniform(0.15, 0.5)}"]
-    lines += draws.friction(chance) + [f"foot_plate.inertia={logarithmic(chance, 3e-3, 9e-2)} kg m^2"]
+    lines += [*draws.friction(chance), f"foot_plate.inertia={logarithmic(chance, 0.003, 0.09)} kg m^2"]
     motion = draws.free(chance, 200.0, 5.0)
     drawn = draws.document(lines, motion, draws.open_loop(chance), initial=draws.start(chance))
     drawn["device"] = {"set": "cylinder-lever", "overrides": lines}

@@ -34,10 +34,6 @@ from ppafo.model.plant import (
 )
 
 
-ALLOWED_OF_TEMPERATURE = 2.5e-4
-"""Error of one step over the reference temperature; with it a run keeps to 2e-3 of it."""
-
-
 class ThermalFlows(NamedTuple):
     """Rates of both contents and both masses, of the gas drawn from the source and of the vane leak (1 to 2) [kg/s].
 
@@ -87,6 +83,8 @@ def transport(thermal: ThermalParameters, flow: float, root_from: float, root_to
     return Transport(mass_flow_ratio(root), enthalpy_flow_ratio(root, thermal.heat_capacity_ratio))
 
 
+ALLOWED_OF_TEMPERATURE = 2.5e-4
+"""Error of one step over the reference temperature; with it a run keeps to 2e-3 of it."""
 NEARLY_EQUAL = 1.0e-4
 """Difference of two pressures over one of them below which gas may turn within a step."""
 
@@ -460,7 +458,7 @@ def thermal_change(
 
 
 def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
-    """Estimated error of pressures and temperatures at the end of a step [s] over what is allowed [-], as ``gas_error``.
+    """Estimated error of pressures and temperatures after a step [s] over what is allowed [-], as ``gas_error``.
 
     A chamber that gas flushes within a step has a pressure that is settled and a temperature that is not.
     """
@@ -469,7 +467,7 @@ def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlow
 
 
 def warming(begun: ThermalGas, added: ThermalFlows, step: float) -> float:
-    """Errors of contents and masses [kg/s] over a step [s], as the larger of both temperatures' over the allowed [-]."""
+    """Errors of contents and masses [kg/s] over a step [s], as the larger of both temperatures' over the allowed."""
     # The temperature over the reference is content over mass: what a little of both changes it by.
     mass_1, mass_2 = begun.end_masses.mass_1, begun.end_masses.mass_2
     warmer_1 = (added.content_1 - begun.end.mass_1 / mass_1 * added.mass_1) / mass_1

@@ -20,7 +20,8 @@ def shank(parts: Program, lane: Lane, time: float) -> ShankNow:
 
 def until_jump(parts: Program, lane: Lane, time: float) -> float:
     """Time [s] from one [s] until the acceleration of the shank jumps; a jump that is due has happened."""
-    assert parts.shank is not None and parts.shank.until_jump is not None, "the shank jumps"
+    assert parts.shank is not None, "a foot has a shank"
+    assert parts.shank.until_jump is not None, "the shank jumps"
     behind: float = parts.shank.until_jump(lane.shank, time + SAME_INSTANT)
     return behind + SAME_INSTANT
 
