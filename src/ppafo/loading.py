@@ -51,6 +51,11 @@ def load_scenario(
     changed in this one. ``plugins`` are modules of your own, files or names, whose objects files may name:
     ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError, ParameterError or DataError for anything that
     cannot be used.
+
+    >>> import ppafo
+    >>> scenario = ppafo.load_scenario("torque-task-proportional", ["supply.pressure=70 psi_g"])
+    >>> print(f"{scenario.device.supply.pressure:.0f} Pa absolute")
+    583958 Pa absolute
     """
     name_plugins(plugins)
     # Vanes first: the code of walks is loaded for a walk only.
@@ -81,6 +86,13 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
     ScenarioError, ParameterError or DataError for anything that cannot be used.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> import tomllib
+    >>> from importlib.resources import files
+    >>> content = tomllib.loads((files("ppafo") / "scenarios" / "step-response.toml").read_text("utf-8"))
+    >>> ppafo.scenario_from_dict(content, ["run.duration=0.2 s"]).run.duration
+    0.2
     """
     name_plugins(plugins)
     request = of_vanes.request_of_dict(content, overrides)

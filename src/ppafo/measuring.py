@@ -14,5 +14,10 @@ def evaluate(recording: Recording | str | Path) -> dict[str, Metric]:
     """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
 
     A file or a result folder stands for its recording. DataError for one that cannot be used.
+
+    >>> import ppafo
+    >>> recording = ppafo.simulate("torque-task-proportional").recording
+    >>> print(f"{ppafo.evaluate(recording)['peak_torque'].value:.3f} N m")
+    5.000 N m
     """
     return of_recording(recording if isinstance(recording, Recording) else read_recording(recording))

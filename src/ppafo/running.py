@@ -29,6 +29,11 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
     diverges is a Result with that status, up to the time of failure. ``plugins`` are modules of your own, files or
     names, whose objects files may name: ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError or
     ParameterError for bad input.
+
+    >>> import ppafo
+    >>> result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
+    >>> print(f"{result.metrics['rms_error'].value:.3f} N m")
+    0.196 N m
     """
     name_plugins(plugins)
     return of_loaded.simulate(scenario_or_load(scenario, overrides))
@@ -92,6 +97,11 @@ def simulate_many(
     """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> runs = ppafo.simulate_many(["torque-task-proportional", "torque-task-solenoid"])
+    >>> [f"{run.metrics['gas_supplied'].value:.2e} kg" for run in runs]
+    ['4.16e-04 kg', '1.16e-03 kg']
     """
     name_plugins(plugins)
     return of_loaded.simulate_many([scenario_or_load(scenario) for scenario in scenarios], threads)

@@ -33,5 +33,6 @@ def test_walks_at_equal_work_are_what_the_script_of_the_page_prints(capsys: pyte
     assert capsys.readouterr().out == shown
     at_50, at_lowest = re.findall(r"proportional valve less pair: ([+-]\d+) %", shown)
     lead = PAGE.partition("\n## ")[0]
-    assert f"takes {at_50.removeprefix('+')} % more gas a stride" in lead
-    assert f"and {at_lowest.removeprefix('-')} % less where each has the lowest supply pressure" in lead
+    more_50, more_lowest = (f"{change[1:]} % {'more' if change[0] == '+' else 'less'}" for change in (at_50, at_lowest))
+    assert f"takes {more_50} gas a stride" in " ".join(lead.split())
+    assert f"and {more_lowest} where each has the lowest supply pressure" in lead

@@ -18,8 +18,8 @@ from ppafo.engine.lanes import LaneBlock
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.exports.c_library import c_library, library_of
+from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import c_identifier
-from ppafo.exports.c_library.program import COUNTS
 from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
 from ppafo.identification.trajectory.problem import declaration_of
 from ppafo.identification.trajectory.problem import with_numbers as with_fitted

@@ -155,6 +155,8 @@ STUDY_DOCUMENT = {
     "format": "ppafo study results",
     "schema_version": 2,
     "study": {"name": "task", "configurations": [{"name": "one"}], "outputs": {}},
+    "scenarios": {"task": {"assumptions": []}},
+    "sha256": "0" * 64,
     "runs": 1,
     "chunks": 1,
     "varied": {},

@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import ProgramError
 from ppafo.exports import fmu
-from ppafo.translation import native
+from ppafo.translation import compiling
 from tests import built_once
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -21,7 +21,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
 
     def ask(line: list[str], remedy: str, folder: str, scratch: Path) -> built_once.Done:
         lines.append(line)
-        return native.asked(line, remedy, folder, scratch)
+        return compiling.asked(line, remedy, folder, scratch)
 
     monkeypatch.setattr(fmu, "asked", built_once._asked_once(ask))
     monkeypatch.setattr(fmu, "compiler_for", lambda _name: ["gcc", "-s"])

@@ -8,13 +8,12 @@ import contextlib
 import functools
 import inspect
 import re
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
-from ppafo.arguments.values import Names, Taken, shown, taken
+from ppafo.arguments.values import Taken, annotations_of, shown, taken
 from ppafo.errors import ArgumentError, PpafoError, nearest_name
 
 P = ParamSpec("P")
@@ -86,10 +85,10 @@ def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callab
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.cache
         def signature() -> _Signature:
-            names, found = Names(vars(sys.modules[function.__module__])), inspect.signature(function).parameters
+            parameters, annotations = inspect.signature(function).parameters, annotations_of(function)
             return _Signature(
-                {name: _Parameter(each.default, taken(each.annotation, names)) for name, each in found.items()},
-                tuple(name for name, each in found.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
+                {name: _Parameter(each.default, taken(annotations[name])) for name, each in parameters.items()},
+                tuple(name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
             )
 
         @functools.wraps(function)

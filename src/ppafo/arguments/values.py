@@ -3,6 +3,7 @@
 import builtins
 import os
 import reprlib
+import sys
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -21,13 +22,27 @@ class NotLoaded:
     Help of a command loads no such module; who passes an object of the class has loaded it.
     """
 
+    def __class_getitem__(cls, _parameters: Any) -> type:
+        """Return the class itself: what it is made of is not asked."""
+        return cls
 
-class Names(dict[str, Any]):
+
+class _Names(dict[str, Any]):
     """The names of an annotation: those of its module, of Python, and classes that are not loaded."""
+
+    def __contains__(self, name: object) -> bool:
+        """Return True: a name that nobody knows is a class that is not loaded."""
+        return True
 
     def __missing__(self, name: str) -> Any:
         """Return a name of Python, or a class in the place of one that is not loaded."""
         return getattr(builtins, name) if hasattr(builtins, name) else type(name, (NotLoaded,), {})
+
+
+def annotations_of(function: Callable[..., Any]) -> Mapping[str, Any]:
+    """Return the annotation of each parameter by name; a class that the module does not load is a ``NotLoaded``."""
+    names = _Names(vars(sys.modules[function.__module__]))
+    return typing.get_type_hints(function, localns=names, include_extras=True)
 
 
 class Taken(NamedTuple):
@@ -49,37 +64,30 @@ def shown(value: Any) -> str:
     return f"<{type(value).__name__}>"
 
 
-def taken(annotation: Any, names: Names) -> Taken:
-    """Return what a parameter with an annotation takes, whose text has these names."""
-    annotation = evaluated(annotation, names)
+def taken(annotation: Any) -> Taken:
+    """Return what a parameter with an annotation takes."""
     origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
     if origin is Annotated:
         # Python flattens nested annotations with the outermost last: that one has the last word.
         word = next((item for item in reversed(inner[1:]) if isinstance(item, Word) and item.take), None)
         if word is None or word.take is None:
-            return taken(inner[0], names)
+            return taken(inner[0])
         own = _one(word.what, word.take)
         return own if word.takes_all or not _is_repeated(inner[0]) else _several(own)
     if origin in (typing.Union, types.UnionType):
-        return _either([taken(item, names) for item in inner if item is not types.NoneType], types.NoneType in inner)
+        return _either([taken(item) for item in inner if item is not types.NoneType], types.NoneType in inner)
     if origin is Literal:
         return _one(" or ".join(map(repr, inner)), lambda value: _among(inner, value))
     if annotation is Any:
         return Taken("anything", lambda _, value: value)
-    return _one(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner, names)
+    return _one(*_PLAIN[annotation]) if annotation in _PLAIN else _of_class(origin or annotation, inner)
 
 
-def evaluated(annotation: Any, names: Names) -> Any:
-    """Return what the text of an annotation stands for; anything but a text as it is."""
-    text = annotation.__forward_arg__ if isinstance(annotation, typing.ForwardRef) else annotation
-    return eval(text, {}, names) if isinstance(text, str) else text
-
-
-def _of_class(kind: type, inner: tuple[Any, ...], names: Names) -> Taken:
+def _of_class(kind: type, inner: tuple[Any, ...]) -> Taken:
     if issubclass(kind, Mapping):
-        return _mapping(taken(inner[1], names))
+        return _mapping(taken(inner[1]))
     if inner and _is_iterable(kind):
-        return _several(taken(inner[0], names))
+        return _several(taken(inner[0]))
     if kind is typing.get_origin(Callable[..., Any]):
         return _one("a function", _taken_function)
     return _one(f"a {kind.__name__}", lambda value: _instance(kind, value))

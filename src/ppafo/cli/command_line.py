@@ -8,7 +8,6 @@ from __future__ import annotations
 import argparse
 import inspect
 import re
-import sys
 import types
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -19,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
 
 from ppafo.arguments import Word, number, whole_number
 from ppafo.arguments.door import without_names
-from ppafo.arguments.values import Names, evaluated
+from ppafo.arguments.values import annotations_of
 from ppafo.cli import output
 from ppafo.errors import ArgumentError, PpafoError, nearest_name
 from ppafo.kinds import kind_at
@@ -144,11 +143,10 @@ def reading_of(annotation: Any) -> Reading:
 
 def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
-    names = Names(vars(sys.modules[verb.__module__]))
+    annotations = annotations_of(verb)
     for parameter in inspect.signature(verb).parameters.values():
         if parameter.name not in (PROGRESS, PLUGINS):
-            # The texts of annotations are evaluated for the command that runs, and for no other.
-            yield parameter, reading_of(evaluated(parameter.annotation, names))
+            yield parameter, reading_of(annotations[parameter.name])
 
 
 def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:

@@ -63,6 +63,9 @@ def doctor(
     programs: list the compiled models one by one, with their sizes and when each was last used
     bits: run each scenario and walk of the package for a moment, and compare every bit with those it has elsewhere
     schema: print the JSON Schema of a file format instead, such as scenario
+
+    >>> print(doctor(schema="study").text.splitlines()[1])
+      "$schema": "https://json-schema.org/draft/2020-12/schema",
     """
     from ppafo.engine.cache import tidying
     from ppafo.engine.cache.folder import cache_folder, refusal

@@ -15,6 +15,11 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
 
     folder: a result folder written by ppafo
     out: a .png, .svg or .pdf file; default figure.png and figure.svg in DIR
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("step")
+    >>> print(export_figure(folder).text)
+    written: step/figure.png, step/figure.svg
     """
     from ppafo.report.recording_figure import FIGURE_FORMATS
     from ppafo.report.style import render_figure

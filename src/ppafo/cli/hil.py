@@ -32,6 +32,11 @@ def hil(
     lock_step: wait for each answer instead of for the clock, at most a second: the same run every time
     patience: how long the controller is called; default '10 s'
     out: result folder; default out/NAME-hil of the scenario
+
+    >>> hil("torque-task-solenoid", port="udp:127.0.0.1:49318", patience=0.2)  # no controller is there
+    Traceback (most recent call last):
+    ...
+    ppafo.errors.ScenarioError: no controller answers within 0.2 s; came in: nothing
     """
     from ppafo.exports.hil.loop import stop_by_interrupt
     from ppafo.exports.hil.run import run_at

@@ -93,6 +93,9 @@ def new(
     name: name of the file and of what it describes; of an example, its name; without it, the examples are listed
     source: copy this one: a shipped name, or a .toml file
     out: the .toml file to write, default NAME.toml; of an example, the new folder, default NAME
+
+    >>> print(new("set", "mine").text)
+    written: mine.toml; next: ppafo sets audit mine.toml
     """
     if kind == EXAMPLE:
         if source is not None or (name is None and out is not None):

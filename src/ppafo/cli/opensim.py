@@ -39,6 +39,10 @@ def export_opensim(
         (--strikes=-0.4,0.8 where time begins below 0); default: the walk as it is, from 0 s on
     body_mass: of a recording: for moments and forces per mass, such as '62 kg'
     out: the folder to write
+
+    >>> print(export_opensim("solenoid", minutes=0.1, out=Path("motion")).text)
+    written: motion (device_torque.sto, walk.sto); next: load motion/device_torque.sto in OpenSim; its header says
+    units and signs
     """
     path = Path(walk)
     is_recording = path.suffix != ".toml" and (path.is_dir() or path.suffix.lower() in _RECORDINGS)

@@ -26,6 +26,9 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
     check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated
     out: result folder with the report; default out/NAME of the scenario
+
+    >>> print(simulate("step-response", out=Path("step")).text.splitlines()[0])
+    step-response: completed
     """
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder

@@ -6,10 +6,10 @@ what the entries call. Every compiler reads them there; Python itself runs the t
 
 import ast
 import inspect
-import re
 import textwrap
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from itertools import pairwise
 from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_checkable
 
 import numpy as np
@@ -37,8 +37,7 @@ ENTRY = '@entry("void({})")'
 ORIGIN = "# origin"
 """Beginning of the line before each function that says which lines of which file it was made from."""
 
-_ENTRY = re.compile(r"""^@entry\((["'])void\(([^"'\n]*)\)\1\)\ndef (\w+)\(""", re.MULTILINE)
-_TYPE = re.compile(r"float64\[.*?\]|float64|int64")
+_MARK = "@entry("
 
 
 @runtime_checkable
@@ -60,12 +59,25 @@ def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Cal
 def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:
     """Text of an entry, from the types of its parameters in order and the lines of its body."""
     head = ENTRY.format(", ".join(parameters.values()))
-    return "\n".join([head, f"def {name}({', '.join(parameters)}):", *(f"    {line}" for line in lines), ""])
+    return "\n".join([head, f"def {name}({', '.join(parameters)}):", *indent(lines), ""])
+
+
+def indent(lines: Iterable[str]) -> list[str]:
+    """The lines, one level further in."""
+    return [f"    {line}" for line in lines]
 
 
 def entry_types(source: str) -> dict[str, list[str]]:
     """Types of the parameters of all entries of a text, in order, by the name of the entry."""
-    return {found[3]: _TYPE.findall(found[2]) for found in _ENTRY.finditer(source)}
+    types = {}
+    for mark, head in pairwise(source.split("\n")):
+        if mark.startswith(_MARK):
+            # The mark holds a signature, which reads as a call: void(float64[:, ::1], int64).
+            signature = ast.literal_eval(mark.removeprefix(_MARK).removesuffix(")"))
+            call = ast.parse(signature, mode="eval").body
+            assert isinstance(call, ast.Call)
+            types[head.removeprefix("def ").partition("(")[0]] = [ast.unparse(kind) for kind in call.args]
+    return types
 
 
 def without_origins(source: str) -> str:

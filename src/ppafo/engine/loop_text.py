@@ -10,6 +10,7 @@ from copy import deepcopy
 from types import FunctionType
 from typing import NamedTuple, Protocol
 
+from ppafo.engine.entries import indent
 from ppafo.engine.generator import Composed, StepText
 from ppafo.engine.lane_rows import HANDED, VECTOR, lanes_of
 from ppafo.engine.plain_python import parse_module
@@ -372,11 +373,6 @@ class RowsOfRun:
     def noted(self, function: FunctionType) -> list[ast.stmt]:
         """The docstring of a function of the loop."""
         return [ast.Expr(ast.Constant((function.__doc__ or "").split("\n")[0]))]
-
-
-def indent(lines: Sequence[str]) -> list[str]:
-    """The lines, one level further in."""
-    return [f"    {line}" for line in lines]
 
 
 def over_rows(count: int, line: str) -> list[str]:

@@ -185,7 +185,12 @@ _FILE = TomlKind(
 
 
 def list_gaits() -> tuple[str, ...]:
-    """Return the names of the gaits that come with the package."""
+    """Return the names of the gaits that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_gaits()
+    ('falisse2019-subject1',)
+    """
     return _FILE.names()
 
 
@@ -194,6 +199,11 @@ def load_gait(gait: str | Path = NORMATIVE) -> Gait:
     """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
 
     DataError where it cannot be used.
+
+    >>> import ppafo
+    >>> gait = ppafo.load_gait("falisse2019-subject1")
+    >>> print(f"{gait.stride_time:.3f} s at {gait.walking_speed:.2f} m/s")
+    1.038 s at 1.33 m/s
     """
     return parse_gait(_FILE.read(gait), str(gait))
 

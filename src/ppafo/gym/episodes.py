@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.walking.assistance import TorqueProfile
-from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INLINE, INT, entry_text, with_arrays
+from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INLINE, INT, entry_text, indent, with_arrays
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR, lanes_of
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
 from ppafo.engine.loading import load_source
-from ppafo.engine.loop_text import Call, RowsOfLanes, indent, lane_loop
+from ppafo.engine.loop_text import Call, RowsOfLanes, lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.engine.run import batch_of

@@ -19,6 +19,9 @@ def workbench(
 
     scenarios: names of scenarios and walks, or .toml files; default: the torque task, step response and a walk
     out: the page to write; default out/workbench.html
+
+    >>> print(workbench(["step-response"], out=Path("page.html")).text)
+    written: page.html (... kB, step-response)
     """
     from ppafo.cli.output import Said, check_new_file
     from ppafo.page.html import is_page

@@ -17,7 +17,6 @@ from ppafo.engine.cache.texts import kept_bytes
 from ppafo.errors import ScenarioError
 from ppafo.page.wasm import WasmModule
 from ppafo.signals.recording import Floats
-from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.scenario import Scenario
 
 MOST_FIRST = 12
@@ -76,6 +75,8 @@ def computed_opening(
     scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
     """Return the same as ``opening_of``, computed."""
+    from ppafo.simulation.ensemble import run_ensemble  # a report computes nothing
+
     known = [one["name"] for one in module.description["metrics"]]
     named, claims = claims, [name for name in claims if name in known]
     channels = [one["name"] for one in module.description["channels"]]

@@ -346,6 +346,10 @@ def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides
     ScenarioError for none, too many or two of one name; ProgramError where a program has to be built and cannot be.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> ppafo.workbench("torque-task-proportional")[:15]
+    b'<!DOCTYPE html>'
     """
     name_plugins(plugins)
     content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")

@@ -158,7 +158,12 @@ _FILE = TomlKind("parameter set", "parameters", resources.files("ppafo.parameter
 
 
 def list_sets() -> tuple[str, ...]:
-    """Return the names of the parameter sets that come with the package."""
+    """Return the names of the parameter sets that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_sets()
+    ('cylinder-lever', 'ppafo2011', 'ppafo2011-printed')
+    """
     return _FILE.names()
 
 
@@ -176,6 +181,11 @@ def load_device(
     another valve than the one that is named.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> device = ppafo.load_device("ppafo2011", overrides={"supply.pressure": "70 psi_g"})
+    >>> print(f"{device.supply.pressure:.0f} Pa absolute, {device.foot_plate.inertia:g} kg m^2")
+    583958 Pa absolute, 0.0084 kg m^2
     """
     name_plugins(plugins)
     check_valve(overrides, valve, f"valve = '{valve}'")
@@ -188,6 +198,10 @@ def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> P
     """Return a parameter set by its name in the package or by the path of a TOML file.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> ppafo.load_parameter_set("ppafo2011").title
+    'Portable powered ankle-foot orthosis, completed'
     """
     name_plugins(plugins)
     content, file = _FILE.read(parameter_set), label(str(parameter_set))

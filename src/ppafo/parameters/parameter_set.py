@@ -279,6 +279,11 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve:
     orifice in the form of ISO 6358 drops its area and discharge coefficient, and the reverse. What follows a number
     (``links_of_set``) is set with it, unless it is given too. ParameterError for an override that does not fit the set,
     and for two that give one value.
+
+    >>> import ppafo
+    >>> changed = ppafo.apply_overrides(ppafo.load_parameter_set("ppafo2011"), ["supply.pressure=70 psi_g"])
+    >>> changed.numbers["supply.pressure"].value, changed.numbers["supply.pressure"].unit
+    (70.0, 'psi_g')
     """
     chosen = chosen_valve(parameter_set, valve)
     given = {

@@ -1,8 +1,8 @@
 """From a device to the numbers that the plant and its effects compute with."""
 
-from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import cache
+from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
 
 from ppafo.model.actuators.kind import Range, mean_growth, plant_in_shape
@@ -58,7 +58,7 @@ def valve_settings(valve: Valve) -> Any:
 
 
 def first_settings(valve: Valve) -> Any:
-    """Return the same of the first run, which choose the model of the valve."""
+    """Return the settings [SI] of a valve in the first run of an ensemble: they choose the model for all of them."""
     return valve_settings(valve)._make(map(first, valve_settings(valve)))
 
 
@@ -82,9 +82,9 @@ def shape_and_growth(device: Device) -> tuple[Any, Any]:
 
     def prepared(low: float, high: float, dead_1: float, dead_2: float, pressed: float, *values: float) -> Any:
         stops = Range(angle_min=low, angle_max=high, dead_volume_1=dead_1, dead_volume_2=dead_2)
-        given = kind.settings(*values)
+        settings = kind.settings(*values)
         table = actuator.table
-        shape = model.prepare(given, stops) if table is None else model.prepare(given, stops, table)
+        shape = model.prepare(settings, stops) if table is None else model.prepare(settings, stops, table)
         return shape, mean_growth(shape, stops, pressed, model.chambers)
 
     ends = actuator.angle_min, actuator.angle_max, actuator.dead_volume_1, actuator.dead_volume_2
@@ -134,7 +134,7 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
     """Return the settings [SI] of an effect, arrays (runs,) where they vary; its defaults where nothing is said."""
     if effect.section in others or effect.always:
         section = others[effect.section] if effect.section in others else getattr(device, effect.section)
-        return {item.name: getattr(section, item.name) for item in effect.quantities}
+        return {quantity.name: getattr(section, quantity.name) for quantity in effect.quantities}
     return {**effect.defaults(device.gas.species), **device.effects.get(effect.name, {})}
 
 
@@ -170,32 +170,35 @@ def effect_rows(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Any, .
 
 def effect_row(effect: Effect, device: Device, others: Sections = _NO_SECTIONS) -> Any:
     """Return the row of an effect for a device, whether it is on or not; numbers are arrays (runs,) where they vary."""
-    settings, names, prepare = settings_of(device, effect, others), _names(device.actuator.kind), effect.prepare
+    settings, prepare = settings_of(device, effect, others), effect.prepare
     # Most effects compute with their settings as they are.
     if prepare is None:
         return effect.parameters(*settings.values())
-    # A setting of the actuator comes before a number of the same name.
-    own_numbers = {"actuator": device.actuator.settings}
-    given = [
-        own_numbers[section][name] if name in own_numbers.get(section, ()) else getattr(getattr(device, section), name)
-        for section, inner in names.items()
-        for name in inner
-    ]
+    names = _names(device.actuator.kind)
+    seen = [(section, name) for section, names_of_section in names.items() for name in names_of_section]
 
     def prepared(*numbers: float) -> Any:
-        own, rest = numbers[: len(settings)], iter(numbers[len(settings) :])
-        parts = [_part(section, inner)(*[next(rest) for _ in inner]) for section, inner in names.items()]
-        return prepare(effect.settings(*own), _part("device", tuple(names))(*parts))
+        own, of_device = numbers[: len(settings)], numbers[len(settings) :]
+        sections: dict[str, dict[str, float]] = {section: {} for section in names}
+        for (section, name), number in zip(seen, of_device, strict=True):
+            sections[section][name] = number
+        view = SimpleNamespace(**{section: SimpleNamespace(**inner) for section, inner in sections.items()})
+        return prepare(effect.settings(*own), view)
 
-    return over_runs(prepared, *settings.values(), *given)
+    return over_runs(prepared, *settings.values(), *(_number(device, section, name) for section, name in seen))
+
+
+def _number(device: Device, section: str, name: str) -> Any:
+    """Return a number of a device; a setting of the actuator's kind comes before a field of the same name."""
+    if section == "actuator" and name in device.actuator.settings:
+        return device.actuator.settings[name]
+    return getattr(getattr(device, section), name)
 
 
 @cache
 def _names(actuator_kind: str) -> dict[str, tuple[str, ...]]:
     """Return the numbers of a device that effects see, by section."""
-    found = {section: tuple(item.name for item in members(section, actuator_kind)) for section in SEEN_BY_EFFECTS}
-    return found | {"gas": (*found["gas"], "specific_gas_constant")}
-
-
-_part: Callable[[str, tuple[str, ...]], Any] = cache(namedtuple)
-"""Classes of the parts of a device that effects see."""
+    names = {
+        section: tuple(quantity.name for quantity in members(section, actuator_kind)) for section in SEEN_BY_EFFECTS
+    }
+    return names | {"gas": (*names["gas"], "specific_gas_constant")}

@@ -35,6 +35,11 @@ def export_firmware(
         faults
     table: with --try: compare every integer controller on every target instead (with 1000 samples each)
     out: the folder to write; with --try text, JSON and figure
+
+    >>> from pathlib import Path
+    >>> print(export_firmware(["torque-task-solenoid"], out=Path("firmware")).text)
+    written: firmware (LICENSE, Makefile, README.md, board.h, board_msp430f2013.c, board_simulated.c, controller.c,
+    controller.h, host.c, main.c, msp430.h, msp430f2013.ld, parameters.h, start_msp430.c); next: make -C firmware
     """
     from ppafo.processor.torque_laws import TARGETS
 
@@ -80,6 +85,11 @@ def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Fol
 
     scenario: name of a scenario, or a .toml file
     out: the folder to write
+
+    >>> from pathlib import Path
+    >>> print(export_controller("torque-task-solenoid", out=Path("law")).text)
+    written: law (LICENSE, Makefile, README.md, controller.c, controller.h, host.c, link.c, link.h, parameters.h,
+    plant.h); next: make -C law
     """
     from ppafo.processor.link import example_controller
     from ppafo.simulation.loading import load_scenario

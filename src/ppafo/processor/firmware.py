@@ -19,7 +19,7 @@ from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
-from ppafo.translation.typed import INT, Row
+from ppafo.translation.value_types import INT, Row
 from ppafo.translation.walk import walk_module
 from ppafo.translation.widths import Interval, Narrowed, Range, hull, narrowed
 from ppafo.version import __version__

@@ -19,7 +19,7 @@ from typing import NamedTuple, Protocol, final
 from weakref import finalize
 
 from ppafo.errors import SimulationError, one_line, reason
-from ppafo.translation.native import asked
+from ppafo.translation.compiling import asked
 
 
 class Memory(NamedTuple):

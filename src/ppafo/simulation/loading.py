@@ -345,7 +345,7 @@ FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", 
 class Layout:
     """How the files of one kind of scenario are laid out and built: the kind of file, what it holds, model, builder.
 
-    ``model`` has, of a document, the kinds that are loaded, ``whole`` all of them: messages speak of these.
+    ``model`` has the sections and kinds of a document alone, ``whole`` all there are: messages speak of these.
     """
 
     file: TomlKind
@@ -355,12 +355,17 @@ class Layout:
     build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]
 
 
-VANE = Layout(FILE, OF_A_VANE, lambda _: scenario_file(), lambda _: whole_scenario_file(), build_scenario)
+VANE = Layout(FILE, OF_A_VANE, scenario_file, lambda _: whole_scenario_file(), build_scenario)
 """Scenarios of a vane alone; a room above this one has the scenarios of a leg."""
 
 
 def list_scenarios() -> tuple[str, ...]:
-    """Return the names of the scenarios that come with the package."""
+    """Return the names of the scenarios that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_scenarios()[:3]
+    ('step-response', 'swing-foot', 'torque-task-anti-windup')
+    """
     return FILE.names()
 
 

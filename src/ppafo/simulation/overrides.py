@@ -60,7 +60,7 @@ def apply_overrides(
     of_device = {path: item for path, item in given.items() if path not in declared.appended and is_of_device(path)}
     own = {path: item for path, item in given.items() if path not in of_device}
     waiting = _choose_kinds(changed, own, file, declared)
-    known = declared.paths(changed)
+    known = declared.paths(changed) if own else ()
     for path in sorted(own):
         if path not in known:
             # Where a kind is unknown too, that is the mistake.

@@ -6,7 +6,7 @@ which keys there can be.
 
 import functools
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, WithJsonSchema
@@ -59,15 +59,20 @@ def model_name(name: str) -> str:
     return "".join(part.capitalize() for part in re.split(r"\W|_", name))
 
 
-def profile_table(prescribed: Quantity, purpose: str) -> Any:
-    """Return the section of a profile; ``purpose`` ends the names of its models."""
+def named_or_all(name: str, kinds: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the one kind that is named, all where it is none of them."""
+    return {name: kinds[name]} if name in kinds else kinds
+
+
+def profile_table(prescribed: Quantity, purpose: str, kind: str = "") -> Any:
+    """Return the section of a profile, one kind or all that are loaded; ``purpose`` ends the names of its models."""
     return one_of(
         [
             table(
                 f"{model_name(name)}{purpose}",
-                kind_field(name, kind.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
+                kind_field(name, profile.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
-            for name, kind in PROFILES.loaded().items()
+            for name, profile in named_or_all(kind, PROFILES.loaded()).items()
         ]
     )
 
@@ -114,24 +119,15 @@ def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
     )
 
 
-def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
-    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion."""
+def file_model(name: str, own: dict[str, Any], sections: Container[str] = declaration.SECTIONS) -> type[BaseModel]:
+    """Return the model of a file of a scenario: the sections that every one has, and the ones of its kind of motion.
+
+    Of the sections that may be left out it has those in ``sections``.
+    """
     device = {
         "set": (str, Field(min_length=1, description="name of a parameter set, or a path relative to this file")),
         "valve": optional(str, "name of one of the set's valves; its default valve unless given"),
         "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
-    }
-    isothermal = kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
-    thermal = kind_field(declaration.THERMAL, "the gas warms and cools: energy balance, heat through the walls")
-    gas = [
-        table("IsothermalGas", isothermal),
-        table("ThermalGas", thermal | quantity_fields(declaration.THERMAL_GAS)),
-    ]
-    lines = {
-        line: optional(
-            table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
-        )
-        for line in declaration.SUPPLY_LINES
     }
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
@@ -139,26 +135,49 @@ def file_model(name: str, own: dict[str, Any]) -> type[BaseModel]:
         "description": (str, Field("", description="what this file tries, and why")),
         "device": (table("Device", device), Field(description="the hardware")),
         **own,
-        "gas_model": optional(one_of(gas), "how the gas in the chambers behaves; isothermal unless given"),
-        declaration.SUPPLY_LINE: optional(
-            table("SupplyLine", lines), "regulators and lines of the gas; constant pressures unless given"
-        ),
-        "assumed": (
-            dict[str, str],
-            Field(default_factory=dict, description="assumed values, which no source gives, and why these"),
-        ),
     }
+    if "gas_model" in sections:
+        fields["gas_model"] = optional(_gas_table(), "how the gas in the chambers behaves; isothermal unless given")
+    if declaration.SUPPLY_LINE in sections:
+        what = "regulators and lines of the gas; constant pressures unless given"
+        fields[declaration.SUPPLY_LINE] = optional(_supply_line_table(), what)
+    reasons = "assumed values, which no source gives, and why these"
+    fields["assumed"] = (dict[str, str], Field(default_factory=dict, description=reasons))
     return table(name, fields)
 
 
-def scenario_file() -> type[BaseModel]:
-    """Return the model of a scenario file, for the controllers and profiles that are loaded.
+def _gas_table() -> Any:
+    isothermal = kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
+    thermal = kind_field(declaration.THERMAL, "the gas warms and cools: energy balance, heat through the walls")
+    return one_of(
+        [
+            table("IsothermalGas", isothermal),
+            table("ThermalGas", thermal | quantity_fields(declaration.THERMAL_GAS)),
+        ]
+    )
+
+
+def _supply_line_table() -> Any:
+    lines = {
+        line: optional(
+            table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
+        )
+        for line in declaration.SUPPLY_LINES
+    }
+    return table("SupplyLine", lines)
+
+
+def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
+    """Return the model of a scenario file with the sections and kinds of a document; with all that are loaded for None.
 
     A file that names no controller is compared with all of this package.
     """
     controllers, profiles = CONTROLLERS.loaded_or_own(), PROFILES.loaded()
+    sections = declaration.SECTIONS if document is None else tuple(filter(document.__contains__, declaration.SECTIONS))
+    named = {} if document is None else {section: declaration.kind_at(document, section) for section in _WITH_KINDS}
     # What the model depends on is given for the cache alone: a kind that is loaded meanwhile makes another model.
-    return _scenario_file(tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
+    kinds = (tuple(controllers.items()), tuple(profiles.items()), tuple(motion_kinds()))
+    return _scenario_file(sections, tuple(named.items()), kinds)
 
 
 def whole_scenario_file() -> type[BaseModel]:
@@ -167,39 +186,43 @@ def whole_scenario_file() -> type[BaseModel]:
     return scenario_file()
 
 
-@functools.lru_cache(maxsize=4)
-def _scenario_file(*_kinds: Any) -> type[BaseModel]:
+_WITH_KINDS = ("motion", "controller", "reference")
+
+
+@functools.lru_cache(maxsize=16)
+def _scenario_file(sections: tuple[str, ...], kinds: tuple[tuple[str, str], ...], _loaded: Any) -> type[BaseModel]:
+    named = dict(kinds)
     motions = []
-    for name, kind in motion_kinds().items():
+    for name, kind in named_or_all(named.get("motion", ""), motion_kinds()).items():
         assert kind.section is not None, "kinds of motion of a vane"
         fields = kind_field(name, kind.section.summary) | quantity_fields(kind.section.numbers)
         profile = kind.section.profile
         if profile is not None:
             fields[profile.name] = (profile.layout(), Field(description=profile.summary))
         motions.append(table(f"{model_name(name)}Motion", fields))
-    words = tuple(declaration.PRESSURE_WORDS)
-    reference = profile_table(declaration.TORQUE_LEVEL, "Reference")
-    # The one whole number of the file: half a seed means nothing.
-    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-    sensors = quantity_fields(declaration.SENSORS) | {"seed": (seed, Field(1, description=declaration.SEED.summary))}
-    initial = table("Initial", quantity_fields(declaration.INITIAL, words))
+    controllers = named_or_all(named.get("controller", ""), CONTROLLERS.loaded())
     own: dict[str, Any] = {
         "run": (
             table("Run", quantity_fields((*declaration.RUN, declaration.ACCURACY))),
             Field(description="times of the run, and its accuracy"),
         ),
         "motion": (one_of(motions), Field(description="what the vane does")),
-        "initial": optional(initial, "state of the gas at the start; atmosphere unless given"),
-        "controller": (
-            controller_table(CONTROLLERS.loaded(), "Controller"),
-            Field(description="what commands the valve"),
-        ),
-        "reference": optional(
-            reference, "torque that the controller follows; only one that follows none, as constant, may leave it out"
-        ),
-        "sensors": optional(table("Sensors", sensors), "sensors of the controller; ideal unless given"),
     }
-    return file_model("ScenarioFile", own)
+    if "initial" in sections:
+        initial = table("Initial", quantity_fields(declaration.INITIAL, tuple(declaration.PRESSURE_WORDS)))
+        own["initial"] = optional(initial, "state of the gas at the start; atmosphere unless given")
+    own["controller"] = (controller_table(controllers, "Controller"), Field(description="what commands the valve"))
+    if "reference" in sections:
+        reference = profile_table(declaration.TORQUE_LEVEL, "Reference", named.get("reference", ""))
+        what = "torque that the controller follows; only one that follows none, as constant, may leave it out"
+        own["reference"] = optional(reference, what)
+    if "sensors" in sections:
+        # The one whole number of the file: half a seed means nothing.
+        seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+        sensors = quantity_fields(declaration.SENSORS)
+        sensors["seed"] = (seed, Field(1, description=declaration.SEED.summary))
+        own["sensors"] = optional(table("Sensors", sensors), "sensors of the controller; ideal unless given")
+    return file_model("ScenarioFile", own, sections)
 
 
 def json_schema() -> dict[str, Any]:

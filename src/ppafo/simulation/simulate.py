@@ -2,10 +2,10 @@
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -48,8 +48,37 @@ class Status:
         return self.kind == "completed"
 
 
-Measured = tuple[Recording, "Mapping[str, Metric]", str]
-"""The channels of a run, its metrics, and how it ended if it was completed, in words."""
+class Measured(NamedTuple):
+    """The channels of a run, its metrics by name, and how it ended if it was completed, in words."""
+
+    recording: Recording
+    metrics: "Mapping[str, Metric]"
+    ended: str
+
+
+class Measuring:
+    """What is measured of a run, made when it is first asked for: many runs are never looked at."""
+
+    __slots__ = ("_measured",)
+
+    def __init__(self, measured: Measured | Callable[[], Measured]) -> None:
+        self._measured = measured
+
+    def __call__(self) -> Measured:
+        """Return recording, metrics and end, the same at every call."""
+        # What makes them holds all rows of the run, so it is let go once they are made.
+        if not isinstance(self._measured, Measured):
+            self._measured = self._measured()
+        return self._measured
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Measuring) and self() == other()
+
+    __hash__ = None  # type: ignore[assignment]  # recordings have no hash
+
+    def __reduce__(self) -> tuple[type["Measuring"], tuple[Measured]]:
+        """Copy and pickle what was measured: the program of the run stays in this process."""
+        return Measuring, (self(),)
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -57,34 +86,26 @@ class Result:
     """A finished run. ``versions`` are the packages', ``engine`` the figures of the time stepping."""
 
     scenario: Scenario
-    recording: Recording
-    metrics: "Mapping[str, Metric]"
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
+    measured: Measuring
 
-    _measure: Callable[[], Measured] | None = field(default=None, init=False, repr=False, compare=False)
-    """What makes recording and metrics of a run until they are first asked for: many runs are never looked at."""
+    @property
+    def recording(self) -> Recording:
+        """The channels over time, in SI."""
+        return self.measured().recording
 
-    def __getattr__(self, name: str) -> Any:
-        """Return recording or metrics where they were not made yet, and keep both."""
-        # Python comes here only where the ordinary look-up fails, as for a field that was never set.
-        if name not in ("recording", "metrics"):
-            raise AttributeError(f"a result has no '{name}'", name=name, obj=self)
-        measure = self._measure
-        if measure is not None:
-            recording, metrics, _ = measure()
-            # The class is frozen, and these two are only kept, so they are set past it.
-            object.__setattr__(self, "recording", recording)
-            object.__setattr__(self, "metrics", metrics)
-            object.__setattr__(self, "_measure", None)
-        return object.__getattribute__(self, name)
+    @property
+    def metrics(self) -> "Mapping[str, Metric]":
+        """The metrics by name, in SI."""
+        return self.measured().metrics
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
         scenario, status = self.scenario, self.status
         width = max((len(name) for name in self.metrics), default=0)
-        lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
+        lines = [f"  {name:<{width}}  {metric.value:.4g} {metric.unit}" for name, metric in self.metrics.items()]
         return "\n".join(
             [f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}", *lines]
         )
@@ -196,26 +217,22 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
     if scenario.walks:
         # A walk is measured at once, for its status says how it ended.
-        recording, metrics, ended = _measured(scenario, run, times[:kept], record[:kept], rows)
-        status = replace(status, message=ended) if status.is_completed else status
-        return Result(scenario, recording, metrics, status, versions, engine)
+        measured = _measured(scenario, run, times[:kept], record[:kept], rows)
+        if status.is_completed:
+            status = replace(status, message=measured.ended)
+        return Result(scenario, status, versions, engine, Measuring(measured))
     shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
-    # Without __init__ recording and metrics stay unset, so that __getattr__ makes them when first asked for.
-    result: Result = object.__new__(Result)
-    known = {"scenario": scenario, "status": status, "versions": versions, "engine": engine}
     measure = partial(_measured, scenario, run, times[:kept], record[:kept], shown)
-    for name, value in {**known, "_measure": measure}.items():
-        object.__setattr__(result, name, value)
-    return result
+    return Result(scenario, status, versions, engine, Measuring(measure))
 
 
-def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> "Measured":
+def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
     """Recording and metrics of a record (samples, rows), and how a completed run ended."""
     from ppafo.metrics.metric import Metrics
 
     by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
     recording, metrics, ended = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
-    return recording, Metrics(metrics), ended
+    return Measured(recording, Metrics(metrics), ended)
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:

@@ -236,7 +236,13 @@ def check_result_folder(folder: str | Path) -> None:
 
 @checked()
 def read_result(folder: str | Path) -> StoredResult:
-    """Return what a result folder holds. DataError for a folder that holds none."""
+    """Return what a result folder holds. DataError for a folder that holds none.
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("step")
+    >>> ppafo.read_result(folder).document["status"]
+    {'kind': 'completed', 'time': None, 'message': 'completed'}
+    """
     place = Path(folder)
     if not place.is_dir():
         raise DataError(f"{folder}: is not a folder")
@@ -278,6 +284,11 @@ def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHE
     """Return the recording in a ``.nc`` file or a table of text such as ``.csv``, or in a result folder, of a walk too.
 
     Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("step")
+    >>> ppafo.read_recording(folder).names[:3]
+    ('angle', 'angular_velocity', 'pressure_1')
     """
     place = Path(path)
     if place.is_dir() and (place / RUN_FILE).exists():

@@ -38,7 +38,12 @@ STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / 
 
 
 def list_studies() -> tuple[str, ...]:
-    """Return the names of the studies that come with the package."""
+    """Return the names of the studies that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_studies()
+    ('gas-of-a-stride', 'pressure-and-area', 'torque-task-uncertainty', 'wearers')
+    """
     return STUDY_FILES.names()
 
 
@@ -56,6 +61,11 @@ def load_study(
     ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
     and the random seed of the file. ``plugins`` are modules of your own whose objects files may name, as of
     ``simulate``. StudyError for anything that is not usable.
+
+    >>> import ppafo
+    >>> study = ppafo.load_study("torque-task-uncertainty", draws=64)
+    >>> [configuration.name for configuration in study.configurations]
+    ['proportional', 'solenoid']
     """
     name_plugins(plugins)
     document, source = read_source(STUDY_FILES, study)

@@ -21,7 +21,8 @@ from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed
 from ppafo.translation.scopes import Scopes, scopes_of
-from ppafo.translation.typed import (
+from ppafo.translation.typed import Function, Module, Statement, Term
+from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
     INT,
@@ -29,13 +30,10 @@ from ppafo.translation.typed import (
     INT32,
     LIBRARY,
     Array,
-    Function,
     Items,
-    Module,
     Row,
+    Scalar,
     Shared,
-    Statement,
-    Term,
     Type,
     is_empty,
     types_in,
@@ -401,7 +399,7 @@ class _Writer:
 
     def type_name(self, kind: Type) -> str:
         """Name of a type in C; a struct is written where it is met first."""
-        if isinstance(kind, typed.Scalar):
+        if isinstance(kind, Scalar):
             return _SCALARS[kind.name]
         if isinstance(kind, Array):
             return "ppafo_array"
@@ -518,7 +516,7 @@ class _Body:
             if name in self.scopes.read and not is_empty(kind):
                 # A number begins as 0, so that no compiler fears for it.
                 begin = {BOOL: " = false", FLOAT: " = 0.0"}
-                value = begin.get(kind, " = 0") if isinstance(kind, typed.Scalar) else ""
+                value = begin.get(kind, " = 0") if isinstance(kind, Scalar) else ""
                 lines.append(f"{'    ' * level}{self.writer.type_name(kind)} {self.name(name)}{value};")
         for statement in body:
             lines += self.statement(statement, level)

@@ -4,18 +4,13 @@ Handing an array to C costs Python about a microsecond, a number a twentieth of 
 packed into one block of memory, once where they stay the same.
 """
 
-import contextlib
 import ctypes
 import hashlib
 import importlib.util
-import os
 import platform
-import signal
 import struct
-import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -27,88 +22,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo import interrupts
 from ppafo.engine.compilers import FLAGS, CompilerError
 from ppafo.engine.lane_rows import COMPILED, lanes_of
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, join_results
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, one_line, reason
-from ppafo.translation.typed import FLOAT, INT, LIBRARY, Array, Scalar, Type, entries_of
-
-LONGEST_COMPILING = 300.0
-"""Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
-_LONGEST_ANSWER = 10.0
-"""Seconds that it has to say its version."""
-# Between two looks at an interrupt while a compiler runs [s].
-_PAUSE = 0.25
-
-
-def asked(
-    line: Sequence[str],
-    remedy: str = "",
-    folder: str | None = None,
-    scratch: Path | None = None,
-    limit: float | None = None,
-) -> "subprocess.CompletedProcess[str]":
-    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run.
-
-    ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
-    not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
-    """
-    # A compiler that is killed leaves its files here, where the whole folder goes away.
-    temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
-    seconds = LONGEST_COMPILING if limit is None else limit
-    try:
-        process = subprocess.Popen(
-            line,
-            cwd=folder,
-            env={**os.environ, **_home(), **temporary},
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            encoding="utf-8",
-            errors="replace",
-            # A group of its own, so that cc1 and the linker end with the driver.
-            process_group=0 if os.name == "posix" else None,
-        )
-    except OSError as error:
-        raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
-    with process:
-        end = time.monotonic() + seconds
-        try:
-            while True:
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    said, complained = process.communicate(timeout=min(_PAUSE, seconds))
-                    return subprocess.CompletedProcess(line, process.returncode, said, complained)
-                interrupts.check()
-                if time.monotonic() > end:
-                    raise CompilerError(f"{Path(line[0]).name} did not end within {seconds:g} s and was stopped")
-        finally:
-            # Ended by an interrupt or its time, the driver's children would go on.
-            if process.poll() is None or process.returncode < 0:
-                with contextlib.suppress(OSError):
-                    if os.name == "posix":
-                        os.killpg(process.pid, signal.SIGKILL)
-                    else:
-                        process.kill()
-
-
-def _home() -> dict[str, str]:
-    """The home of this user where the environment does not say it: zig works with none else."""
-    if os.environ.get("HOME") or os.name != "posix":
-        return {}
-    try:
-        return {"HOME": str(Path("~").expanduser())}
-    except RuntimeError:
-        return {}
-
-
-def complaint(done: "subprocess.CompletedProcess[str]") -> str:
-    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
-    # gcc and clang say it on stderr, some wrappers on stdout.
-    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
-    return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
-
+from ppafo.translation.value_types import FLOAT, INT, LIBRARY, Array, Scalar, Type, entries_of
 
 Entries = Mapping[str, tuple[Type, ...]]
 """Types of the parameters of entries, by name."""
@@ -228,17 +147,6 @@ _LIBRARY_FILE = {"win32": "program.dll", "darwin": "program.dylib"}.get(sys.plat
 COMPILERS = ("gcc", "clang", "zig")
 """In the order of preference: most lanes are about as quick by each, a slow valve takes four times as long by the last
 two."""
-_INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
-_PASSING = (
-    "no space left",
-    "quota exceeded",
-    "temporary file",
-    "cannot allocate memory",
-    "out of memory",
-    "killed signal",
-    "cache directory",
-)
-"""What compilers say where the computer lacks something at that moment, in small letters."""
 _LANE_LOOP = entries_of(f"{COMPILED}\ndef advance(")
 _TITLE = "Generated from the functions of ppafo. Not to be edited."
 
@@ -272,8 +180,10 @@ class CCompiler:
 
     def described(self) -> str:
         """Its name and version, as it says them."""
+        from ppafo.translation.compiling import LONGEST_ANSWER, asked  # a run asks no compiler
+
         try:
-            answer = asked([*self.command, "--version"], limit=_LONGEST_ANSWER).stdout
+            answer = asked([*self.command, "--version"], limit=LONGEST_ANSWER).stdout
         except CompilerError as failure:
             answer = str(failure)
         said = next(iter(answer.splitlines()), "")
@@ -281,15 +191,18 @@ class CCompiler:
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Take a composed text to C and compile it; the library stays beside ``path`` where that is a place."""
+        from ppafo.translation.compiling import compile_library  # most programs are there
+
         translated = translated_text(source)
         if Path(path).is_absolute():
-            _compiled(translated, Path(path).parent, self.command, self.flags)
+            compile_library(translated, Path(path).with_name(_LIBRARY_FILE), self.command, self.flags)
             self.run_text(source, path, module)
             return
         try:
             # A loaded library may be removed on Unix; on Windows its file stays until the process ends.
             with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
-                library = _compiled(translated, Path(folder), self.command, self.flags)
+                library = Path(folder) / _LIBRARY_FILE
+                compile_library(translated, library, self.command, self.flags)
                 _fill(module, library, entries_of(source))
         except OSError as error:
             problem = f"what {self.name} makes cannot be kept for an instant: {reason(error)}"
@@ -375,31 +288,13 @@ def build(
 
     CompilerError where the compiler refuses it.
     """
-    library = _compiled(with_packed_entries(source, entries), folder, command, flags)
+    from ppafo.translation.compiling import compile_library
+
+    library = folder / _LIBRARY_FILE
+    compile_library(with_packed_entries(source, entries), library, command, flags)
     module = ModuleType(library.stem)
     _fill(module, library, entries)
     return module
-
-
-def _compiled(source: str, folder: Path, command: Sequence[str], flags: Sequence[str]) -> Path:
-    """The library that a compiler makes of C, in a folder."""
-    # Windows has no mounts without execution, nor the flag.
-    if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:
-        raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *COMPILERS)
-    written, library = folder / "program.c", folder / _LIBRARY_FILE
-    written.write_text(source, encoding="utf-8")
-    position = () if sys.platform == "win32" else ("-fPIC",)
-    line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
-    done, name = asked(line, scratch=folder), Path(command[0]).name
-    if done.returncode in _INTERRUPTED:
-        raise SimulationError(f"{name} was interrupted")  # by the same key as this process: it works all the same
-    if done.returncode != 0:
-        # Killed, or without room for its files: the compiler itself is sound and may work the next time.
-        passing = done.returncode < 0 or any(sign in done.stderr.casefold() for sign in _PASSING)
-        raise CompilerError(f"{name} does not compile a model: {complaint(done)}", passing=passing)
-    if not library.is_file():
-        raise CompilerError(f"{name} ended without an error, but made no library")
-    return library
 
 
 def _fill(module: ModuleType, library: Path, entries: Entries) -> None:

@@ -5,7 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 from ppafo.translation import typed
-from ppafo.translation.typed import Function, Statement, Term, Type
+from ppafo.translation.typed import Function, Statement, Term
+from ppafo.translation.value_types import INT, Type
 
 Block = tuple[Statement, ...]
 
@@ -154,7 +155,7 @@ def _made(statement: Statement) -> tuple[str, Type] | None:
         return statement.name, statement.value.type
     if isinstance(statement, typed.Reserve):
         return statement.name, statement.type
-    return (statement.name, typed.INT) if isinstance(statement, typed.Count) else None
+    return (statement.name, INT) if isinstance(statement, typed.Count) else None
 
 
 def _blocks(statement: Statement) -> list[Block]:

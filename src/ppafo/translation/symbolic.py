@@ -19,7 +19,8 @@ from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.model.effects.kind import Effect
 from ppafo.translation import typed
-from ppafo.translation.typed import FLOAT, INT, Function, Handed, Items, Row, Statement, Term, Type, is_empty
+from ppafo.translation.typed import Function, Statement, Term
+from ppafo.translation.value_types import FLOAT, INT, Handed, Items, Row, Type, is_empty
 from ppafo.translation.walk import walk_module
 
 Compare = Callable[[str, Any, Any, str], Any]

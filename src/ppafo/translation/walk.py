@@ -18,27 +18,23 @@ from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
 from ppafo.translation.scopes import Names, changed, needed
-from ppafo.translation.typed import (
+from ppafo.translation.typed import FUNCTIONS, Function, Module, Statement, Term, converted
+from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
-    FUNCTIONS,
     INT,
     LIBRARY,
     Array,
-    Function,
     Handed,
     Items,
-    Module,
     Row,
     Scalar,
     Shared,
-    Statement,
-    Term,
     Type,
-    converted,
     entries_of,
     is_empty,
     joined,
+    mixes,
     types_in,
 )
 
@@ -300,7 +296,7 @@ class Expressions:
         if kind is None:
             raise self.refused(node, "a choice between values of different forms")
         # In C both sides get one type: an int that becomes a float loses digits, and -0 differs from 0.
-        if typed.mixes(yes.type, no.type):
+        if mixes(yes.type, no.type):
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
         return Term("choice", kind, (test, converted(yes, kind), converted(no, kind)))
 
@@ -616,7 +612,7 @@ class _FunctionWalk:
             kinds = sorted({kind_of(item) for item in (self.returns, value.type) if item is not None})
             problem = f"the ways through the function return different things: {' or '.join(kinds)}"
             raise self.module.mistaken(self.first_return or node, problem)
-        if self.returns is not None and typed.mixes(self.returns, value.type):
+        if self.returns is not None and mixes(self.returns, value.type):
             raise self.refused(node, "a function that returns a whole number in one place and a float in another")
         self.has_widened |= self.returns is not None and kind != self.returns
         self.returns, self.first_return = kind, self.first_return or node
@@ -747,7 +743,7 @@ class _FunctionWalk:
         found = joined(before, kind)
         if found is None:
             raise self.refused(node, f"'{name}' holds values of different forms")
-        if typed.mixes(before, kind):
+        if mixes(before, kind):
             raise self.refused(node, f"'{name}' holds a whole number in one place and a float in another")
         self.has_widened |= found != before
         self.types[name] = found

@@ -10,20 +10,8 @@ from typing import NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
-from ppafo.translation.typed import (
-    BOOL,
-    INT,
-    INT16,
-    INT32,
-    Function,
-    Items,
-    Module,
-    Row,
-    Statement,
-    Term,
-    Type,
-    types_in,
-)
+from ppafo.translation.typed import Function, Module, Statement, Term
+from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, Scalar, Type, types_in
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
 MOST_TURNS = 64
@@ -222,7 +210,7 @@ def _refused(item: Function, what: str) -> ProgramError:
     return ProgramError(f"{item.source}: {what}, which cannot be taken to whole numbers of 16 and 32 bits")
 
 
-def _width(found: Interval) -> typed.Scalar | None:
+def _width(found: Interval) -> Scalar | None:
     """The narrowest type that holds a range; None where none does."""
     return next((kind for kind, own in _WIDTHS if own.low <= found.low and found.high <= own.high), None)
 
@@ -302,7 +290,7 @@ class _Narrowing:
 
     def calculated(self, term: Term, parts: tuple[Term, ...]) -> Term:
         """A term that works something out, in the widest type of its parts and its value."""
-        own = self.type_of(term.type, self.ranges.terms[id(term)]) if isinstance(term.type, typed.Scalar) else term.type
+        own = self.type_of(term.type, self.ranges.terms[id(term)]) if isinstance(term.type, Scalar) else term.type
         if term.kind == "number" or (term.kind == "convert" and parts[0].type == BOOL):
             return replace(term, type=own, parts=parts)
         if term.kind == ">>":
@@ -316,7 +304,7 @@ class _Narrowing:
             widest: Type = INT32 if INT32 in kinds else INT16
             whole = tuple(converted(part, widest) for part in whole)
             own = widest if term.type == INT else own
-        elif term.kind == "choice" and not isinstance(term.type, typed.Scalar):
+        elif term.kind == "choice" and not isinstance(term.type, Scalar):
             own = whole[0].type
         return replace(term, type=own, parts=(*parts[: len(parts) - len(whole)], *whole))
 

@@ -7,7 +7,6 @@ processes start without it; ``scripts/known_units.py`` writes that file.
 import functools
 import json
 from decimal import Decimal
-from importlib.resources import files
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ppafo.constants import PASCALS_PER_PSI
@@ -113,6 +112,8 @@ def parse_unit(unit: str) -> tuple[ParsedUnit, str]:
 @functools.cache
 def known_units() -> dict[str, ParsedUnit]:
     """Return the kept units by their normal spelling."""
+    from importlib.resources import files  # what speaks of units reads none yet
+
     told = json.loads((files("ppafo") / "known_units.json").read_text(encoding="utf-8"))
     return {unit: ParsedUnit(Decimal(scale), Decimal(offset), powers) for unit, (scale, offset, powers) in told.items()}
 

@@ -85,7 +85,12 @@ _TURN = 2.0 * math.pi
 
 
 def list_walks() -> tuple[str, ...]:
-    """Return the names of the walk configurations that come with the package."""
+    """Return the names of the walk configurations that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_walks()[:3]
+    ('off', 'proportional', 'proportional-learning')
+    """
     return FILE.names()
 
 
@@ -113,6 +118,10 @@ def load_walk(
     subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ``plugins``
     are modules of your own whose objects files may name, as of ``simulate``. ScenarioError, ParameterError or DataError
     for anything that cannot be used.
+
+    >>> import ppafo
+    >>> ppafo.load_walk("solenoid", task_sequence="corridor").name
+    'solenoid'
     """
     name_plugins(plugins)
     file, given = label(str(scenario)), tuple(overrides)

@@ -70,6 +70,11 @@ def walk(
     and those in all, part by part.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> result = ppafo.walk("solenoid", minutes=0.1)
+    >>> print(f"{result.metrics['toe_clearance'].value:.3f} m")
+    -0.034 m
     """
     name_plugins(plugins)
     if isinstance(scenario, Scenario):
@@ -157,6 +162,12 @@ def compare_walks(
     """Walk ``minutes`` [min], or a whole task sequence, with the device and without.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
+
+    >>> import ppafo
+    >>> compared = ppafo.compare_walks("solenoid", minutes=0.1)
+    >>> walks = compared.with_device, compared.without_device
+    >>> [f"{result.metrics['toe_clearance'].value:.3f} m" for result in walks]
+    ['-0.034 m', '-0.121 m']
     """
     configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     worn = walk(configuration, minutes=minutes, progress=progress)
@@ -318,6 +329,11 @@ def walk_population(
     """Let many wearers walk for ``minutes`` [min], or all of a task sequence; the first is the configuration's.
 
     ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
+
+    >>> import ppafo
+    >>> population = ppafo.walk_population("solenoid", wearers=2, minutes=0.1)
+    >>> [f"{clearance:.3f} m" for clearance in population.outcomes["toe_clearance"]]
+    ['-0.035 m', '-0.033 m']
     """
     if not 1 <= wearers <= MAXIMUM_WEARERS:
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")

@@ -19,10 +19,10 @@ HEAVY = frozenset(
 )
 READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
 WRITING = {"h5netcdf", "h5py", "jinja2"}
-MOST_BEFORE_THE_RUN, MOST = 132, 178
+MOST_BEFORE_THE_RUN, MOST = 130, 175
 """Modules of the package that a run of a scenario may load; what has no part in it stays out."""
-MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 118, 21_500
-"""Modules and their lines that a run from Python may load: 116 when this was written."""
+MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 116, 18_600
+"""Modules and their lines that a run from Python may load: 116 and 18,584 when this was written."""
 
 CODE = """
 import json, sys
@@ -125,11 +125,13 @@ def test_what_a_run_from_python_loads_does_not_grow_unnoticed(run_from_python: l
         "report.writing",
         "storage.netcdf",
         "translation.c99",
+        "translation.compiling",
         "model.plant_faults",
         "model.gait",
         "model.leg",
         "model.regulator",
         "model.actuators.table",
+        "engine.generator",
         "engine.led_leg",
         "simulation.check",
         "simulation.sampled",

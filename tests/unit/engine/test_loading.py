@@ -17,7 +17,7 @@ from ppafo.engine.cache.tidying import list_left_out, list_programs
 from ppafo.engine.compilers import OFFERED
 from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try, load_source
 from ppafo.errors import ProgramError, SimulationError
-from ppafo.translation import native
+from ppafo.translation import compiling, native
 from tests.compilers_here import compilers_here
 
 HEADER = "import math\n\n\n"
@@ -199,7 +199,7 @@ def test_a_compiler_that_never_ends_is_stopped_with_what_it_started_and_the_next
     compiler_that_fails("gcc", tmp_path / "bin", monkeypatch).write_text(
         f"#!/bin/sh\nsleep 600 &\necho $! > {started}\nwait\n", encoding="utf-8"
     )
-    monkeypatch.setattr(native, "LONGEST_COMPILING", 0.5)
+    monkeypatch.setattr(compiling, "LONGEST_COMPILING", 0.5)
     assert result_of(text("x[0, 0] + 0.75")) == 2.75
     assert caplog.messages[0] == (
         "ppafo: gcc did not end within 0.5 s and was stopped; "

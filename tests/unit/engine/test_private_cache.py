@@ -165,8 +165,9 @@ def test_user_without_home_and_without_an_entry_goes_without_a_cache(
 def test_full_disk_is_no_error(tmp_path: Path) -> None:
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (2000, 2000))\n"
     environment = {**os.environ, "PPAFO_CACHE_DIR": str(tmp_path / "programs")}
+    # Without -B Python would keep what it compiles of the package itself cut at the limit, and break all later imports.
     done = subprocess.run(
-        [sys.executable, "-c", limit + RUN], env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-B", "-c", limit + RUN], env=environment, capture_output=True, text=True, check=False
     )
     assert done.stdout == "42.0\n", done.stderr
     assert "is not kept" in done.stderr

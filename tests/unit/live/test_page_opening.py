@@ -98,7 +98,7 @@ def test_the_page_says_its_main_fact_and_its_questions_set_the_sliders(chromium:
     facts = page.locator(".facts")
     said = facts.inner_text().replace("\u00a0", " ")
     assert "The task requires 6 N m; the supply sustains 5.0 N m, so the shaded part is out of reach." in said
-    assert "lasts 9.5 minutes (Solenoid pair), 30 minutes (Proportional valve)" in facts.inner_text()
+    assert "lasts 9.4 minutes (Solenoid pair), 30 minutes (Proportional valve)" in facts.inner_text()
     assert "shaded" in facts.inner_text()
     page.get_by_role("link", name="What if the task required 4 N m?").click()
     page.wait_for_timeout(300)

@@ -18,7 +18,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.translation.c99 import c_source, program_source
 from ppafo.translation.native import build, run_native
-from ppafo.translation.typed import entries_of
+from ppafo.translation.value_types import entries_of
 from ppafo.translation.walk import walk_module
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration

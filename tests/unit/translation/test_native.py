@@ -18,7 +18,7 @@ from ppafo.errors import ProgramError, SimulationError
 from ppafo.golden_bits import digest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.translation import native
+from ppafo.translation import compiling, native
 from scripts.golden_bits import drawn_batch
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -57,13 +57,13 @@ def test_a_program_of_gcc_is_kept_found_again_and_made_anew_where_it_is_damaged(
     batch: Batch, fresh_cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     compiled: list[Path] = []
-    compile_c = native._compiled
+    compile_c = compiling.compile_library
 
-    def counted(source: str, folder: Path, *given: Any) -> Path:
-        compiled.append(folder)
-        return compile_c(source, folder, *given)
+    def counted(source: str, library: Path, *given: Any) -> None:
+        compiled.append(library)
+        compile_c(source, library, *given)
 
-    monkeypatch.setattr(native, "_compiled", counted)
+    monkeypatch.setattr(compiling, "compile_library", counted)
     forget_programs(monkeypatch)
     expected = by("gcc", batch, monkeypatch)
     (kept,) = list_programs(fresh_cache)

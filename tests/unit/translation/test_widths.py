@@ -8,7 +8,8 @@ import pytest
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.translation.c99 import c_source
-from ppafo.translation.typed import INT, INT16, INT32, Module
+from ppafo.translation.typed import Module
+from ppafo.translation.value_types import INT, INT16, INT32
 from ppafo.translation.walk import walk_module
 from ppafo.translation.widths import Interval, hull, narrowed
 

@@ -53,6 +53,12 @@ def compare(
     baseline: configuration that all others are compared with; default: the first
     draws: draws of the uncertain values; default 4096
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> compared = ppafo.compare(["torque-task-proportional", "torque-task-solenoid"]).found
+    >>> (task,) = compared.tasks
+    >>> [(case.configuration, f"{case.metrics['rms_error'].value:.3f} N m") for case in task.cases]
+    [('torque-task-proportional', '0.869 N m'), ('torque-task-solenoid', '1.026 N m')]
     """
     name_plugins(plugins)
     from dataclasses import replace

@@ -42,6 +42,10 @@ def load_design(
     ``seed`` replaces the seed of a file with tasks. StudyError or ParameterError for what is not usable, in one line.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> [task.name for task in ppafo.load_design("torque-task").tasks]
+    ['ramp to 6 N m', 'ramp to 3 N m']
     """
     name_plugins(plugins)
     document, file = read_design_file(problem)

@@ -51,6 +51,13 @@ def design(
     toes: lowest height of the toes in mid-swing; default: '1 cm', or the healthy gait's own where that is less
     catalogue: a .toml file with parts of your own; default: the catalogue of the package
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> from dataclasses import replace
+    >>> problem = ppafo.load_design("torque-task")
+    >>> search = problem.search.model_copy(update={"screening": 256, "population": 16, "generations": 2})
+    >>> print(ppafo.design(replace(problem, search=search)).said[0])
+    The paper's torque task with parts and settings free: error, gas per task and mass against each other.
     """
     name_plugins(plugins)
     from ppafo.analyses.design.front import answer as front

@@ -53,6 +53,11 @@ def bottle(
     rest: time of each rest; default '0 s' (no rest)
     longest: maximum simulated time; default '1440 min'
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> discharge = ppafo.bottle(gas_per_stride="0.3 g").found.discharge
+    >>> print(f"{discharge.walking_time / 60.0:.1f} min: {discharge.ending.kind}")
+    14.6 min: too cold
     """
     name_plugins(plugins)
     from dataclasses import replace

@@ -34,6 +34,11 @@ def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -
     The same device, without faults, walks on the bottle until that ends it, as ``ppafo walk --bottle`` does;
     ``bottle`` is its own, or the paper's, unless given. A stride is one of the leg with the device, or a whole
     task sequence.
+
+    >>> import ppafo
+    >>> endurance = ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1))
+    >>> print(f"{endurance.discharge.walking_time / 60.0:.1f} min: {endurance.discharge.ending.kind}")
+    5.2 min: frozen
     """
     gas = walk_gas(result)
     # A walk that takes no gas lasts for ever on any bottle.

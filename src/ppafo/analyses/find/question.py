@@ -10,7 +10,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
-    from ppafo.analyses.find.solve import Threshold
+    from ppafo.analyses.find.answer import Threshold
     from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
 
@@ -45,62 +45,18 @@ def find(
     highest: find the highest value
     grid: number of evenly spaced values to try first; default 64
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"
+    >>> print(ppafo.find(task, vary="supply.pressure=20..90 psi_g", such_that=metric).said[0])
+    supply.pressure = 54.7758 psi_g is the lowest value that meets rms_error <= 0.5 N m: rms_error is 0.5 N m there
+    (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
-    import numpy as np
-
-    from ppafo.analyses.find.solve import (
-        ACCURACY,
-        CONDITION,
-        FEWEST,
-        MOST,
-        PARTS,
-        SEED,
-        STREAMS,
-        Search,
-        finding_of,
-        range_of,
-    )
-    from ppafo.errors import StudyError, one_line
+    from ppafo.analyses.find.answer import finding_of
+    from ppafo.analyses.find.solve import outermost
     from ppafo.loading import scenario_or_load
-    from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
     from ppafo.studies.study import with_overrides
-    from ppafo.study.runs import Runs, Tally, with_companions
 
     base = with_overrides(scenario_or_load(scenario), overrides)
-    path, low, high = range_of(vary, base)
-    parts = CONDITION.fullmatch(such_that)
-    if parts is None:
-        raise StudyError(
-            f"'{one_line(such_that)}' is not of the form METRIC <= LIMIT or METRIC >= LIMIT, "
-            "for example 'final_error <= 0.3 N m'"
-        )
-    check_metrics([parts[1]], base)
-    limit = level_of(parts[3], parts[1], f"'{one_line(such_that)}'", atmosphere_of(base, [path.path]))
-    condition = Limit(parts[1], limit, parts[2] == "<=", f"{parts[1]} {parts[2]} {parts[3]}")
-    if not FEWEST <= grid <= MOST:
-        raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
-    # The same streams for all values, so that neighbours differ by the value alone.
-    seeds = seeds_of_noise([base], [path.path], 0, STREAMS, SEED)
-    tally = Tally(grid * max(1, seeds.size), progress)
-    search = Search(
-        base, path.path, condition, Runs(base, with_companions([condition.metric], base), tally, (), threads), seeds
-    )
-    search.run(np.linspace(low, high, grid))
-    if not np.isfinite(search.metrics).any():
-        if search.oscillating:
-            raise StudyError(
-                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
-                "oscillates: leave its gains out, so that they follow the device"
-            )
-        reason = search.runs.reason
-        raise StudyError(
-            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
-            f"'{condition.metric}'{reason and '; the first: '}{reason}"
-        )
-    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
-    value, beyond = search.ends(highest)
-    while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
-        search.run(np.linspace(value, beyond, PARTS + 1)[1:-1])
-        value, beyond = search.ends(highest)
-    return finding_of(base.name, path, search, highest, grid)
+    return finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))

@@ -7,67 +7,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
-from ppafo.report.finding import Column, Finding, Part
-from ppafo.report.kind import of_metric, of_path
-from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, GREEN, VERMILION
+from ppafo.progress import Report
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Limit
+from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, varied_path
-from ppafo.study.runs import Runs, oscillating, settled
+from ppafo.study.runs import Runs, Tally, oscillating, settled, with_companions
 from ppafo.units import split_quantity
 
 DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
-PARTS = 32
+_PARTS = 32
 """Parts into which a bracket is divided: that many runs side by side take little longer than one."""
-STREAMS = 16
+_STREAMS = 16
 """Noise streams over which every value is tried where sensors are noisy, the same for all."""
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range."""
-SEED = 1
+_SEED = 1
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
-CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
-
-
-@dataclass(frozen=True, slots=True)
-class Tried:
-    """A value [SI] that was tried, and the metric there [SI], nan where the run failed."""
-
-    value: float
-    metric: float
-    is_of_grid: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Threshold:
-    """The lowest, or highest, value that meets a condition on a metric; numbers in SI.
-
-    ``value`` is None where none does, and ``not_met_at`` the next value on its outer side that was tried and does not,
-    None at the end of the range. ``changes`` counts how often the condition begins or ceases to be met along the values
-    that were tried, ``met`` are the ends of each stretch where it is. ``unsettled`` counts the runs whose loop
-    oscillates at the instant of the metric, so that their RMS error on the hold was taken in its place.
-    """
-
-    scenario: str
-    path: str
-    unit: str
-    condition: str
-    metric: str
-    limit: float
-    wanted: str
-    value: float | None
-    metric_at_value: float | None
-    not_met_at: float | None
-    changes: int
-    met: list[list[float]]
-    remarks: list[str]
-    noise_streams: int
-    runs: int
-    failed: int
-    unsettled: int
-    tried: list[Tried]
+_CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
 class Search:
@@ -95,10 +53,10 @@ class Search:
         turns = oscillating(rows, self._base)
         self.oscillating += int(np.count_nonzero(turns))
         judged = np.where(turns, np.nan, judged)
-        found = judged.reshape(streams, values.size)
+        by_stream = judged.reshape(streams, values.size)
         self.values = np.concatenate([self.values, values])
-        self.metrics = np.concatenate([self.metrics, found.mean(axis=0)])
-        self.spread = np.concatenate([self.spread, found.std(axis=0, ddof=min(1, streams - 1))])
+        self.metrics = np.concatenate([self.metrics, by_stream.mean(axis=0)])
+        self.spread = np.concatenate([self.spread, by_stream.std(axis=0, ddof=min(1, streams - 1))])
 
     def ends(self, highest: bool) -> tuple[float | None, float | None]:
         """Return the outermost value that meets the condition, and its neighbour on the outer side."""
@@ -128,132 +86,119 @@ def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
     return path, low, high
 
 
-def stretches(values: Floats, is_met: NDArray[np.bool_]) -> list[list[float]]:
-    """Return the first and last value [SI] of each stretch of neighbours that meet the condition."""
-    # Not met beyond both ends: a stretch that reaches the end of the range ends there.
-    padded = np.concatenate([[False], is_met, [False]]).astype(int)
-    first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
-    return [[float(values[low]), float(values[high - 1])] for low, high in zip(first, after, strict=True)]
+def condition_of(text: str, base: Scenario, path: str) -> Limit:
+    """Return the condition of a text ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; StudyError for any other text.
+
+    The ambient pressure behind a gauge pressure is the scenario's, unless ``path``, which varies, is that pressure.
+    """
+    quoted = f"'{one_line(text)}'"
+    parts = _CONDITION.fullmatch(text)
+    if parts is None:
+        raise StudyError(
+            f"{quoted} is not of the form METRIC <= LIMIT or METRIC >= LIMIT, for example 'final_error <= 0.3 N m'"
+        )
+    metric, sign, limit = parts.groups()
+    check_metrics([metric], base)
+    level = level_of(limit, metric, quoted, atmosphere_of(base, [path]))
+    return Limit(metric, level, sign == "<=", f"{metric} {sign} {limit}")
 
 
-def finding_of(scenario: str, path: VariedPath, search: Search, highest: bool, grid: int) -> Finding[Threshold]:
-    """Return the search in words, a table of where the condition is met, and the metric over the value."""
-    condition, order = search.condition, np.argsort(search.values)
-    values, metrics, spread, of_grid = search.values[order], search.metrics[order], search.spread[order], order < grid
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A finished search; numbers in SI.
+
+    ``values`` (values,) ascend, ``metrics`` are the metric at each, nan where the run failed, and ``spread`` its
+    standard deviation over ``noise_streams``. ``value`` is the outermost that meets the condition, None where none
+    does, and ``beyond`` its neighbour on the outer side, None at the end of the range.
+    """
+
+    scenario: str
+    path: VariedPath
+    condition: Limit
+    highest: bool
+    values: Floats
+    metrics: Floats
+    spread: Floats
+    is_of_grid: NDArray[np.bool_]
+    value: float | None
+    beyond: float | None
+    noise_streams: int
+    runs: int
+    failed: int
+    first_failure: str
+    unsettled: int
+    oscillating: int
+
+    @property
+    def is_met(self) -> NDArray[np.bool_]:
+        """True for each value that meets the condition."""
+        return np.asarray(self.condition.is_kept(self.metrics), dtype=np.bool_)
+
+    @property
+    def changes(self) -> int:
+        """How often the condition begins or ceases to be met along the values."""
+        return int(np.count_nonzero(np.diff(self.is_met)))
+
+    @property
+    def stretches(self) -> list[list[float]]:
+        """The first and last value of each stretch of neighbours that meet the condition."""
+        # Not met beyond both ends: a stretch that reaches the end of the range ends there.
+        padded = np.concatenate([[False], self.is_met, [False]]).astype(int)
+        first, after = np.flatnonzero(np.diff(padded) > 0), np.flatnonzero(np.diff(padded) < 0)
+        return [[float(self.values[low]), float(self.values[high - 1])] for low, high in zip(first, after, strict=True)]
+
+
+def outermost(
+    base: Scenario,
+    vary: str,
+    such_that: str,
+    highest: bool,
+    grid: int,
+    threads: int | None = None,
+    progress: Report | None = None,
+) -> Outcome:
+    """Return the search for the outermost value; StudyError for bad input, and where no run has the metric."""
+    path, low, high = range_of(vary, base)
+    condition = condition_of(such_that, base, path.path)
+    if not FEWEST <= grid <= MOST:
+        raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
+    # The same streams for all values, so that neighbours differ by the value alone.
+    seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
+    tally = Tally(grid * max(1, seeds.size), progress)
+    runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
+    search = Search(base, path.path, condition, runs, seeds)
+    search.run(np.linspace(low, high, grid))
+    if not np.isfinite(search.metrics).any():
+        if search.oscillating:
+            raise StudyError(
+                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
+                "oscillates: leave its gains out, so that they follow the device"
+            )
+        raise StudyError(
+            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
+            f"'{condition.metric}'{runs.reason and '; the first: '}{runs.reason}"
+        )
+    # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     value, beyond = search.ends(highest)
-    is_met = condition.is_kept(metrics)
-    changes = int(np.count_nonzero(np.diff(is_met)))
-    kind, of_condition = of_path(path.path, path.quantity.unit), of_metric(condition.metric)
-    at_value = None if value is None else float(metrics[np.searchsorted(values, value)])
-    ends = f"{kind.text(values[0])} to {kind.text(values[-1])}"
-    wanted, further = ("highest", "higher") if highest else ("lowest", "lower")
-    # Where none meets it, the one that comes nearest says whether a wider range could.
-    if value is None or at_value is None:
-        row = int((np.nanargmin if condition.is_most else np.nanargmax)(metrics))
-        verdict = (
-            f"no {path.path} from {ends} meets {condition.text}; the nearest is {of_condition.text(metrics[row])} at "
-            f"{kind.text(values[row])}"
-        )
-    else:
-        verdict = (
-            f"{path.path} = {kind.text(value)} is the {wanted} value that meets {condition.text}"
-            f"{', and the end of the range' if beyond is None else ''}: {condition.metric} is "
-            f"{of_condition.text(at_value)} there"
-            + (
-                f"; a wider range may have a {further} one"
-                if beyond is None
-                else f" (bracketed to {kind.change(abs(value - beyond), '.1g')})"
-            )
-        )
-    where = "everywhere" if is_met.all() else "nowhere" if value is None else f"at {np.count_nonzero(is_met)} of them"
-    remarks = [
-        f"{np.count_nonzero(of_grid)} values from {ends}, evenly, then {np.count_nonzero(~of_grid)} more in the "
-        f"bracket; the condition is met {where}"
-    ]
-    if changes > 1:
-        remarks.append(
-            f"the condition changes {changes} times over the range, so it is not met everywhere "
-            f"{'below' if highest else 'above'} this value; see the table and the figure"
-        )
-    if search.seeds.size:
-        noise = (
-            f"sensors are noisy: the metric is the mean over {search.seeds.size} noise streams, the same for all values"
-        )
-        if value is not None:
-            varies = of_condition.change(float(spread[np.searchsorted(values, value)]))
-            noise += (
-                f"; at the value that was found it varies by {varies} (standard deviation) from stream to stream, so a "
-                "single run may miss the condition there"
-            )
-        remarks.append(noise)
-    if search.unsettled:
-        remarks.append(
-            f"in {search.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
-            "that: their rms_error_hold was taken in its place"
-        )
-    if search.oscillating:
-        remarks.append(
-            f"in {search.oscillating} of {search.runs.count} runs the torque loop oscillates: they count as not met"
-        )
-    if search.runs.failures:
-        remarks.append(
-            f"{search.runs.failures} of {search.runs.count} runs failed and count as not met; the first: "
-            f"{search.runs.reason}"
-        )
-    met = stretches(values, is_met)
-    panel = Panel(
-        kind,
-        of_condition,
-        (
-            Mark("line", values, metrics),
-            Mark("line", values[of_grid], metrics[of_grid], style={"linestyle": "", "marker": "o", "markersize": 3}),
-            Mark(
-                "level", (), condition.limit, label="limit", colour=BLACK, style={"linestyle": "--", "linewidth": 1.0}
-            ),
-            *(Mark("span", each, label="" if row else "condition met", colour=GREEN) for row, each in enumerate(met)),
-            *(
-                ()
-                if value is None
-                else (Mark("at", value, label=f"found: {kind.text(value, '.4g')}", colour=VERMILION),)
-            ),
-        ),
-    )
-    return Finding(
-        name="find",
-        kicker="Search",
-        title=f"The {wanted} {path.path} such that {condition.text}",
-        said=(verdict, *remarks),
-        parts=(
-            Part(
-                "Met in the range that was tried",
-                [Column(title, [kind.text(each[end]) for each in met]) for end, title in enumerate(("from", "to"))],
-            ),
-            Part(
-                "Metric over the value",
-                panels=(panel,),
-                name="find",
-                caption="The metric over the value; dashed: the limit; shaded: where the condition is met.",
-            ),
-        ),
-        found=Threshold(
-            scenario=scenario,
-            path=path.path,
-            unit=path.quantity.unit,
-            condition=condition.text,
-            metric=condition.metric,
-            limit=condition.limit,
-            wanted=wanted,
-            value=value,
-            metric_at_value=at_value,
-            not_met_at=beyond,
-            changes=changes,
-            met=met,
-            remarks=remarks,
-            noise_streams=search.seeds.size,
-            runs=search.runs.count,
-            failed=search.runs.failures,
-            unsettled=search.unsettled,
-            tried=list(map(Tried, values.tolist(), metrics.tolist(), of_grid.tolist())),
-        ),
-        passed=value is not None,
+    while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
+        search.run(np.linspace(value, beyond, _PARTS + 1)[1:-1])
+        value, beyond = search.ends(highest)
+    order = np.argsort(search.values)
+    return Outcome(
+        scenario=base.name,
+        path=path,
+        condition=condition,
+        highest=highest,
+        values=search.values[order],
+        metrics=search.metrics[order],
+        spread=search.spread[order],
+        is_of_grid=order < grid,
+        value=value,
+        beyond=beyond,
+        noise_streams=seeds.size,
+        runs=runs.count,
+        failed=runs.failures,
+        first_failure=runs.reason,
+        unsettled=search.unsettled,
+        oscillating=search.oscillating,
     )

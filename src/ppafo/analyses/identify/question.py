@@ -31,6 +31,12 @@ def identify(
 
     problem: a problem file (.toml); see 'ppafo doctor --schema identification'
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> from ppafo.cli.new import new
+    >>> written = new("example", "measured-cylinder")
+    >>> print(str(ppafo.identify("measured-cylinder/cylinder.toml")).splitlines()[0])
+    static-torque: 80 readings, 80 repetitions; area 0.00052 m^2, friction in motion 4.22 N; scatter 0.334 N
     """
     name_plugins(plugins)
     from ppafo.analyses.identify.answer import finding_of

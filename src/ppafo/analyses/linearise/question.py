@@ -29,6 +29,11 @@ def linearise(
     at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of
         the reference
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> model = ppafo.linearise("torque-task-proportional", overrides={"reference.level": 3.0}).found
+    >>> [f"{pole.real:.2f} 1/s" for pole in model.poles]
+    ['-0.21 1/s', '-0.97 1/s']
     """
     name_plugins(plugins)
     from importlib.util import find_spec

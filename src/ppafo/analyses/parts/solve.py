@@ -60,6 +60,10 @@ def parts(
 
     part: name of a part, for all its figures and their sources
     catalogue: a .toml file; default: the catalogue of the package
+
+    >>> import ppafo
+    >>> ppafo.parts("festo-mpye-5-m5-010-b").said[0]
+    'festo-mpye-5-m5-010-b: Festo MPYE-5-M5-010-B (valves, proportional)'
     """
     loaded = load_catalogue(catalogue)
     named = {item.name: item for item in loaded.parts}

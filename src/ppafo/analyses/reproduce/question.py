@@ -32,6 +32,11 @@ def reproduce(
 
     study: publication to run again: a name, a .toml file of claims, or 'all'; default ppafo-2011, the paper
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> finding = ppafo.reproduce("jmd-2016")
+    >>> finding.title, finding.passed
+    ('jmd-2016, run again', True)
     """
     name_plugins(plugins)
     from ppafo.analyses.reproduce.answer import Studies, finding_of, finding_of_studies

@@ -50,6 +50,12 @@ def sensitivity(
     configuration: configuration of the study, needed if it has several
     independent: ignore the correlations of the study
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> study, choice = "torque-task-uncertainty", {"configuration": "solenoid", "metrics": "rms_error"}
+    >>> print(ppafo.sensitivity(study, samples=64, **choice).said[0])
+    torque-task-uncertainty, solenoid: shapley, 64 orders, 1,152 runs of 7 uncertain values; bands with 95 %
+    confidence
     """
     name_plugins(plugins)
     from ppafo.analyses.sensitivity.methods import METHODS

@@ -122,7 +122,13 @@ def write_report(results: StudyResults) -> None:
 
 @checked()
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
-    """Return the finished results of a study in a folder or at an address; DataError where there are none."""
+    """Return the finished results of a study in a folder or at an address; DataError where there are none.
+
+    >>> import ppafo
+    >>> written = ppafo.sweep("torque-task-uncertainty", draws=4, out="four")
+    >>> ppafo.load_study_results("four").said[0]
+    'torque-task-uncertainty: 8 runs: 8 completed'
+    """
     place = place_at(folder)
     document = read_manifest(place)
     try:

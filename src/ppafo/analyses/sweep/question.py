@@ -60,6 +60,10 @@ def sweep_into_folder(
     first_draws: draws before the first estimate; default 256
     confidence: confidence of the interval; default 95%
     maximum_failed: fraction of the runs that may fail before the statistic is refused; default 1%
+
+    >>> from pathlib import Path
+    >>> print(sweep_into_folder("torque-task-uncertainty", draws=4, out=Path("four")).said[0])
+    torque-task-uncertainty: 8 runs: 8 completed
     """
     from dataclasses import replace
 

@@ -210,6 +210,11 @@ def sweep(
     Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
     nan where a run failed, which is a row that says so. StudyError for a study that cannot be used or does not fit onto
     the disk, and where the folder has results of another one; DataError for a folder that cannot be used.
+
+    >>> import ppafo
+    >>> study = ppafo.sweep("torque-task-uncertainty", draws=4).found
+    >>> study.summary["runs"], study.summary["completed"]
+    (8, 8)
     """
     name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)

@@ -351,6 +351,11 @@ def estimate(
     StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> study = "torque-task-uncertainty"
+    >>> print(ppafo.estimate(study, metric="rms_error", configuration="solenoid", width="5 %").said[0])
+    mean of rms_error: 1.0375 [1.0317, 1.0433] N m after 4,096 draws, 95 % confidence
     """
     name_plugins(plugins)
     chosen, base, uncertainty = drawn_in(study, overrides, configuration)

@@ -244,7 +244,12 @@ NOISE_DRAWS = 16
 
 
 def list_tunings() -> tuple[str, ...]:
-    """Return the names of the tunings that come with the package."""
+    """Return the names of the tunings that come with the package.
+
+    >>> import ppafo
+    >>> ppafo.list_tunings()
+    ('pid-gains', 'pid-gains-robust', 'push-off')
+    """
     return TUNING.names()
 
 
@@ -255,6 +260,11 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     ``overrides`` change the scenario. StudyError for anything that is not usable.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> print(ppafo.load_tuning("pid-gains"))
+    Tuning 'pid-gains' of 'torque-task-proportional': controller.proportional_gain, controller.integral_gain,
+    controller.derivative_gain
     """
     name_plugins(plugins)
     document, source = read_source(TUNING, tuning)

@@ -35,6 +35,10 @@ def tune(
 
     tuning: name of a tuning, or a .toml file
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> print(ppafo.tune("pid-gains").said[0])
+    pid-gains: objective 1 before, 0.008313 after (-99.2 %)
     """
     name_plugins(plugins)
     from dataclasses import replace

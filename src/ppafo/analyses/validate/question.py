@@ -63,6 +63,11 @@ def validate(
     columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
         it
     plugins: modules of your own, files or names, whose objects files may name
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("bench")
+    >>> print(ppafo.validate("ppafo2011", [folder], motion="leg", overrides=["supply.pressure=55 psi_g"]).said[0])
+    ppafo2011 agrees with 1 recording: every RMS error is within its limit; nothing but noise is left
     """
     name_plugins(plugins)
     from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of, named_column_map

@@ -37,6 +37,9 @@ def walk_with_and_without(
     minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
+
+    >>> print(walk_with_and_without("solenoid", minutes=0.1).said[0])
+    solenoid: completed, 4 strides of falisse2019-subject1
     """
     from ppafo.analyses.walk.answer import LONG, finding_of, reporter, wearers_finding
     from ppafo.simulation.scenario import Scenario

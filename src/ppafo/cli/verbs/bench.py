@@ -29,6 +29,11 @@ def rig_simulate(
     device: parameter set or .toml file; default ppafo2011
     valve: valve of the parameter set; default: its default valve
     out: folder of the recording and of rig.json with the true values; default out/rig
+
+    >>> print(rig_simulate("valve-map", out=Path("rig")).text)
+    valve-map: synthetic: made by the simulated test bench of ppafo in place of a measurement
+    201 samples of command, mass_flow, upstream_pressure, downstream_pressure
+    written: rig (valve-map.csv, rig.json)
     """
     from ppafo.cli.output import Said, blame_out_option
     from ppafo.rig.experiments import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
@@ -56,6 +61,11 @@ def rig_record(
     duration: end after this time of the bench, for example '10 s'
     patience: end, or give up, after this time without a sample; default '5 s'
     out: the .csv file to write
+
+    >>> rig_record(port="udp:127.0.0.1:49317", patience=0.2, out=Path("bench.csv"))  # no bench sends there
+    Traceback (most recent call last):
+    ...
+    ppafo.errors.DataError: no sample came within 0.2 s; what came in: nothing
     """
     from ppafo.cli import output
     from ppafo.errors import DataError

@@ -13,7 +13,13 @@ if TYPE_CHECKING:
 
 
 def sets_list() -> Said:
-    """List the parameter sets that come with the package."""
+    """List the parameter sets that come with the package.
+
+    >>> print(sets_list().text)
+    cylinder-lever     Cylinder with a lever: a measured cylinder on an assumed joint
+    ppafo2011          Portable powered ankle-foot orthosis, completed
+    ppafo2011-printed  Portable powered ankle-foot orthosis, exactly as reported
+    """
     from ppafo.cli.output import listing
     from ppafo.parameters import list_sets, load_parameter_set
 
@@ -23,7 +29,11 @@ def sets_list() -> Said:
 
 
 def sets_show(name: SetName, *, overrides: Overrides = ()) -> Finding[dict[str, Any]]:
-    """Show every value of a parameter set with its source."""
+    """Show every value of a parameter set with its source.
+
+    >>> sets_show("ppafo2011").said[0]
+    'ppafo2011: Portable powered ankle-foot orthosis, completed'
+    """
     from ppafo.analyses.sets.values import shown_values
     from ppafo.parameters import apply_overrides, load_parameter_set
 
@@ -40,6 +50,13 @@ def sets_audit(
     names: name of a set, or a .toml file; several are shown side by side
     parent: show what changed against this set, in place of the one that the file names
     all_: print what concerns no changed value too, of a set with a parent or --set
+
+    >>> audited = sets_audit(["ppafo2011-printed"])
+    >>> print(str(audited).splitlines()[0])
+    error: reported.velocity_over_acceleration is upside down: its unit belongs to the inverse
+    [velocity-over-acceleration-upside-down]
+    >>> audited.passed
+    False
     """
     from ppafo.analyses.sets.audit import audited
 

@@ -25,6 +25,10 @@ def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Ov
     """Write a scenario or a walk as a library in C: header, source, example, make files.
 
     out: the folder to write
+
+    >>> print(export_c("step-response", out=Path("library")).text)
+    written: library (CMakeLists.txt, LICENSE, Makefile, README.md, main.c, step_response.c, step_response.h); next:
+    make -C library check
     """
     from ppafo.cli.output import export
     from ppafo.exports.c_library import c_library
@@ -50,6 +54,9 @@ def export_fmu(
     fmi: version of FMI; default 2
     platforms: what it is to run on, separated by commas: linux64, win64, ...; default: this computer
     out: the folder to write, or the unit itself: a name that ends in .fmu
+
+    >>> print(export_fmu("step-response", out=Path("step.fmu")).text)
+    written: step.fmu; next: fmpy simulate step.fmu --show-plot
     """
     from ppafo.cli.output import export, export_file
     from ppafo.exports.fmu import closed_loop, functional_unit, host_platform, plant_alone

@@ -26,7 +26,11 @@ if TYPE_CHECKING:
 
 
 def gait_list() -> Said:
-    """List the gaits that come with the package."""
+    """List the gaits that come with the package.
+
+    >>> print(gait_list().text)
+    falisse2019-subject1  Healthy adult, 62 kg, overground at 1.33 m/s
+    """
     from ppafo.cli.output import listing
     from ppafo.gait import list_gaits, load_gait
 
@@ -37,6 +41,9 @@ def gait_show(gait: Gait, *, speed: Speed | None = None) -> Finding[GaitFound]:
     """Show and draw a gait.
 
     speed: walking speed to scale to, such as '1.2 m/s'
+
+    >>> print(gait_show("falisse2019-subject1").said[0])
+    falisse2019-subject1: Healthy adult, 62 kg, overground at 1.33 m/s (measured)
     """
     from ppafo.gait import at_speed, load_gait
     from ppafo.gait.finding import gait_finding
@@ -79,6 +86,11 @@ def gait_import(
     ankle_neutral: reading of the ankle with the foot square to the shank, such as '3 deg'
     name: name of the gait and of its file
     title: one line: who walks, and how
+
+    >>> from pathlib import Path
+    >>> written = gait_record("falisse2019-subject1", out=Path("strides.csv"))
+    >>> print(gait_import([Path("strides.csv")], body_mass=62.0).said[0])
+    imported-gait: Mean of 9 strides, right foot (synthetic)
     """
     from ppafo.gait.finding import gait_finding
     from ppafo.gait.recorded import ImportSettings, import_gait
@@ -109,6 +121,10 @@ def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:
 
     strides: number of strides; default 10
     out: the .csv file to write
+
+    >>> from pathlib import Path
+    >>> print(gait_record("falisse2019-subject1", strides=2, out=Path("strides.csv")).text)
+    written: strides.csv (417 samples, synthetic)
     """
     from ppafo.cli.output import Said, check_new_file
     from ppafo.errors import DataError

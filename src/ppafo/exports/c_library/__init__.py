@@ -6,6 +6,7 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
+from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import (
     Library,
     Switch,
@@ -16,7 +17,6 @@ from ppafo.exports.c_library.files import (
     words_of_walk,
 )
 from ppafo.exports.c_library.preparation import following_text, preparation_of, relations_of, settings_of
-from ppafo.exports.c_library.program import exported
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import effects_of

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from ppafo.engine.rows import is_number, is_row, leaf_paths, members, row_expression
-from ppafo.translation.typed import FLOAT, Items, Row, Shared, Type
+from ppafo.translation.value_types import FLOAT, Items, Row, Shared, Type
 
 NameOf = Callable[[type], str]
 

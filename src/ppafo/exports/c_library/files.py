@@ -13,7 +13,7 @@ from ppafo.engine.lanes import SIGNAL_ROWS
 from ppafo.engine.run import NEVER_FAILED
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
-from ppafo.exports.c_library.program import ExportedProgram, Further, c_text_of_run
+from ppafo.exports.c_library.exported import ExportedProgram, Further
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
@@ -177,6 +177,8 @@ def c_identifier(name: str) -> str:
 
 def library_files(library: Library) -> dict[str, bytes]:
     """All files of a library by name."""
+    from ppafo.exports.c_library.program import c_text_of_run  # a page needs to know of what, not the text
+
     name, program = library.name, library.program
     words = _words(library, name)
     surface = library.surface

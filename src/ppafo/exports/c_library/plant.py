@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.exported import ExportedProgram
 from ppafo.exports.c_library.files import Library, Surface, c_identifier, library_files
-from ppafo.exports.c_library.program import ExportedProgram
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.plan import step_counts

@@ -6,8 +6,8 @@ from typing import Any, final
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.engine.entries import indent
 from ppafo.engine.lanes import RECORDED_ANGLE, Segment
-from ppafo.engine.loop_text import indent
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
@@ -15,8 +15,8 @@ from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.exports.c_library.boundary import Boundary
+from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.program import COUNTS
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.columns import smaller

@@ -7,8 +7,7 @@ Preparation and metrics take settings by their names as text, and numbers that m
 import ast
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
 from functools import cache
 from importlib.resources import files
 from types import FunctionType
@@ -16,28 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.engine.channels import REQUEST, TRACED, walk_traces
-from ppafo.engine.entries import HEADER, INLINE
+from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
-from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, indent, lane_loop, run_loop
+from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
-from ppafo.metrics import METRICS
-from ppafo.metrics.metric import WALK, MetricKind, ReadAt, Readings
+from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
+from ppafo.metrics.metric import ReadAt, Readings
+from ppafo.metrics.readable import ThermalTotals, Totals, real_totals, thermal_totals, totals
 from ppafo.model.columns import over_runs
-from ppafo.simulation.ensemble.running import (
-    ThermalTotals,
-    Totals,
-    has_channels,
-    real_totals,
-    thermal_totals,
-    totals,
-)
-from ppafo.translation.typed import FLOAT, INT, Array, Row, Shared, Type
+from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
@@ -90,77 +80,13 @@ class _ForOneRun(ast.NodeTransformer):
         return getattr(self.value_of(node.value), node.attr, None) if isinstance(node, ast.Attribute) else None
 
 
-COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
-"""Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
-
-The last one is 1 where the error decides about the parts of a step, else 0.
-"""
-Further = Callable[[SourceCollector, Boundary], str]
-"""Writes a further composed function, once it has gathered what that calls."""
-
-
 LOOP_TYPES: tuple[Type, ...] = (
     *map(Array, LOOP_ARRAYS.values()),
     *(FLOAT if kind == "float64" else INT for kind in LOOP_NUMBERS.values()),
 )
 """Types of the arguments of a run's loop beside its states and parameters."""
-WHOLE, IN_PARTS = "advance", "advance_in_parts"
-"""Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
-TOGETHER = "_together"
-"""Stands behind the name of a lane loop of several runs at once."""
 _STEPS = {WHOLE: "AT_STEP", IN_PARTS: "AT_PARTED"}
 _ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
-
-
-@dataclass(frozen=True, slots=True)
-class ExportedProgram:
-    """A program with meters for all its metrics, and traces of all its outputs."""
-
-    program: Program
-    metrics: tuple[MetricKind, ...]
-
-    @property
-    def loops(self) -> dict[str, Program]:
-        """Programs of its lane loops, by their names in C.
-
-        A locked vane without lines has two: its settings decide whether the error decides about the parts of a step.
-        """
-        if not self.chooses_parts:
-            return {WHOLE: self.program}
-        return {WHOLE: replace(self.program, is_adaptive=False), IN_PARTS: replace(self.program, is_adaptive=True)}
-
-    @property
-    def chooses_parts(self) -> bool:
-        """True where the settings decide whether the error decides about the parts of a step."""
-        return self.program.is_locked and self.program.feed is None and not self.program.has_shape
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Channels that it gives at each sample, in order."""
-        return self.program.traced
-
-
-def exported(program: Program) -> ExportedProgram:
-    """The program as it is exported; a metric that needs all samples of a channel is left out."""
-    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
-    states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
-    if REQUEST not in states if program.walks else not program.has_reference:
-        missing.add("reference")
-    offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
-    metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
-    # By name: the same metrics in another order are the same program.
-    meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
-    outputs = (
-        *(name for name in TRACED if name not in missing),
-        *(walk_traces(program.state_rows()) if program.walks else ()),
-    )
-    return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
-
-
-def places_of(groups: Mapping[str, type]) -> dict[str, str]:
-    """Names in C of the places of all numbers of some groups of rows, by path."""
-    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
-    return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}
 
 
 def c_text_of_run(

@@ -32,7 +32,7 @@ from ppafo.exports.fmu.description import (
     variability_of,
 )
 from ppafo.simulation.scenario import Scenario
-from ppafo.translation.native import asked, complaint
+from ppafo.translation.compiling import asked, complaint
 from ppafo.version import __version__
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")

@@ -81,6 +81,7 @@ from ppafo.engine.package_key import COMPOSED, package_key
 from ppafo.errors import PpafoError, ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
 from ppafo.exports.c_library.files import (
     OUTPUTS,
     Library,
@@ -89,16 +90,6 @@ from ppafo.exports.c_library.files import (
     conditions_of,
     conditions_of_program,
     run_words,
-)
-from ppafo.exports.c_library.program import (
-    COUNTS,
-    IN_PARTS,
-    TOGETHER,
-    WHOLE,
-    ExportedProgram,
-    c_text,
-    outline_of,
-    places_of,
 )
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.device import Device
@@ -111,7 +102,7 @@ from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
-from ppafo.translation.native import asked, complaint
+from ppafo.translation.compiling import asked, complaint
 from ppafo.units import to_si
 from ppafo.version import __version__
 
@@ -245,7 +236,7 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
         if item.name in changed:
             found[item.path] = dict(_CHANGED)
         elif is_of_device(item.path):
-            found[item.path] = dict(_of_set(parameter_set, device, item))
+            found[item.path] = dict(_of_set(parameter_set, device, item, follows=item.path in library.links))
         else:
             # Times and the angle of a locked vane have no key of their own in every file, and are the task's anyway.
             is_given = value_at(origin.content, item.path) is not None or item.path in (*TIMES, LOCKED_ANGLE)
@@ -255,8 +246,8 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -> dict[str, Any]:
-    """Origin of a number of the device: the set's where it has this very value."""
+def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting, *, follows: bool) -> dict[str, Any]:
+    """Origin of a number of the device: the set's where it has this very value, the default's where it ``follows``."""
     if parameter_set is None:
         return _CHANGED
     path = item.path
@@ -264,7 +255,7 @@ def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting) -
         path = f"valves.{device.valve_name}.{path.removeprefix('valve.')}"
     entry, declared = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or declared is None:
-        return _DEFAULT if item.value == item.quantity.default else _CHANGED
+        return _DEFAULT if follows or item.value == item.quantity.default else _CHANGED
     if entry_in_si(entry, declared, atmospheric_pressure(parameter_set)) != item.value:
         return _CHANGED
     if entry.source == SOURCE:
@@ -336,6 +327,8 @@ def program_of(library: Library, item: Scenario) -> bytes:
 
 def _known_digest(library: Library) -> str:
     """The digest of a library's text, whatever the values of its settings are."""
+    from ppafo.exports.c_library.program import outline_of  # most digests are kept
+
     # What decides the translation unit: what its functions are made from, and what translates them.
     names = [item.name for item in library.settings]
     outline = _unit(library, outline_of(library.program, names, library.further, LANES))
@@ -351,6 +344,8 @@ def _known_digest(library: Library) -> str:
 
 def source_of(library: Library) -> str:
     """The translation unit of a library. Values of settings are not in it: other numbers, same program."""
+    from ppafo.exports.c_library.program import c_text
+
     names = [item.name for item in library.settings]
     return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
 

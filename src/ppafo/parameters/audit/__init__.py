@@ -62,6 +62,10 @@ def audit(
     reason for something that is not found is a warning, so that it does not outlive what it excuses.
 
     ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+
+    >>> import ppafo
+    >>> [finding.id for finding in ppafo.audit("ppafo2011") if finding.severity == "warning"][:3]
+    ['flow-of-proportional', 'flow-of-solenoid', 'one-coefficient-proportional-solenoid']
     """
     name_plugins(plugins)
     audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)

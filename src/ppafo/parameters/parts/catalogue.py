@@ -227,7 +227,12 @@ class Catalogue:
 
 @checked(name_or_path="catalogue")
 def load_catalogue(catalogue: str | Path = DEFAULT) -> Catalogue:
-    """Return a catalogue of parts by its name in the package or by the path of a TOML file."""
+    """Return a catalogue of parts by its name in the package or by the path of a TOML file.
+
+    >>> import ppafo
+    >>> [part.name for part in ppafo.load_catalogue().parts if part.kind == "solenoid"]
+    ['festo-vovg-5v-pair', 'festo-mha2-ms1h-pair']
+    """
     return parse_catalogue(_FILE.read(catalogue), label(str(catalogue)))
 
 

@@ -12,9 +12,10 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
+from ppafo.metrics.readable import REFERENCE
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
-from ppafo.simulation.ensemble.running import REFERENCE, Outcome, Request, intervals, offered
+from ppafo.simulation.ensemble.running import Outcome, Request, intervals, offered
 from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY

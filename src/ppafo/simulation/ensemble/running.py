@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.channels import REQUEST as REQUEST_ROW
 from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_numbers
@@ -15,86 +14,24 @@ from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
-from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind, Readings
-from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
+from ppafo.metrics.metric import MetricKind, Readings
+from ppafo.metrics.readable import (
+    WITH_ENERGY_BALANCE,
+    ThermalTotals,
+    Totals,
+    has_channels,
+    real_totals,
+    thermal_totals,
+    totals,
+)
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
 
-REFERENCE = "reference"
-_WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 _SAME = 1.0e-6
-
-
-class Totals(NamedTuple):
-    """Gas in the chambers and totals of it [kg] since the start of a run."""
-
-    supplied_mass: float
-    vented_mass: float
-    leaked_mass: float
-    mass_1: float
-    mass_2: float
-
-
-class ThermalTotals(NamedTuple):
-    """The same of gas with an energy balance, with its true masses [kg], and its energies [J]."""
-
-    supplied_mass: float
-    vented_mass: float
-    leaked_mass: float
-    mass_1: float
-    mass_2: float
-    gas_energy: float
-    supplied_enthalpy: float
-    vented_enthalpy: float
-    wall_heat: float
-    gas_work: float
 
 
 _OF_STATE = tuple(f"state.{name}" for name in Totals._fields)
 """Paths of the numbers that totals are made of, beside the true masses where there are any."""
-
-
-def totals(state: PlantState) -> Totals:
-    """Gas [kg] of a state; its numbers may be arrays (runs,)."""
-    return Totals(
-        supplied_mass=state.supplied_mass,
-        vented_mass=state.vented_mass,
-        leaked_mass=state.leaked_mass,
-        mass_1=state.mass_1,
-        mass_2=state.mass_2,
-    )
-
-
-def real_totals(state: PlantState, masses: TrueMasses) -> Totals:
-    """Gas [kg] of a state that is not ideal; its numbers may be arrays (runs,)."""
-    return Totals(
-        supplied_mass=state.supplied_mass,
-        vented_mass=state.vented_mass,
-        leaked_mass=state.leaked_mass,
-        mass_1=masses.mass_1,
-        mass_2=masses.mass_2,
-    )
-
-
-def thermal_totals(
-    state: PlantState, masses: ThermalState, plant: PlantParameters, thermal: ThermalParameters
-) -> ThermalTotals:
-    """Gas [kg] and energies [J] of a state with an energy balance; numbers may be arrays (runs,)."""
-    per_content = energy_per_content(plant.gas_product, thermal.heat_capacity_ratio)
-    return ThermalTotals(
-        supplied_mass=state.supplied_mass,
-        vented_mass=state.vented_mass,
-        leaked_mass=state.leaked_mass,
-        mass_1=masses.mass_1,
-        mass_2=masses.mass_2,
-        gas_energy=per_content * (state.mass_1 + state.mass_2),
-        supplied_enthalpy=per_content * masses.supplied_content,
-        vented_enthalpy=per_content * masses.vented_content,
-        wall_heat=per_content * masses.heat_content,
-        gas_work=masses.gas_work,
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,24 +173,6 @@ def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, F
     return thermal_totals(state, masses, plant, thermal)._asdict()
 
 
-def has_channels(program: Program, kind: MetricKind) -> bool:
-    """True where runs of a program have the channels of a metric, and what else it needs."""
-    missing = frozenset() if program.is_thermal else _WITH_ENERGY_BALANCE
-    # A walk follows no reference: what its controller wants in each phase of the gait is a number of its state.
-    has_reference = program.has_reference and not program.walks
-    has = {
-        WALK: program.walks,
-        STEADY: not program.takes_task_sequence,
-        LED_SHANK: program.is_on_gait,
-        REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
-    }
-    return (
-        not missing.intersection(kind.channels)
-        and (has_reference or REFERENCE not in kind.channels)
-        and all(has[need] for need in kind.needs)
-    )
-
-
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
     """Why no run of a scenario has what a metric needs, an empty text where it has."""
     return scenario.motion.motion_kind.lacks(scenario, kind)
@@ -261,7 +180,7 @@ def lacking(scenario: Scenario, kind: MetricKind) -> str:
 
 def offered(scenario: Scenario) -> dict[str, MetricKind]:
     """The metrics that runs of a scenario have, for messages: metrics of walks are not for a vane, nor the reverse."""
-    missing = frozenset() if scenario.gas_model is not None else _WITH_ENERGY_BALANCE
+    missing = frozenset() if scenario.gas_model is not None else WITH_ENERGY_BALANCE
     return {
         name: kind
         for name, kind in METRICS.items()

@@ -8,10 +8,10 @@ import numpy as np
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
+from ppafo.metrics.readable import REFERENCE
 from ppafo.model.columns import Problem, at
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
-from ppafo.simulation.ensemble.running import REFERENCE
 from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
 from ppafo.simulation.profiles import TOLERANCE, profile_bounds, profile_problem
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 import ppafo
 from ppafo.analyses.find import solve
+from ppafo.analyses.find.answer import Threshold
 from ppafo.analyses.find.question import find
-from ppafo.analyses.find.solve import ACCURACY, Threshold
+from ppafo.analyses.find.solve import ACCURACY
 from ppafo.cli.main import main
 from ppafo.errors import StudyError
 from ppafo.progress import Progress
@@ -35,7 +36,7 @@ def of_curve(monkeypatch: pytest.MonkeyPatch) -> Callable[..., Finding[Threshold
         def model(columns: Mapping[str, Floats]) -> dict[str, Floats]:
             return {metric: curve(columns["supply.pressure"] / BAR)}
 
-        monkeypatch.setattr("ppafo.study.runs.Runs", lambda *_: Runs.of_model(model, [metric]))
+        monkeypatch.setattr("ppafo.analyses.find.solve.Runs", lambda *_: Runs.of_model(model, [metric]))
         return find(TASK, vary=RANGE, such_that=condition, **options)
 
     return search
@@ -180,7 +181,7 @@ def test_the_value_rests_on_many_noise_streams_and_not_on_the_seed_of_the_scenar
         seen.append(seeds)
         return {"final_error": 6.3 - pressure + noise(seeds)}
 
-    monkeypatch.setattr("ppafo.study.runs.Runs", lambda *_: Runs.of_model(model, ["final_error"]))
+    monkeypatch.setattr("ppafo.analyses.find.solve.Runs", lambda *_: Runs.of_model(model, ["final_error"]))
     found = [
         find(
             TASK, vary=RANGE, such_that=LIMIT, overrides=["sensors.pressure_noise=1 kPa_d", f"sensors.seed={seed}"]

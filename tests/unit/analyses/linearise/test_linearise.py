@@ -16,7 +16,7 @@ from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.errors import ScenarioError
+from ppafo.errors import ArgumentError, ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
 from ppafo.report.finding import text_of
@@ -232,7 +232,7 @@ def test_what_python_hands_over_wrongly_is_refused_in_one_line(steady: LinearMod
         steady.response(np.array([1.0]), "torqe")
     with pytest.raises(ScenarioError, match="no input 'reference'; there are: command"):
         steady.response(np.array([1.0]), source="reference")
-    with pytest.raises(ScenarioError, match="--at 'None' is neither a time nor 'equilibrium'"):
+    with pytest.raises(ArgumentError, match=r"at=None: must be a number of seconds, a time .* or 'equilibrium'"):
         linear(TASK, None)  # type: ignore[arg-type]
     for answer in (linearise, ppafo.simulate):
         with pytest.raises(ScenarioError, match="overrides are for the name or file of a scenario"):
@@ -255,7 +255,7 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
     for scenario, at, overrides, line in (
         (TASK, 9.0, (), "--at 9 s is outside the run, which lasts 3 s"),
         (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator comes to 5 N m"),
-        (TASK, "Equilibrium", (), "neither a time nor 'equilibrium'"),
+        (TASK, "Equilibrium", (), "at: 'Equilibrium': must be a time such as .*, or 'equilibrium'"),
         ("torque-task-solenoid", 1.0, (), "valve 'solenoid' is on or off"),
     ):
         with pytest.raises(ppafo.PpafoError, match=line) as refused:

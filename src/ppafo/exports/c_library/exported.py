@@ -1,0 +1,78 @@
+"""What of a program is exported: its lane loops, metrics and outputs, and the names that these have in C."""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+from ppafo.engine.channels import REQUEST, TRACED, walk_traces
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.source_text import SourceCollector
+from ppafo.exports.c_library.boundary import Boundary
+from ppafo.metrics import METRICS
+from ppafo.metrics.metric import WALK, MetricKind
+from ppafo.metrics.readable import has_channels
+
+COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
+"""Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
+
+The last one is 1 where the error decides about the parts of a step, else 0.
+"""
+Further = Callable[[SourceCollector, Boundary], str]
+"""Writes a further composed function, once it has gathered what that calls."""
+
+WHOLE, IN_PARTS = "advance", "advance_in_parts"
+"""Names of the lane loops in C: of whole steps or of the one there is, and of steps in parts where there are both."""
+TOGETHER = "_together"
+"""Stands behind the name of a lane loop of several runs at once."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedProgram:
+    """A program with meters for all its metrics, and traces of all its outputs."""
+
+    program: Program
+    metrics: tuple[MetricKind, ...]
+
+    @property
+    def loops(self) -> dict[str, Program]:
+        """Programs of its lane loops, by their names in C.
+
+        A locked vane without lines has two: its settings decide whether the error decides about the parts of a step.
+        """
+        if not self.chooses_parts:
+            return {WHOLE: self.program}
+        return {WHOLE: replace(self.program, is_adaptive=False), IN_PARTS: replace(self.program, is_adaptive=True)}
+
+    @property
+    def chooses_parts(self) -> bool:
+        """True where the settings decide whether the error decides about the parts of a step."""
+        return self.program.is_locked and self.program.feed is None and not self.program.has_shape
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Channels that it gives at each sample, in order."""
+        return self.program.traced
+
+
+def exported(program: Program) -> ExportedProgram:
+    """The program as it is exported; a metric that needs all samples of a channel is left out."""
+    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
+    states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
+    if REQUEST not in states if program.walks else not program.has_reference:
+        missing.add("reference")
+    offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
+    metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
+    # By name: the same metrics in another order are the same program.
+    meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
+    outputs = (
+        *(name for name in TRACED if name not in missing),
+        *(walk_traces(program.state_rows()) if program.walks else ()),
+    )
+    return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
+
+
+def places_of(groups: Mapping[str, type]) -> dict[str, str]:
+    """Names in C of the places of all numbers of some groups of rows, by path."""
+    paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
+    return {path: f"AT_{re.sub(r'[^A-Za-z0-9]+', '_', path).strip('_').upper()}" for path in paths}

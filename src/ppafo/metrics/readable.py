@@ -1,0 +1,98 @@
+"""What metrics are read from in a program: totals of its gas, and the channels that its runs have."""
+
+from typing import NamedTuple
+
+from ppafo.engine.channels import REQUEST as REQUEST_ROW
+from ppafo.engine.program import Program
+from ppafo.engine.rows import row_numbers
+from ppafo.metrics.gas import ENERGIES
+from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind
+from ppafo.model.gas import energy_per_content
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
+
+REFERENCE = "reference"
+WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
+
+
+class Totals(NamedTuple):
+    """Gas in the chambers and totals of it [kg] since the start of a run."""
+
+    supplied_mass: float
+    vented_mass: float
+    leaked_mass: float
+    mass_1: float
+    mass_2: float
+
+
+class ThermalTotals(NamedTuple):
+    """The same of gas with an energy balance, with its true masses [kg], and its energies [J]."""
+
+    supplied_mass: float
+    vented_mass: float
+    leaked_mass: float
+    mass_1: float
+    mass_2: float
+    gas_energy: float
+    supplied_enthalpy: float
+    vented_enthalpy: float
+    wall_heat: float
+    gas_work: float
+
+
+def totals(state: PlantState) -> Totals:
+    """Gas [kg] of a state; its numbers may be arrays (runs,)."""
+    return Totals(
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
+        mass_1=state.mass_1,
+        mass_2=state.mass_2,
+    )
+
+
+def real_totals(state: PlantState, masses: TrueMasses) -> Totals:
+    """Gas [kg] of a state that is not ideal; its numbers may be arrays (runs,)."""
+    return Totals(
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
+        mass_1=masses.mass_1,
+        mass_2=masses.mass_2,
+    )
+
+
+def thermal_totals(
+    state: PlantState, masses: ThermalState, plant: PlantParameters, thermal: ThermalParameters
+) -> ThermalTotals:
+    """Gas [kg] and energies [J] of a state with an energy balance; numbers may be arrays (runs,)."""
+    per_content = energy_per_content(plant.gas_product, thermal.heat_capacity_ratio)
+    return ThermalTotals(
+        supplied_mass=state.supplied_mass,
+        vented_mass=state.vented_mass,
+        leaked_mass=state.leaked_mass,
+        mass_1=masses.mass_1,
+        mass_2=masses.mass_2,
+        gas_energy=per_content * (state.mass_1 + state.mass_2),
+        supplied_enthalpy=per_content * masses.supplied_content,
+        vented_enthalpy=per_content * masses.vented_content,
+        wall_heat=per_content * masses.heat_content,
+        gas_work=masses.gas_work,
+    )
+
+
+def has_channels(program: Program, kind: MetricKind) -> bool:
+    """True where runs of a program have the channels of a metric, and what else it needs."""
+    missing = frozenset() if program.is_thermal else WITH_ENERGY_BALANCE
+    # A walk follows no reference: what its controller wants in each phase of the gait is a number of its state.
+    has_reference = program.has_reference and not program.walks
+    has = {
+        WALK: program.walks,
+        STEADY: not program.takes_task_sequence,
+        LED_SHANK: program.is_on_gait,
+        REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
+    }
+    return (
+        not missing.intersection(kind.channels)
+        and (has_reference or REFERENCE not in kind.channels)
+        and all(has[need] for need in kind.needs)
+    )

@@ -1,0 +1,125 @@
+"""How a compiler of C is run: what it is asked, how long it may take, and what it says where it fails.
+
+A program that is kept from earlier is loaded without this.
+"""
+
+import contextlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from ppafo import interrupts
+from ppafo.engine.compilers import OFFERED, CompilerError
+from ppafo.errors import SimulationError, one_line, reason
+
+LONGEST_COMPILING = 300.0
+"""Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""
+LONGEST_ANSWER = 10.0
+"""Seconds that it has to say its version."""
+# Between two looks at an interrupt while a compiler runs [s].
+_PAUSE = 0.25
+
+
+def asked(
+    line: Sequence[str],
+    remedy: str = "",
+    folder: str | None = None,
+    scratch: Path | None = None,
+    limit: float | None = None,
+) -> "subprocess.CompletedProcess[str]":
+    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run.
+
+    ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
+    not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
+    """
+    # A compiler that is killed leaves its files here, where the whole folder goes away.
+    temporary = {} if scratch is None else dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(scratch))
+    seconds = LONGEST_COMPILING if limit is None else limit
+    try:
+        process = subprocess.Popen(
+            line,
+            cwd=folder,
+            env={**os.environ, **_home(), **temporary},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            encoding="utf-8",
+            errors="replace",
+            # A group of its own, so that cc1 and the linker end with the driver.
+            process_group=0 if os.name == "posix" else None,
+        )
+    except OSError as error:
+        raise CompilerError(f"{line[0]} cannot be run: {reason(error)}{remedy and '; '}{remedy}") from error
+    with process:
+        end = time.monotonic() + seconds
+        try:
+            while True:
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    said, complained = process.communicate(timeout=min(_PAUSE, seconds))
+                    return subprocess.CompletedProcess(line, process.returncode, said, complained)
+                interrupts.check()
+                if time.monotonic() > end:
+                    raise CompilerError(f"{Path(line[0]).name} did not end within {seconds:g} s and was stopped")
+        finally:
+            # Ended by an interrupt or its time, the driver's children would go on.
+            if process.poll() is None or process.returncode < 0:
+                with contextlib.suppress(OSError):
+                    if os.name == "posix":
+                        os.killpg(process.pid, signal.SIGKILL)
+                    else:
+                        process.kill()
+
+
+def _home() -> dict[str, str]:
+    """The home of this user where the environment does not say it: zig works with none else."""
+    if os.environ.get("HOME") or os.name != "posix":
+        return {}
+    try:
+        return {"HOME": str(Path("~").expanduser())}
+    except RuntimeError:
+        return {}
+
+
+def complaint(done: "subprocess.CompletedProcess[str]") -> str:
+    """The line in which a compiler says what is wrong; how it ended where it says nothing."""
+    # gcc and clang say it on stderr, some wrappers on stdout.
+    lines = [*done.stderr.splitlines(), *done.stdout.splitlines(), f"it ended with {done.returncode}"]
+    return one_line(next((text for text in lines if "error" in text), next(filter(str.strip, lines))))
+
+
+_INTERRUPTED = (-signal.SIGINT, -signal.SIGTERM)
+_PASSING = (
+    "no space left",
+    "quota exceeded",
+    "temporary file",
+    "cannot allocate memory",
+    "out of memory",
+    "killed signal",
+    "cache directory",
+)
+"""What compilers say where the computer lacks something at that moment, in small letters."""
+
+
+def compile_library(source: str, library: Path, command: Sequence[str], flags: Sequence[str]) -> None:
+    """Let a compiler make a library of C, in a folder; CompilerError where it does not."""
+    folder = library.parent
+    # Windows has no mounts without execution, nor the flag.
+    if hasattr(os, "ST_NOEXEC") and os.statvfs(folder).f_flag & os.ST_NOEXEC:
+        raise CompilerError(f"libraries in {folder.parent} cannot be loaded (it is mounted noexec)", *OFFERED)
+    written = folder / "program.c"
+    written.write_text(source, encoding="utf-8")
+    position = () if sys.platform == "win32" else ("-fPIC",)
+    line = [*command, *flags, "-shared", *position, str(written), "-o", str(library), "-lm"]
+    done, name = asked(line, scratch=folder), Path(command[0]).name
+    if done.returncode in _INTERRUPTED:
+        raise SimulationError(f"{name} was interrupted")  # by the same key as this process: it works all the same
+    if done.returncode != 0:
+        # Killed, or without room for its files: the compiler itself is sound and may work the next time.
+        passing = done.returncode < 0 or any(sign in done.stderr.casefold() for sign in _PASSING)
+        raise CompilerError(f"{name} does not compile a model: {complaint(done)}", passing=passing)
+    if not library.is_file():
+        raise CompilerError(f"{name} ended without an error, but made no library")

@@ -1,0 +1,113 @@
+"""Types of the values of a composed module, which say the same in every language; and those of its entries."""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from ppafo.engine.entries import entry_types
+
+
+@dataclass(frozen=True, slots=True)
+class Scalar:
+    """One number: ``bool``, ``int`` (64 bits, products wrap), ``float`` (64 bits), ``int16`` or ``int32``."""
+
+    name: str
+
+
+BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
+INT16, INT32 = Scalar("int16"), Scalar("int32")
+"""What ``widths`` makes of whole numbers for small processors; the walk itself finds none."""
+_ORDER = (BOOL, INT, FLOAT)
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A NamedTuple with the types that its fields have in one place."""
+
+    name: str
+    fields: tuple[tuple[str, "Type"], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Items:
+    """A tuple without names."""
+
+    types: tuple["Type", ...]
+
+    @property
+    def is_uniform(self) -> bool:
+        """True where all items are of one type."""
+        return len(set(self.types)) == 1
+
+
+@dataclass(frozen=True, slots=True)
+class Array:
+    """An array of floats; ``shape`` is () for one that is handed over, whose extents are known when it runs."""
+
+    dimensions: int
+    shape: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Handed:
+    """A function that was handed over: it is bound when the call is translated."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Shared:
+    """A row that is handed over by its place: what a function writes into it is seen outside."""
+
+    row: Row
+
+
+Type: TypeAlias = Scalar | Row | Items | Array | Handed | Shared
+
+LIBRARY = frozenset({"exp", "log", "pow"})
+"""Functions that every C library has, with last bits of its own."""
+
+
+def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
+    """Functions of a composed module that are called from outside, with the types of their parameters."""
+    plain: dict[str, Type] = {"int64": INT, "float64": FLOAT}
+    return {
+        name: tuple(plain.get(word) or Array(word.count(":") - 1) for word in words)
+        for name, words in entry_types(source).items()
+    }
+
+
+def is_empty(kind: Type) -> bool:
+    """True for what holds no number: a function, a row or a tuple of nothing."""
+    return all(map(is_empty, types_in(kind))) if isinstance(kind, Items | Row) else isinstance(kind, Handed)
+
+
+def types_in(kind: Items | Row) -> tuple[Type, ...]:
+    """Types of the items of a tuple, or of the fields of a row."""
+    return kind.types if isinstance(kind, Items) else tuple(inner for _, inner in kind.fields)
+
+
+def joined(one: Type, other: Type) -> Type | None:
+    """The type that holds both, as where two branches meet; None where there is none."""
+    if one == other:
+        return one
+    if isinstance(one, Scalar) and isinstance(other, Scalar):
+        return max(one, other, key=_ORDER.index)
+    # Tuples of different lengths have no common type.
+    if isinstance(one, Items) and isinstance(other, Items) and len(one.types) == len(other.types):
+        types = [joined(*pair) for pair in zip(one.types, other.types, strict=True)]
+        return None if None in types else Items(tuple(item for item in types if item is not None))
+    if isinstance(one, Row) and isinstance(other, Row) and one.name == other.name:
+        pairs = zip(one.fields, other.fields, strict=True)
+        found = [(name, joined(inner, outer)) for (name, inner), (_, outer) in pairs]
+        fields = tuple((name, kind) for name, kind in found if kind is not None)
+        return Row(one.name, fields) if len(fields) == len(found) else None
+    return None
+
+
+def mixes(one: Type, other: Type) -> bool:
+    """True where one has a whole number or truth value in the place of a float: -0 and large ones would differ."""
+    if isinstance(one, Scalar) and isinstance(other, Scalar):
+        return one != other and FLOAT in (one, other)
+    if isinstance(one, Items | Row) and isinstance(other, Items | Row):
+        return any(mixes(*pair) for pair in zip(types_in(one), types_in(other), strict=True))
+    return False
