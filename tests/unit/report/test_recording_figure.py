@@ -45,6 +45,18 @@ def test_there_is_a_panel_for_each_quantity_that_was_recorded_and_no_other() -> 
     assert len(whole.axes) == 5
 
 
+def test_an_ankle_that_a_simulation_holds_is_in_the_title_and_no_flat_panel() -> None:
+    figure = recording_figure(recording("simulated", torque=1.0, angle=np.pi / 2.0), "task")
+    assert titles(figure) == ["Actuator torque (N m)"]
+    assert "task, ankle at 90 deg" in texts(figure)
+    assert titles(recording_figure(recording("simulated", angle=1.0))) == ["Ankle angle (deg)"]
+
+
+@pytest.mark.parametrize(("command", "words"), [(1.0, "(-1 to 1)"), (2.0, "(-1 to 1; 2 vents both chambers)")])
+def test_a_command_that_vents_is_explained_where_it_is_given(command: float, words: str) -> None:
+    assert titles(recording_figure(recording(command=command))) == [f"Valve command {words}"]
+
+
 def test_angles_are_drawn_in_degrees_and_gas_in_grams() -> None:
     figure = recording_figure(recording(angle=np.pi / 2.0, supplied_mass=4e-4))
     assert drawn(figure, 0)[0][0] == pytest.approx(90.0)
