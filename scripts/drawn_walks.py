@@ -286,20 +286,24 @@ def residual_peaks(result: WalkResult) -> tuple[np.ndarray, np.ndarray]:
     seen = list(zip(*(data[name][::every].tolist() for name in ("angle", "pressure_1", "pressure_2")), strict=True))
     means = observer.volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
     state, shares = observer.START, []
+    feeds = (nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure)
     for last, now, command in zip(seen, seen[1:], data["command"][::every].tolist(), strict=False):
+        fed = (
+            observer.is_fed(nominal, state.coil_1, state.spool),
+            observer.is_fed(nominal, state.coil_2, -state.spool),
+        )
         state = observer.next_observer(
             nominal, state._replace(command=command), last[0], last[1], last[2], now[0], now[1], now[2], period
         )
         chambers, volumes = (state.chamber_1, state.chamber_2), observer.volumes(nominal, now[0])
         shares.append(
             [
-                (measured - chamber.pressure)
-                * volume
-                / (
-                    observer.OF_PASSED * chamber.passed
-                    + mean * (observer.OFFSET + observer.OF_PRESSURE * abs(measured))
+                observer.contradiction(
+                    nominal, chamber.passed, volume, mean, measured, chamber.pressure, is_fed, supply
                 )
-                for chamber, measured, volume, mean in zip(chambers, now[1:], volumes, means, strict=True)
+                for chamber, measured, volume, mean, supply, is_fed in zip(
+                    chambers, now[1:], volumes, means, feeds, fed, strict=True
+                )
             ]
         )
     lasts = np.lib.stride_tricks.sliding_window_view(np.array(shares), int(observer.ALARM_SAMPLES), axis=0).min(axis=2)

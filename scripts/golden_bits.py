@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch, BatchResult, Clock, run_batch
+from ppafo.engine.rows import row_numbers
 from ppafo.golden_bits import Hashes, digest, hash_of, names, plain_batch
 
 Runner = Callable[[Batch], BatchResult]
@@ -36,6 +37,10 @@ def drawn_batch(batch: Batch, runs: int = DRAWS, seed: int = SEED) -> Batch:
     states = np.repeat(batch.states, runs, axis=1)
     # Steps and delays stay: others would be another clock.
     parameters[_TIMING_ROWS:] *= _factors(parameters[_TIMING_ROWS:].shape, seed)
+    for path, row in row_numbers(batch.program.parameter_rows()).items():
+        # Numbers of a shape go together: a lever of another length has other lengths at its stops.
+        if path.startswith("plant.shape."):
+            parameters[row] = batch.parameters[row]
     states[_RESULT_ROWS:] *= _factors(states[_RESULT_ROWS:].shape, seed + 1)
     # In one run of ten a number is what no plan would give: it may fail, and must fail alike.
     for run in range(0, runs, 10):

@@ -6,12 +6,16 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.engine.entries import INLINE
 from ppafo.engine.lanes import RECORDED_ANGLE
+from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import energy_balance, isothermal, lines, walk
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
 from ppafo.model.catalog import EFFECTS, VALVES
+from ppafo.model.controlled import TORQUE
 from ppafo.model.valves import vent_valve
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import MeterKind
@@ -40,6 +44,11 @@ def meters() -> tuple[MeterKind, ...]:
     return tuple({meter.name: meter for kind in METRICS.values() if is_of_any(kind) for meter in kind.meters}.values())
 
 
+def lane_source(program: Program) -> str:
+    """Source text of the module whose ``advance`` runs one block of a program."""
+    return write_lanes(program, SourceCollector(INLINE))
+
+
 def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
     """``count`` programs, every third a walk, in which the entries of each catalogue take turns; the rest is drawn."""
     draw = random.Random(seed)
@@ -54,10 +63,11 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
         walks = number % 3 == 2
         angle = None if walks else angles[number % len(angles)]
         metered = not walks and draw.random() < 0.3
+        law = _turn(walking_laws, number) if walks else _turn(laws, number)
         yield Program(
             valve=_turn(walking_valves if walks else valves, number),
             reference=PROFILES["constant"] if walks else _turn(profiles, number),
-            controller=_turn(walking_laws, number) if walks else _turn(laws, number),
+            controller=law,
             angle=angle,
             ideal_sensors=draw.random() < 0.5,
             late_commands=draw.random() < 0.3,
@@ -74,6 +84,7 @@ def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:
             samples_inside=draw.random() < 0.2,
             meters=meters() if metered else (),
             traced=("angle", "mass_1") if metered else (),
+            controlled=TORQUE if law is None else _turn(law.controls, number),
         )
 
 

@@ -17,18 +17,18 @@ export interface Panel {
   /** What its vertical axis is called, before the unit. */
   readonly axis: string;
   readonly channels: readonly string[];
-  /** A channel that is drawn once, in ink: what was asked for. */
-  readonly wanted?: string;
+  /** Channels of which the one that there is is drawn once, in ink: what was asked for. */
+  readonly wanted?: readonly string[];
   /** What the title says after its name. */
   readonly note?: string;
 }
 
 export const PANELS: readonly Panel[] = [
-  { title: "Torque", axis: "Torque", channels: ["torque"], wanted: "reference" },
-  { title: "Pressures", axis: "Pressure", channels: ["pressure_1", "pressure_2"], note: ", chamber 2 dashed" },
+  { title: "Torque", axis: "Torque", channels: ["torque"], wanted: ["reference"] },
+  { title: "Pressures", axis: "Pressure", channels: ["pressure_1", "pressure_2"], wanted: ["reference_pressure_1", "reference_pressure_2"], note: ", chamber 2 dashed" },
   { title: "Command to the valve", axis: "Command", channels: ["command"] },
   { title: "Gas taken from the supply", axis: "Gas", channels: ["supplied_mass"] },
-  { title: "Angle of the ankle", axis: "Angle", channels: ["angle"], wanted: "healthy_angle" },
+  { title: "Angle of the ankle", axis: "Angle", channels: ["angle"], wanted: ["healthy_angle", "reference_angle"] },
   { title: "Torque on the wearer", axis: "Torque", channels: ["external_torque"] },
   { title: "0 helps, 1 lifts only, 2 pauses, 3 stopped", axis: "Controller state", channels: ["safe_state"] },
 ];
@@ -113,8 +113,9 @@ export class Panels {
     this.overlay = overlay;
     const layout = JSON.stringify([isBeside, [...this.moving].map(({ title }) => title), shown.map((item) => [item.name, item.look, ...item.run.channels.keys()])]);
     const present = PANELS.filter((panel) => shown.some(({ run }) => panel.channels.some((name) => run.channels.has(name))));
-    // What is asked for comes first: a torque, else how the vane moves.
-    const leads = (panel: Panel) => panel.channels[0] === (shown.some(({ run }) => run.channels.has("reference")) ? "torque" : "angle");
+    // What is asked for comes first, else how the vane moves.
+    const asked = present.find((panel) => panel.wanted?.some((name) => name.startsWith("reference") && shown.some(({ run }) => run.channels.has(name))));
+    const leads = (panel: Panel) => panel === (asked ?? present.find(({ channels }) => channels[0] === "angle"));
     this.rememberMoving(present);
     const moving = present.filter((panel) => this.moving.has(panel) || leads(panel));
     const panels = [...moving.filter(leads), ...moving.filter((panel) => !leads(panel))];
@@ -155,7 +156,7 @@ export class Panels {
     this.programs = programs;
     const isFlat = (values: Float64Array | undefined) => values === undefined || values.every((value) => value === values[0]);
     for (const panel of present) {
-      const names = [...panel.channels, ...(panel.wanted === undefined ? [] : [panel.wanted])];
+      const names = [...panel.channels, ...(panel.wanted ?? [])];
       if (names.some((name) => this.overlay?.channels.has(name) || !this.shown.every(({ run }) => isFlat(run.channels.get(name))))) this.moving.add(panel);
     }
   }
@@ -306,11 +307,13 @@ export class Panels {
   }
 
   private linesOf(panel: Panel, shown: readonly number[]): Line[] {
-    const wanted = shown.find((place) => panel.wanted !== undefined && this.shown[place]?.run.channels.has(panel.wanted));
+    const wanted = (panel.wanted ?? [])
+      .map((channel) => ({ channel, place: shown.find((place) => this.shown[place]?.run.channels.has(channel)), isWanted: true }))
+      .find(({ place }) => place !== undefined);
     const lines = shown.flatMap((place) =>
       panel.channels.filter((name) => this.shown[place]?.run.channels.has(name)).map((channel) => ({ place, channel, isWanted: false })),
     );
-    return wanted === undefined ? lines : [{ place: wanted, channel: panel.wanted ?? "", isWanted: true }, ...lines];
+    return wanted?.place === undefined ? lines : [{ ...wanted, place: wanted.place }, ...lines];
   }
 
   private dataOf(panel: Panel, shown: readonly number[]): uPlot.AlignedData {
@@ -366,7 +369,7 @@ export class Panels {
       low = Math.min(low, least * factor + offset);
       high = Math.max(high, most * factor + offset);
     };
-    for (const channel of [...panel.channels, ...(panel.wanted === undefined ? [] : [panel.wanted])]) {
+    for (const channel of [...panel.channels, ...(panel.wanted ?? [])]) {
       for (const item of this.shown) {
         const line = this.lineOf(channel, item);
         include(item.run.channels.get(channel), line);
@@ -388,7 +391,7 @@ export class Panels {
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    if (panel.wanted === "reference") this.shadeUnreached(plot, shown);
+    if (panel.wanted?.includes("reference")) this.shadeUnreached(plot, shown);
     for (const channel of panel.channels) {
       for (const place of shown) {
         const item = this.shown[place];

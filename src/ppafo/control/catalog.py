@@ -20,6 +20,7 @@ CONTROLLERS: Kinds[ControllerKind] = Kinds(
         "sliding_mode": "ppafo.control.controllers.feedback:SLIDING_MODE",
         "damped_proportional": "ppafo.control.controllers.feedback:DAMPED_PROPORTIONAL",
         "feedback_linearisation": "ppafo.control.controllers.model_based:FEEDBACK_LINEARISATION",
+        "cascade": "ppafo.control.controllers.cascade:CASCADE",
         "pid_fixed_point": "ppafo.processor.torque_laws:PID_FIXED_POINT",
         "on_off_fixed_point": "ppafo.processor.torque_laws:ON_OFF_FIXED_POINT",
         "on_off_dead_zone_fixed_point": "ppafo.processor.torque_laws:DEAD_ZONE_FIXED_POINT",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 from ppafo.model.columns import Problem
+from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 
 OPEN_LOOP = "constant"
@@ -28,6 +29,10 @@ class ControllerKind:
     ``only_switches`` asks for full openings or none, so that it fits a pair of solenoid valves in walking. One without
     ``needs_reference`` never looks at the reference, so that a scenario may be without one.
 
+    ``controls`` names what it can follow a reference of, in ``model.controlled.CONTROLLED``. One that controls more
+    than a torque acts on ``seen_error`` or ``seen_value`` of there alone, and its settings in N m are in the unit of
+    what is controlled.
+
     A law with a ``plan`` has other numbers than its settings: ``plan(settings, period, torque_constant, reference)``
     makes them, by name, from settings in SI units, a period [s], the device's torque constant [N m/Pa] and the lowest
     and highest reference [N m], each of which may be an array (runs,), and says what may be wrong with them.
@@ -44,6 +49,7 @@ class ControllerKind:
     only_switches: bool = False
     needs_reference: bool = True
     plan: Plan | None = None
+    controls: tuple[str, ...] = (TORQUE,)
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +58,8 @@ class ProfileKind:
 
     ``parameters`` is a NamedTuple class whose fields are the quantities in order; ``value(parameters, time)`` returns
     value, rate and second derivative at a time [s]; ``bounds(parameters)`` the lowest and highest value of all time.
-    A quantity with unit ``""`` takes the unit of what is prescribed. A profile that ``is_monotone`` only rises, only
+    A quantity with unit ``""`` takes the unit of what is prescribed; those among ``differences`` are differences of two
+    values of it, as an amplitude is. A profile that ``is_monotone`` only rises, only
     falls or rests, so that both ends of a stretch of time have its extremes. One that ``is_smooth`` has no corners, at
     which a foot on a shank that moves so would be struck. ``until_jump(parameters, time)`` is the time [s], above 0,
     until the second derivative of a smooth one jumps; None where it never does.
@@ -64,6 +71,7 @@ class ProfileKind:
     parameters: type
     value: Callable[..., Any]
     bounds: Callable[..., tuple[float, float]]
+    differences: tuple[str, ...] = ()
     is_monotone: bool = False
     is_smooth: bool = False
     until_jump: Callable[..., float] | None = None
@@ -76,7 +84,9 @@ class PythonController(Protocol):
         """Forget everything; called once before the run."""
 
     def update(self, time: float, reference: float, measurement: Any) -> float:
-        """Return the command from -1 to 1 at a time [s], for a reference [N m] and a ``Measurement``.
+        """Return the command from -1 to 1 at a time [s], for a reference and a ``Measurement``.
+
+        The reference is a torque [N m], or what else ``reference.of`` names: an angle [rad] or a pressure [Pa].
 
         In a walk it is a ``GaitMeasurement`` with the forces under heel and toes, the reference is 0, and
         ``model.command.VENT`` is a command too: it joins both chambers to the atmosphere.

@@ -101,6 +101,7 @@ SINE = ProfileKind(
     parameters=Sine,
     value=sine_value,
     bounds=sine_bounds,
+    differences=("amplitude",),
     is_smooth=True,
 )
 
@@ -311,6 +312,9 @@ def _quantity(name: str) -> Quantity:
     return Quantity(name, "", f"value of knot {number}", 0.0)
 
 
+_VALUES = tuple(f"value_{number:02}" for number in range(1, KNOTS + 1))
+"""They count from the level."""
+
 TABLE = ProfileKind(
     name="tabulated",
     summary="Up to 32 knots, the first at time 0, joined by straight lines and repeated.",
@@ -323,6 +327,7 @@ TABLE = ProfileKind(
     parameters=Tabulated,
     value=table_value,
     bounds=table_bounds,
+    differences=_VALUES,
 )
 
 SMOOTH = ProfileKind(
@@ -332,6 +337,7 @@ SMOOTH = ProfileKind(
     parameters=Tabulated,
     value=smooth_value,
     bounds=smooth_bounds,
+    differences=_VALUES,
     is_smooth=True,
     until_jump=until_knot,
 )

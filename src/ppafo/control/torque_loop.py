@@ -10,7 +10,8 @@ closed loop's time constant theta the rules of S. Skogestad, Journal of Process 
 
     k_p = 1 / (2 R theta),    T_i = 8 theta,    k_d = 0
 
-The other laws have the same bandwidth in their own words.
+The other laws have the same bandwidth in their own words. Where a pressure or an angle is controlled in the place of a
+torque, R is its rate, and its unit stands in the place of N m.
 """
 
 from typing import NamedTuple

@@ -3,10 +3,12 @@
 from collections.abc import Mapping
 
 from ppafo.engine.rows import leaf_paths
+from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import Sample
 
 TRACED: dict[str, str] = {
     **{name: f"sample.{name}" for name in Sample._fields if name not in ("number", "foot", "stride")},
+    **{kind.reference: "sample.reference" for kind in CONTROLLED.values()},
     **{name: f"state.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
 """Channels that can be traced, and where a lane has them."""

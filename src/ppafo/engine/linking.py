@@ -12,6 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
+from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 
 
@@ -34,6 +35,11 @@ def link_program(program: Program, collector: Linked) -> None:
     """
     own = links_of(program.actuator)
     collector.links.update(own)
+    if program.controlled != TORQUE:
+        followed = CONTROLLED[program.controlled]
+        collector.links[controlled] = followed.value
+        if followed.sign < 0.0:
+            collector.links[steered] = turned_round
     if not program.effects:
         return
     # Names of rows without any effect: two effects that share a name are refused by the catalogue.

@@ -14,6 +14,7 @@ from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParamete
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.kind import Effect, State
 from ppafo.model.plant import PlantParameters, PlantState, SinglePort
 from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
@@ -220,7 +221,7 @@ class Program:
     of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
-    that moves so, and ``foot`` says how that goes through a step.
+    that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
     """
 
     valve: ValveModel
@@ -245,6 +246,7 @@ class Program:
     effects: tuple[Effect, ...] = ()
     shank: ProfileKind | None = None
     foot: FootPhases | None = None
+    controlled: str = TORQUE
 
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""

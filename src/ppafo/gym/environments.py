@@ -27,6 +27,7 @@ from ppafo.gym.episodes import (
 )
 from ppafo.gym.pictures import picture
 from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
+from ppafo.model.controlled import TORQUE
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
 from ppafo.simulation.loading import load_scenario
@@ -138,6 +139,11 @@ class World:
             words = over(words, own, ScenarioError)
             chosen = load_scenario(file, words)
             chosen.device.check_vane("an environment")
+            if task == "torque" and chosen.controlled != TORQUE:
+                raise ScenarioError(
+                    f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
+                    "another scenario, or the task 'angle'"
+                )
             self.episodes = scenario_episodes(chosen, randomise, varied, targets)
         bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = Judging(

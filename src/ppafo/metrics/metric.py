@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
+from ppafo.model.controlled import CONTROLLED, TORQUE, Controlled
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
 
@@ -107,8 +108,9 @@ class MetricKind:
     example no hold for the error on the hold. ``read(readings)`` returns the same for many runs (runs,), nan in place
     of None, from the meters in ``meters`` and the traces of the channels in ``traced``; without a trace it is a
     ``ReadAt``, or a plain function, no closure, of arithmetic with the functions of ``model.columns``, which is
-    translated too. It is asked only of runs that have the channels, and what is in ``needs``. Without ``compute`` it is
-    counted while a run goes on, and no recording of its channels alone has it.
+    translated too. It is asked only of runs that have the channels, and what is in ``needs``; of a metric about a
+    reference, ``of_reference`` says of what that is. Without ``compute`` it is counted while a run goes on, and no
+    recording of its channels alone has it.
     """
 
     name: str
@@ -120,12 +122,65 @@ class MetricKind:
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
+    of_reference: str = ""
+
+
+_WAY = "the largest way of the reference from the start"
+
+
+def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str], str]) -> tuple[MetricKind, ...]:
+    """Return metrics of a torque's reference, and the same of each other one, in its unit.
+
+    ``rename(name, controlled)`` makes the names of the others.
+    """
+    others = (
+        replace(
+            kind,
+            name=rename(kind.name, name),
+            unit=controlled.difference if kind.unit == "N m" else kind.unit,
+            summary=kind.summary.replace("torque", controlled.words).replace("the largest reference", _WAY),
+            channels=(controlled.channel, controlled.reference),
+            of_reference=name,
+        )
+        for name, controlled in CONTROLLED.items()
+        if name != TORQUE
+        for kind in kinds
+    )
+    return (*(replace(kind, of_reference=TORQUE) for kind in kinds), *others)
+
+
+def controlled_in(recording: Recording) -> Controlled | None:
+    """Return what the reference of a recording is of; None where it has none."""
+    return next((kind for kind in CONTROLLED.values() if kind.reference in recording), None)
+
+
+def has_reference(recording: Recording) -> bool:
+    """Return whether a recording has a reference of anything."""
+    return controlled_in(recording) is not None
+
+
+def reference_of(recording: Recording) -> Floats:
+    """Return the reference of a recording, which has one."""
+    return next(recording[kind.reference] for kind in CONTROLLED.values() if kind.reference in recording)
+
+
+def followed(recording: Recording) -> tuple[Floats, Floats]:
+    """Return the reference of a recording, which has one, and what follows it."""
+    channel = next(kind.channel for kind in CONTROLLED.values() if kind.reference in recording)
+    return reference_of(recording), recording[channel]
+
+
+def extent(recording: Recording) -> float:
+    """Return how far the reference goes: from 0 for a torque, else from what is controlled at the start."""
+    if CONTROLLED[TORQUE].reference in recording:
+        return float(np.max(np.abs(recording[CONTROLLED[TORQUE].reference])))
+    reference, value = followed(recording)
+    return float(np.max(np.abs(reference - value[0])))
 
 
 def hold_start(recording: Recording) -> int | None:
     """Return the sample from which on the reference stays at its final level; None where it never rests there."""
-    reference = recording["reference"]
-    tolerance = SAME_LEVEL * float(np.max(np.abs(reference)))
+    reference, tolerance = reference_of(recording), SAME_LEVEL * extent(recording)
     away = np.flatnonzero(np.abs(reference - reference[-1]) > tolerance)
     first = int(away[-1]) + 1 if away.size else 0
     # One sample at rest has no time over which a mean could be taken.

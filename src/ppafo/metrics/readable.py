@@ -10,7 +10,6 @@ from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 
-REFERENCE = "reference"
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
 
 
@@ -93,6 +92,6 @@ def has_channels(program: Program, kind: MetricKind) -> bool:
     }
     return (
         not missing.intersection(kind.channels)
-        and (has_reference or REFERENCE not in kind.channels)
+        and (not kind.of_reference or (has_reference and kind.of_reference == program.controlled))
         and all(has[need] for need in kind.needs)
     )

@@ -1,4 +1,4 @@
-"""How restless a task is: changes of state of the valves and oscillations of the torque.
+"""How restless a task is: changes of state of the valves and oscillations of what is controlled.
 
 The state of a valve is the one that the command orders, at the samples: valve A of a pair is on above 0, valve B below,
 both are off at 0 and where the command vents. Each change of each valve counts one, so a reversal of a pair counts two.
@@ -14,14 +14,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, hold, ramp, spans
+from ppafo.metrics.metric import (
+    Floats,
+    MetricKind,
+    ReadAt,
+    Readings,
+    extent,
+    followed,
+    for_each_reference,
+    hold,
+    ramp,
+    spans,
+)
 from ppafo.model.columns import choose, larger, truncated
+from ppafo.model.controlled import value_in
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
 OSCILLATION_THRESHOLD = 0.05
-"""Smallest swing that counts as an oscillation, as a fraction of the largest absolute reference."""
+"""Smallest swing that counts as an oscillation, as a fraction of how far the reference goes."""
 
 SHUT = 1.0e-6
 """Command up to which a valve counts as off or shut: what rounding leaves at the start of a task opens nothing."""
@@ -63,12 +75,12 @@ def reversals(values: Floats, swing: float) -> int:
 
 
 def oscillations(recording: Recording, part_of: Callable[[Recording], slice | None]) -> float | None:
-    """Number of torque reversals in a part of the task that swing over 5 % of the largest reference; None without."""
-    part, largest = part_of(recording), float(np.max(np.abs(recording["reference"])))
+    """Number of reversals in a part of the task that swing over 5 % of how far the reference goes; None without."""
+    part, largest = part_of(recording), extent(recording)
     # Without a reference there is nothing that the smallest swing could be a fraction of.
     if part is None or largest == 0.0:
         return None
-    return float(reversals(recording["torque"][part], OSCILLATION_THRESHOLD * largest))
+    return float(reversals(followed(recording)[1][part], OSCILLATION_THRESHOLD * largest))
 
 
 class Switchings(NamedTuple):
@@ -118,7 +130,7 @@ UNDECIDED = -0.5
 
 
 def next_swing(state: Swing, value: float, swing: float) -> Swing:
-    """The state after one more value, in the unit of ``swing`` [N m]."""
+    """The state after one more value, in the unit of ``swing``."""
     # The sign of ``turns`` is the way and its size counts: a turn changes the one and adds 1 to the other.
     play = min(max(state.play, value - swing), value)
     turns_back = (play - state.play) * state.turns < 0.0
@@ -142,15 +154,16 @@ class Oscillations(NamedTuple):
 
 def start_oscillations(course: Course, sample: Sample) -> Oscillations:
     """No reversal at the first sample."""
-    return Oscillations(Swing(sample.torque, UNDECIDED, sample.torque), UNDECIDED)
+    value = value_in(sample)
+    return Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
 
 
 def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> Oscillations:
     """One sample more; the first one of the hold is the last one of the ramp too."""
-    torque = sample.torque
-    swing = next_swing(state.swing, torque, OSCILLATION_THRESHOLD * course.largest)
+    value = value_in(sample)
+    swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number
-    begun = Swing(torque if anew else swing.play, UNDECIDED if anew else swing.turns, torque if anew else swing.highest)
+    begun = Swing(value if anew else swing.play, UNDECIDED if anew else swing.turns, value if anew else swing.highest)
     return Oscillations(begun, swing.turns if anew else state.turns_on_ramp)
 
 
@@ -158,12 +171,12 @@ OSCILLATIONS = MeterKind("oscillations", Oscillations, start_oscillations, updat
 
 
 def read_oscillations_ramp(readings: Readings) -> Floats:
-    """``oscillations_ramp``, the number of torque reversals."""
+    """``oscillations_ramp``, the number of reversals."""
     return _where_swinging(readings, spans(readings)[0], count_of(readings.meters[OSCILLATIONS.name].turns_on_ramp))
 
 
 def read_oscillations_hold(readings: Readings) -> Floats:
-    """``oscillations_hold``, the number of torque reversals."""
+    """``oscillations_hold``, the number of reversals."""
     return _where_swinging(readings, spans(readings)[1], count_of(readings.meters[OSCILLATIONS.name].swing.turns))
 
 
@@ -175,16 +188,7 @@ def _where_swinging(readings: Readings, span: Floats, count: Floats) -> Floats:
 
 _REVERSALS = "torque reversals of more than 5 % of the largest reference"
 
-METRICS = (
-    MetricKind(
-        "switchings",
-        "-",
-        "valves switched on or off by the command, each of a pair counted: a reversal is 2",
-        ("command",),
-        switchings,
-        ReadAt(("meters.switchings.changes",)),
-        (SWITCHINGS,),
-    ),
+_OSCILLATIONS = (
     MetricKind(
         "oscillations_ramp",
         "-",
@@ -203,4 +207,17 @@ METRICS = (
         read_oscillations_hold,
         (OSCILLATIONS,),
     ),
+)
+
+METRICS = (
+    MetricKind(
+        "switchings",
+        "-",
+        "valves switched on or off by the command, each of a pair counted: a reversal is 2",
+        ("command",),
+        switchings,
+        ReadAt(("meters.switchings.changes",)),
+        (SWITCHINGS,),
+    ),
+    *for_each_reference(_OSCILLATIONS, lambda name, controlled: f"{controlled}_{name}"),
 )

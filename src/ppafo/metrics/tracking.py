@@ -1,4 +1,4 @@
-"""How well the torque follows its reference."""
+"""How well what is controlled follows its reference."""
 
 from collections.abc import Callable
 from functools import partial
@@ -6,26 +6,36 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, hold, ramp, spans
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, followed, for_each_reference, hold, ramp, spans
 from ppafo.model.columns import root
+from ppafo.model.controlled import CONTROLLED, TORQUE, value_in
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
 _NEEDED = ("torque", "reference")
 
-ONE_INSTANT = "final_error"
-"""A metric that reads one sample: of a loop that oscillates it says where that sample happened to fall."""
+ONE_INSTANT = {
+    (f"final_{name}error"): (f"rms_{name}error_hold", f"{name}oscillations_hold")
+    for name in ("" if controlled == TORQUE else f"{controlled}_" for controlled in CONTROLLED)
+}
+"""Metrics that read one sample, which in a loop that oscillates falls anywhere; those that say whether it does."""
 SUSTAINED = 4
-"""Reversals of the torque on the hold from which a loop oscillates; one that settles has one or two."""
+"""Reversals on the hold from which a loop oscillates; one that settles has one or two."""
 
 
 def settled_error(final: Floats, on_hold: Floats, reversals: Floats) -> Floats:
-    """Return ``final_error`` [N m] or, where the loop oscillates on the hold, ``rms_error_hold`` if that is larger."""
+    """Return the error at the end or, where the loop oscillates on the hold, its RMS there if that is larger."""
     return np.where((reversals >= SUSTAINED) & (on_hold > final), on_hold, final)
 
 
+def error_of(recording: Recording) -> Floats:
+    """Return the reference less what follows it, in the unit of the reference."""
+    reference, value = followed(recording)
+    return reference - value
+
+
 def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None] | None = None) -> float | None:
-    """Root of the time average of (reference - torque)^2 [N m] in all or a part; None where it has no such part.
+    """Root of the time average of the squared error in all or a part; None where it has no such part.
 
     By the trapezoidal rule, so that any sampling will do.
     """
@@ -33,22 +43,22 @@ def rms_error(recording: Recording, part_of: Callable[[Recording], slice | None]
     if part is None:
         return None
     # Over time and not over samples: a recording may have more of them where more happens.
-    time, error = recording.time[part], (recording["reference"] - recording["torque"])[part]
+    time, error = recording.time[part], error_of(recording)[part]
     return float(np.sqrt(np.trapezoid(error**2, time) / float(time[-1] - time[0])))
 
 
 def peak_error(recording: Recording) -> float:
-    """Largest absolute difference of reference and torque [N m]."""
-    return float(np.max(np.abs(recording["reference"] - recording["torque"])))
+    """Largest absolute error, in the unit of the reference."""
+    return float(np.max(np.abs(error_of(recording))))
 
 
 def final_error(recording: Recording) -> float:
-    """Absolute difference of reference and torque at the last sample [N m]."""
-    return float(abs(recording["reference"][-1] - recording["torque"][-1]))
+    """Absolute error at the last sample, in the unit of the reference."""
+    return float(abs(error_of(recording)[-1]))
 
 
 class SquaredError(NamedTuple):
-    """Squared error at the last sample [N^2 m^2]; trapezoidal sums of it before the hold and on it, one a sample."""
+    """Squared error at the last sample; trapezoidal sums of it before the hold and on it, one a sample."""
 
     last: float
     before_hold: float
@@ -57,13 +67,13 @@ class SquaredError(NamedTuple):
 
 def start_squared_error(course: Course, sample: Sample) -> SquaredError:
     """The squared error of the first sample."""
-    error = sample.reference - sample.torque
+    error = sample.reference - value_in(sample)
     return SquaredError(error * error, 0.0, 0.0)
 
 
 def update_squared_error(state: SquaredError, course: Course, sample: Sample) -> SquaredError:
     """One interval more."""
-    error = sample.reference - sample.torque
+    error = sample.reference - value_in(sample)
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.
     piece = 0.5 * (state.last + square)
@@ -78,7 +88,7 @@ SQUARED_ERROR = MeterKind("squared_error", SquaredError, start_squared_error, up
 
 
 class AbsoluteError(NamedTuple):
-    """Absolute error [N m]: the largest, and the one of the last sample so far."""
+    """Absolute error: the largest, and the one of the last sample so far."""
 
     largest: float
     last: float
@@ -86,13 +96,13 @@ class AbsoluteError(NamedTuple):
 
 def start_absolute_error(course: Course, sample: Sample) -> AbsoluteError:
     """The error of the first sample."""
-    error = abs(sample.reference - sample.torque)
+    error = abs(sample.reference - value_in(sample))
     return AbsoluteError(error, error)
 
 
 def update_absolute_error(state: AbsoluteError, course: Course, sample: Sample) -> AbsoluteError:
     """The larger one of that and the error of the next sample, and this one."""
-    error = abs(sample.reference - sample.torque)
+    error = abs(sample.reference - value_in(sample))
     return AbsoluteError(max(state.largest, error), error)
 
 
@@ -119,7 +129,7 @@ def read_rms_error_hold(readings: Readings) -> Floats:
 
 _RMS = "root-mean-square torque error"
 
-METRICS = (
+_OF_TORQUE = (
     MetricKind("rms_error", "N m", _RMS, _NEEDED, rms_error, read_rms_error, (SQUARED_ERROR,)),
     MetricKind(
         "rms_error_ramp",
@@ -158,3 +168,8 @@ METRICS = (
         (ABSOLUTE_ERROR,),
     ),
 )
+
+METRICS = for_each_reference(_OF_TORQUE, lambda name, controlled: name.replace("error", f"{controlled}_error"))
+
+TRACKING = tuple(kind.name for kind in METRICS)
+"""Names of the errors, of each reference."""

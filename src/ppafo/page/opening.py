@@ -14,7 +14,9 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.channels import TRACED
 from ppafo.errors import ScenarioError
+from ppafo.model.controlled import CONTROLLED
 from ppafo.page.wasm import WasmModule
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
@@ -80,8 +82,9 @@ def computed_opening(
     known = [one["name"] for one in module.description["metrics"]]
     named, claims = claims, [name for name in claims if name in known]
     channels = [one["name"] for one in module.description["channels"]]
-    # The first panel shows a torque that is controlled, else the motion of the vane.
-    lead = "torque" if "reference" in channels else "angle"
+    # The first panel shows what is controlled, else the motion of the vane.
+    followed = next((kind for kind in CONTROLLED.values() if kind.reference in channels), None)
+    lead = "angle" if followed is None else followed.channel if followed.channel in TRACED else "pressure_1"
 
     def runs(columns: Mapping[str, Floats], bands: Sequence[str]) -> Any:
         count = max((len(column) for column in columns.values()), default=1)
@@ -89,7 +92,9 @@ def computed_opening(
         some = {**usual, **columns} or {"run.duration": np.full(count, scenario.run.duration)}
         return run_ensemble(scenario, some, claims, bands)
 
-    shown = [lead, *(("reference",) if lead == "torque" else ())]
+    # A difference of pressures is no channel: its reference would be no level beside the one that is shown.
+    wanted = () if followed is None or lead != followed.channel else (followed.reference,)
+    shown = [lead, *wanted]
     base = runs({}, shown)
     usual = [float(base.metrics[name][0]) for name in claims]
     course = base.traces[lead][:, 0]

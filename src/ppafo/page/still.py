@@ -5,13 +5,19 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from typing import Any
 
+from ppafo.model.controlled import CONTROLLED
 from ppafo.report.display_units import axis_unit, display_value, quantity_of_unit
 from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
 
 _WIDTH, _HEIGHT = 720.0, 340.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 12.0, 30.0, 44.0
-_NAMES = {"torque": "Torque", "angle": "Angle of the ankle"}
-_UNITS = {"torque": "N m", "angle": "rad"}
+_NAMES = {
+    "torque": "Torque",
+    "angle": "Angle of the ankle",
+    "pressure_1": "Pressure in chamber 1",
+    "pressure_2": "Pressure in chamber 2",
+}
+_UNITS = {name: CONTROLLED[name].level.unit for name in _NAMES}
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
@@ -29,7 +35,8 @@ def still_of(
         return [(time, display_value(value, quantity)) for time, value in both if value is not None]
 
     curves = [(course(one, lead), colour) for one, colour in zip(openings, _colours(programs), strict=False)]
-    required = course(openings[0], "reference") if "reference" in openings[0]["courses"] else []
+    reference = CONTROLLED[lead].reference
+    required = course(openings[0], reference) if reference in openings[0]["courses"] else []
     points = [point for curve in (required, *(points for points, _ in curves)) for point in curve]
     if not points:
         return ""

@@ -78,6 +78,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         ),
         flow=Flow(**read("flow", declaration.FLOW)),
         valve_name=name,
+        joint=parameter_set.joint,
         effects={
             effect: read(EFFECTS[effect].section, EFFECTS[effect].quantities_in(species))
             for effect in sorted(named_effects)

@@ -11,6 +11,7 @@ from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.declaration import Number, attribute_among
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
+from ppafo.parameters.joint import ANKLE, Joint
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -152,7 +153,7 @@ class Device:
     """A complete device with the one valve that was chosen; everything that a run needs to know of the hardware.
 
     ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
-    ``links`` say which of its numbers follow others that are varied.
+    ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
     """
 
     name: str
@@ -166,6 +167,7 @@ class Device:
     valve_name: str
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
+    joint: Joint = ANKLE
 
     def check_vane(self, what: str) -> None:
         """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""

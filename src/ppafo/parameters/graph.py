@@ -21,7 +21,7 @@ TORQUE_CONSTANT_PATH, DISPLACEMENT_PATH = "actuator.torque_constant", "actuator.
 SAME_PRESSURE = 1.0e-6
 """Relative difference below which two pressures are one that was written in two units."""
 _LEVEL, _GAUGE = "Pa_a", "_g"
-_COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.")
+_COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
 
 def itself(number: Any) -> Any:
@@ -104,8 +104,8 @@ Graph = Mapping[str, tuple[Follows, ...]]
 def counts_from(path: str, atmosphere: float) -> float:
     """Return from which pressure [Pa absolute] a gauge pressure at a path counts.
 
-    Pressures of the supply and of the start count from the atmosphere of the device; what a controller or a sensor is
-    set to knows no weather and counts from the standard atmosphere.
+    Pressures of the supply, of the start and of a reference count from the atmosphere of the device; what a controller
+    or a sensor is set to knows no weather and counts from the standard atmosphere.
     """
     return atmosphere if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 

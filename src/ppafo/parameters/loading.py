@@ -4,6 +4,7 @@ import functools
 import json
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
@@ -23,6 +24,7 @@ from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
+from ppafo.parameters.joint import ANKLE, OPPOSITES, Joint
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
     Accepted,
@@ -114,6 +116,30 @@ def whole_parameter_file() -> type[BaseModel]:
 _KINDS: tuple[Kinds[Any], ...] = (VALVES, ACTUATORS, EFFECTS)
 
 
+_WORD = Annotated[str, Field(pattern=r"^[a-z][a-z ]{0,39}$")]
+_JOINT = table(
+    "Joint",
+    {
+        "name": (_WORD, Field(description="name of the joint, such as 'elbow'")),
+        "positive": (_WORD, Field(description="what a growing angle is called, such as 'flexion'")),
+        "negative": optional(_WORD, "what a falling angle is called; the opposite unless given"),
+    },
+)
+
+
+def _joint_of(given: Any, file: str) -> Joint:
+    """Return the words for a joint; ParameterError for a movement whose opposite is not known and not given."""
+    if given is None:
+        return ANKLE
+    negative = given.negative or OPPOSITES.get(given.positive)
+    if negative is None:
+        hint = nearest_name(given.positive, OPPOSITES)
+        raise ParameterError(
+            f"{file}: joint.positive = '{given.positive}': its opposite is not known{hint}; give joint.negative too"
+        )
+    return Joint(given.name, given.positive, negative)
+
+
 @functools.lru_cache(maxsize=4)
 def _parameter_file(_kinds: Any) -> type[BaseModel]:
     fields: dict[str, Any] = {
@@ -134,6 +160,7 @@ def _parameter_file(_kinds: Any) -> type[BaseModel]:
         "default_valve": (str, Field(description="name of the valve that a device has by default")),
         "accepted": (list[Accepted], Field(default_factory=list, description="contradictions kept for a reason")),
     }
+    fields["joint"] = optional(_JOINT, "the joint that the actuator turns, in words; the ankle unless given")
     fields |= {name: optional(model, f"section {name}") for name, model in _sections().items()}
     valves = [
         _section(
@@ -274,6 +301,7 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},
         accepted={item.finding: item.reason for item in parsed.accepted},
+        joint=_joint_of(parsed.joint, file),
     )
 
 
@@ -300,6 +328,8 @@ def parameter_set_toml(parameter_set: ParameterSet) -> str:
     lines = [*_assignments({"schema_version": 1, **{key: value for key, value in head.items() if value}})]
     if parameter_set.citation is not None:
         lines += ("", "[citation]", *_assignments(parameter_set.citation.model_dump(exclude_defaults=True)))
+    if parameter_set.joint != ANKLE:
+        lines += ("", "[joint]", *_assignments(asdict(parameter_set.joint)))
     if parameter_set.actuator_kind != VANE:
         file = {"file": parameter_set.actuator_file} if parameter_set.actuator_file else {}
         lines += ("", "[actuator]", *_assignments({"kind": parameter_set.actuator_kind, **file}))

@@ -28,6 +28,7 @@ from ppafo.parameters.graph import (
     follows,
     gauge_link,
 )
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
 from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
 
@@ -102,7 +103,8 @@ class ParameterSet:
     ``file`` is what messages call the set; ``numbers``, ``texts`` and ``flags`` are keyed by paths such as
     ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue,
     ``actuator_kind`` the actuator's, ``actuator_file`` the file of one that was measured, and ``actuator_table`` what
-    is in it. ``parent`` is the set that this one began as, a name of the package or a path from here; '' without one.
+    is in it; ``joint`` is what it turns, in words. ``parent`` is the set that this one began as, a name of the package
+    or a path from here; '' without one.
     """
 
     file: str
@@ -121,6 +123,7 @@ class ParameterSet:
     texts: Mapping[str, TextEntry]
     flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
+    joint: Joint = ANKLE
 
     def __repr__(self) -> str:
         """Return name, title, how many values there are, and the valves; ``ppafo sets show`` lists every value."""

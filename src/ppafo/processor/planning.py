@@ -8,6 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.columns import Problem, at, over_runs
+from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.processor.fixed_point import SETTINGS, Converter, converter_of
 
@@ -62,6 +63,7 @@ def fixed_point_kind(
         initial=initial,
         update=update,
         restart=None,
+        controls=(TORQUE,),
         plan=plan,
     )
 

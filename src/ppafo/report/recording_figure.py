@@ -1,12 +1,14 @@
 """The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, one_line
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
@@ -42,12 +44,23 @@ _END_OF_WALK = 5.0
 _ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
 _COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")
 PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]], ...] = (
-    (_ANGLE, 10.0, (), {"angle": ("", ACTUAL)}),
+    (_ANGLE, 10.0, (), {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)}),
     (
         Kind("Pressure", "Pa_a", "pressure"),
         5.0,
         (0.0,),
-        {"pressure_1": ("chamber 1", CHAMBER_1), "pressure_2": ("chamber 2", CHAMBER_2)},
+        {
+            "pressure_1": ("chamber 1", CHAMBER_1),
+            "pressure_2": ("chamber 2", CHAMBER_2),
+            "reference_pressure_1": ("reference, chamber 1", REFERENCE),
+            "reference_pressure_2": ("reference, chamber 2", REFERENCE),
+        },
+    ),
+    (
+        Kind("Pressure in chamber 1 less chamber 2", "Pa_d", "pressure change"),
+        5.0,
+        (),
+        {"reference_pressure_difference": ("reference", REFERENCE), "pressure_difference": ("actual", ACTUAL)},
     ),
     (
         Kind("Actuator torque", "N m", "torque"),
@@ -79,18 +92,19 @@ def recording_figure(
     remark: str = "",
     atmosphere: float = STANDARD_ATMOSPHERE,
     valve: str = "",
+    joint: Joint = ANKLE,
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
     An ankle that a simulation holds at one angle is in the title instead, unless there is nothing else to draw.
     ``remark`` stands below the panels, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
-    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn.
+    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn, ``joint`` what it turns.
     """
     panels = []
     title = title or recording.label
     held = _held_angle(recording)
     if held is not None:
-        title = f"{title}, ankle at {_ANGLE.text(held)}"
+        title = f"{title}, {joint.name} at {_ANGLE.text(held)}"
     for kind, span, always_shown, lines in PANELS:
         shown = {name: line for name, line in lines.items() if name in recording}
         if kind is _ANGLE and held is not None:
@@ -103,12 +117,13 @@ def recording_figure(
             look = look_of_valve(valve) if line is ACTUAL else line
             # A command holds between two samples; all else goes on in between.
             style = {"linestyle": look.line, "drawstyle": "steps-post" if channel == "command" else "default"}
-            label = name if len(shown) > 1 else ""
+            label = joint.said(name) if len(shown) > 1 else ""
             marks.append(Mark("line", recording.time, recording[channel] + shift, (), label, look.colour, style))
         if marks:
             ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
             then = partial(_set_limits, ends, span, always_shown)
-            named = _COMMAND_THAT_VENTS if vents else kind
+            own = _COMMAND_THAT_VENTS if vents else kind
+            named = replace(own, words=joint.said(own.words))
             panels.append(Panel(TIME, named, marks, then=then, shares_x=True))
     if not panels:
         drawn = ", ".join(channel for *_, lines in PANELS for channel in lines)
@@ -119,7 +134,8 @@ def recording_figure(
 def _held_angle(recording: Recording) -> float | None:
     """Return the angle [rad] of a simulated ankle that never moves beside what else is drawn, None of any other."""
     others = [name for _, _, _, lines in PANELS for name in lines if name != "angle" and name in recording]
-    if recording.kind != "simulated" or "angle" not in recording or not others:
+    follows = "reference_angle" in recording
+    if recording.kind != "simulated" or "angle" not in recording or not others or follows:
         return None
     angle = recording["angle"]
     return float(angle[0]) if angle.size > 1 and bool((angle == angle[0]).all()) else None
@@ -150,7 +166,8 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
         raise _other_form(file, "scenario.name", name, "a text")
     atmosphere = stated_atmosphere(file, document, "scenario", "device")
     valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
-    return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve)
+    joint = stated_joint(file, document, "scenario", "device")
+    return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve, joint)
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
@@ -175,6 +192,19 @@ def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> 
     """
     given = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
     return STANDARD_ATMOSPHERE if given is None else given
+
+
+def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint:
+    """Return what the device at some keys of a file's document turns, in words; the ankle where it does not say.
+
+    DataError names the key that is of another form.
+    """
+    words = _under(file, document, *device, "joint")
+    found = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
+    for name, word in found.items():
+        if not isinstance(word, str):
+            raise _other_form(file, ".".join((*device, "joint", name)), word, "a text")
+    return Joint(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in found.items()})
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:

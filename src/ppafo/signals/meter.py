@@ -42,8 +42,9 @@ class StrideSample(NamedTuple):
 class Sample(NamedTuple):
     """One sample of a recording: its number from 0, channels in SI units, and the channels of a foot and of a stride.
 
-    What a run does not have is 0: reference, temperatures of gas without an energy balance, ``foot`` but on the shank
-    of a gait, ``stride`` but in a walk. In a walk ``reference`` is the torque that the controller requests.
+    ``reference`` is in the unit of what is controlled. What a run does not have is 0: reference, temperatures of gas
+    without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in a walk. In a walk ``reference`` is
+    the torque that the controller requests.
     """
 
     number: float
@@ -61,10 +62,11 @@ class Sample(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What is known of the whole reference [N m], and where it rests.
+    """What is known of the whole reference, in its unit, and where it rests.
 
-    Its last value and its largest absolute value over all samples; ``tolerance`` is the difference from the last value
-    up to which it counts as resting; ``hold_start`` is the number of the sample after the last one that did not rest.
+    Its last value; the farthest that it goes over all samples, from 0 or, where it is no torque, from what is
+    controlled as the run begins; ``tolerance`` is the difference from the last value up to which it counts as resting;
+    ``hold_start`` is the number of the sample after the last one that did not rest.
     """
 
     last: float
@@ -78,7 +80,7 @@ SAME_LEVEL = 1.0e-9
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
-    """True where a reference [N m] does not rest at its last value."""
+    """True where a reference does not rest at its last value; all in its unit."""
     return abs(reference - last) > tolerance
 
 

@@ -44,6 +44,12 @@ CHANNELS: dict[str, ChannelKind] = {
     "pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2"),
     "torque": ChannelKind("N m", "actuator torque, positive in plantarflexion"),
     "reference": ChannelKind("N m", "torque requested of the controller"),
+    "reference_angle": ChannelKind("rad", "angle requested of the controller"),
+    "reference_pressure_1": ChannelKind("Pa", "absolute pressure in chamber 1 requested of the controller"),
+    "reference_pressure_2": ChannelKind("Pa", "absolute pressure in chamber 2 requested of the controller"),
+    "reference_pressure_difference": ChannelKind(
+        "Pa_d", "pressure in chamber 1 minus that in chamber 2, as requested of the controller"
+    ),
     "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1; 2 vents both chambers", is_held=True),
     "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
     "vented_mass": ChannelKind("kg", "gas vented to the atmosphere since the start"),

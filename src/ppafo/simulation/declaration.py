@@ -18,6 +18,7 @@ from ppafo.control.catalog import CONTROLLERS, FIXED_POINT, PROFILES
 from ppafo.documents.models import quote
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity, quantities_of, range_rule
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
 from ppafo.parameters.declaration import is_within
@@ -70,7 +71,8 @@ SAMPLING = (RATE, PERIOD)
 ARITHMETIC = "controller.arithmetic"
 """What integer controllers were once chosen by."""
 
-TORQUE_LEVEL = Quantity("level", "N m", "", None, -1.0e4, 1.0e4)
+REFERENCE_OF = "reference.of"
+"""What the reference is a value of, by a word of ``CONTROLLED``."""
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
@@ -118,9 +120,39 @@ class Declared:
         return (*self.texts(document), *self.quantities(document), *self.appended)
 
 
-def controller_settings(kind: str) -> tuple[Quantity, ...]:
-    """Return the settings of a controller of the catalogue, none where it is unknown."""
-    return CONTROLLERS[kind].quantities if kind in CONTROLLERS else ()
+def controlled_in(document: Mapping[str, Any]) -> str:
+    """Return what the reference of a document is of: a torque where it says nothing, or nothing that is known."""
+    name = value_at(document, REFERENCE_OF)
+    return name if isinstance(name, str) and name in CONTROLLED else TORQUE
+
+
+def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, ...]:
+    """Return the settings of a controller of the catalogue, in units of what it controls; none where it is unknown."""
+    if kind not in CONTROLLERS:
+        return ()
+    law = CONTROLLERS[kind]
+    # A law that knows no torque has its settings in units of its own.
+    is_of_any = controlled in law.controls and TORQUE in law.controls
+    return tuple(CONTROLLED[controlled].setting(item) for item in law.quantities) if is_of_any else law.quantities
+
+
+def reference_settings(kind: str, controlled: str) -> tuple[Quantity, ...]:
+    """Return the settings of a reference: levels, to be given where it is no torque, and differences of them."""
+    followed = CONTROLLED[controlled]
+    found = profile_settings(kind, followed.level)
+    if controlled == TORQUE or kind not in PROFILES:
+        return found
+    profile, span = PROFILES[kind], followed.level.maximum - followed.level.minimum
+    levels = {item.name for item in profile.quantities if not item.unit}
+
+    def of_reference(item: Quantity) -> Quantity:
+        if item.name not in levels:
+            return item
+        if item.name in profile.differences:
+            return replace(item, unit=followed.difference, minimum=-span, maximum=span)
+        return replace(item, default=None)
+
+    return tuple(map(of_reference, found))
 
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
@@ -172,12 +204,13 @@ def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | 
     if of_motion is None:
         section = section_of(document)
         of_motion = motion_quantities(section, kind_at(document, profile_path(section)))
+    controlled = controlled_in(document)
     found = {
         **by_path("run", (*RUN, ACCURACY)),
         **of_motion,
         **by_path("initial", INITIAL),
-        **by_path("controller", SAMPLING + controller_settings(kind_at(document, "controller"))),
-        **by_path("reference", profile_settings(kind_at(document, "reference"), TORQUE_LEVEL)),
+        **by_path("controller", SAMPLING + controller_settings(kind_at(document, "controller"), controlled)),
+        **by_path("reference", reference_settings(kind_at(document, "reference"), controlled)),
         **by_path("sensors", (*SENSORS, SEED)),
         **by_path("gas_model", gas_settings(kind_at(document, "gas_model"))),
     }
@@ -191,7 +224,7 @@ def profile_path(section: MotionSection | None) -> str:
 
 def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the paths of every text that a document can hold."""
-    kinds = ("motion.kind", "controller.kind", "reference.kind", "gas_model.kind")
+    kinds = ("motion.kind", "controller.kind", "reference.kind", REFERENCE_OF, "gas_model.kind")
     section = section_of(document)
     if section is None or section.profile is None:
         return (*TEXTS, *kinds)
@@ -340,7 +373,7 @@ class Reading:
             result = parse_quantity(value, quantity.unit, atmosphere) if isinstance(value, str) else float(value)
         # A whole number of a file may be larger than any float.
         except (UnitError, OverflowError) as error:
-            raise self.refusal(path, str(error)) from error
+            raise self.refusal(path, f"{error}{self._of_what(path, quantity)}") from error
         if not isinstance(value, str) and not math.isfinite(result):
             raise self.refusal(path, "is not a finite number")
         if not isinstance(value, str) and quantity.unit not in PLAIN:
@@ -349,9 +382,19 @@ class Reading:
             raise self.refusal(path, range_rule(quantity, limits(quantity, atmosphere)))
         return result
 
-    def section(self, section: str, quantities: tuple[Quantity, ...]) -> dict[str, float]:
-        """Return all values of a section by name, in SI."""
-        return {item.name: self.number(f"{section}.{item.name}", item) for item in quantities}
+    def _of_what(self, path: str, quantity: Quantity) -> str:
+        """Return what decides the unit of a level of the reference or of a gain; an empty text for any other number."""
+        controlled = controlled_in(self.document)
+        followed = CONTROLLED[controlled]
+        is_level = path.startswith("reference.") and quantity.unit in (followed.level.unit, followed.difference)
+        is_gain = path.startswith("controller.") and controlled != TORQUE and followed.plain_unit in quantity.unit
+        return f"; {REFERENCE_OF} is '{controlled}'" if is_level or is_gain else ""
+
+    def section(
+        self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
+    ) -> dict[str, float]:
+        """Return all values of a section by name, in SI; gauge pressures count from an atmosphere [Pa absolute]."""
+        return {item.name: self.number(f"{section}.{item.name}", item, atmosphere) for item in quantities}
 
 
 def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:

@@ -16,6 +16,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.documents.models import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
@@ -30,33 +31,36 @@ from ppafo.simulation.declaration import (
     INITIAL,
     OF_A_VANE,
     PRESSURE_WORDS,
+    REFERENCE_OF,
     SEED,
     SENSORS,
     SUPPLY_LINE,
     SUPPLY_LINES,
     THERMAL,
     THERMAL_GAS,
-    TORQUE_LEVEL,
     Declared,
     Reading,
+    controlled_in,
     controller_settings,
     kind_at,
     line_entries,
     line_quantities,
     quantities,
     quantity_text,
+    reference_settings,
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.motion_kind import MOTIONS
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths
-from ppafo.simulation.profiles import read_profile
+from ppafo.simulation.profiles import reference_problem
 from ppafo.simulation.scenario import (
     Assumption,
     Control,
     GasModel,
     Initial,
+    Motion,
     Origin,
     ProfileChoice,
     RegulatedLine,
@@ -66,7 +70,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
-from ppafo.simulation.torque_loop import PERIOD_PATH, loop_terms
+from ppafo.simulation.torque_loop import LEG_PATHS, PERIOD_PATH, loop_terms
 from ppafo.units import format_quantity, split_quantity
 
 _SECTION = "assumed"
@@ -120,7 +124,9 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     initial, links = _initial(reading, device.supply)
     sensors = _sensors(reading, clock)
     lines = read_supply_line(reading, device)
-    control, of_control = _control(reading, device, clock.period, sensors, lines)
+    controlled = _controlled(reading)
+    reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
+    control, of_control = _control(reading, device, clock.period, sensors, lines, motion)
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -129,14 +135,18 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         motion=motion,
         initial=initial,
         controller=control,
-        reference=_reference(reading),
+        reference=reference,
         sensors=sensors,
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
         origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
         gas_model=read_gas_model(reading),
         supply_line=lines,
-        links={**links, **of_control},
+        links={**links, **of_reference, **of_control},
+        controlled=controlled,
     )
+    problem = reference_problem(scenario)
+    if problem:
+        raise ScenarioError(f"{request.file}: {problem}")
     # Refuse what only a vane has.
     try:
         if scenario.gas_model is not None:
@@ -217,32 +227,67 @@ def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
 
 
 def _control(
-    reading: Reading, device: Device, period: float, sensors: Sensors, lines: SupplyLine | None
+    reading: Reading,
+    device: Device,
+    period: float,
+    sensors: Sensors,
+    lines: SupplyLine | None,
+    motion: Motion,
 ) -> tuple[Control, Graph]:
     """Return the controller with its sample period [s], and which of its settings [SI] follow other numbers."""
     kind = kind_at(reading.document, "controller")
-    items = controller_settings(kind)
+    controlled, leg = controlled_in(reading.document), getattr(motion, "leg", None)
+    items = controller_settings(kind, controlled)
     if not any(item.follows for item in items):
         return Control(kind, reading.section("controller", items), period), {}
     rows = None if lines is None else lines.row(device.supply)
-    terms = nominal_terms(device, rows) | loop_terms(device, CONTROLLERS[kind], walks=False)
+    terms = nominal_terms(device, rows) | loop_terms(
+        device, CONTROLLERS[kind], walks=False, controlled=controlled, has_leg=leg is not None
+    )
     of_sensors = {item.name: getattr(sensors, item.name) for item in SENSORS}
     present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
+    if leg is not None:
+        present |= {path: getattr(leg, path.removeprefix("motion.")) for path in LEG_PATHS}
     found, links = read_followers(reading, {"controller": items}, terms, device, present)
     return Control(kind, {path.partition(".")[2]: number for path, number in found.items()}, period), links
 
 
-def _reference(reading: Reading) -> ProfileChoice:
-    """Return the torque that the controller follows; ScenarioError where it needs one and none is given."""
-    if "reference" in reading.document:
-        return read_profile(reading, "reference", TORQUE_LEVEL)
-    kind = kind_at(reading.document, "controller")
-    if CONTROLLERS[kind].needs_reference:
-        raise ScenarioError(
-            f"{reading.file}: 'reference' is missing: controller.kind = '{kind}' follows a torque; give "
-            "[reference] with its kind and settings"
-        )
-    return _NOTHING_TO_FOLLOW
+def _controlled(reading: Reading) -> str:
+    """Return what the reference is of; ScenarioError where the controller cannot follow it."""
+    controlled, kind = controlled_in(reading.document), kind_at(reading.document, "controller")
+    law = CONTROLLERS[kind]
+    if not law.needs_reference or controlled in law.controls:
+        return controlled
+    able = ", ".join(name for name, other in CONTROLLERS.items() if controlled in other.controls)
+    follows = " or ".join(CONTROLLED[name].words for name in law.controls)
+    remedy = f'give [reference] of = "{law.controls[0]}", or take one of {able}'
+    # A reference that says nothing is of a torque, which a law of another quantity cannot follow.
+    path = REFERENCE_OF if value_at(reading.document, REFERENCE_OF) is not None else "controller.kind"
+    raise reading.refusal(
+        path, f"the controller '{kind}' follows a reference of {follows}, not of {controlled}; {remedy}"
+    )
+
+
+def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
+    """Return what the controller follows, and which levels of it follow the atmosphere [Pa absolute].
+
+    ScenarioError where the controller needs a reference and none is given.
+    """
+    if "reference" not in reading.document:
+        law = kind_at(reading.document, "controller")
+        if CONTROLLERS[law].needs_reference:
+            raise ScenarioError(
+                f"{reading.file}: 'reference' is missing: controller.kind = '{law}' follows a reference; give "
+                "[reference] with its kind and settings"
+            )
+        return _NOTHING_TO_FOLLOW, {}
+    kind = kind_at(reading.document, "reference")
+    settings = reference_settings(kind, controlled)
+    levels = [f"reference.{item.name}" for item in settings if item.unit == "Pa_a"]
+    given = {path: value_at(reading.document, path) for path in levels}
+    links = {path: gauge_link(path, *split_quantity(str(text))) for path, text in given.items() if text is not None}
+    choice = ProfileChoice(kind, reading.section("reference", settings, atmosphere))
+    return choice, {path: follow for path, follow in links.items() if follow}
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:

@@ -28,12 +28,17 @@ class Surroundings(NamedTuple):
 
 
 class MeanChambers(NamedTuple):
-    """Torque per pressure [m^3], and gas content per pressure [m^3]: the volume, and what it gives under pressure."""
+    """Torque per pressure [m^3], and gas content per pressure [m^3]: the volume, and what it gives under pressure.
+
+    The angle moves gas by ``growth`` [m^3/rad].
+    """
 
     torque_per_pressure_1: float
     torque_per_pressure_2: float
     volume_1: float
     volume_2: float
+    growth_1: float
+    growth_2: float
 
 
 class StillPlant(NamedTuple):
@@ -89,6 +94,8 @@ def vane_at_right_angle(settings: VaneSettings, stops: Range, _around: Surroundi
         torque_per_pressure_2=settings.torque_constant,
         volume_1=stops.dead_volume_1 + growth * (angle - stops.angle_min),
         volume_2=stops.dead_volume_2 + growth * (stops.angle_max - angle),
+        growth_1=growth,
+        growth_2=growth,
     )
 
 
@@ -109,11 +116,16 @@ def shaped_in_the_middle(settings: Any, stops: Range, around: Surroundings) -> M
     half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
     filled = both_chambers(plant, angle, half_1, half_2)
     vented = shaft_torque(plant, angle, room, room)
+    # By virtual work a chamber grows with the angle as its torque does with the pressure.
+    growth_1 = abs(shaft_torque(plant, angle, room + gauge_1, room) - vented) / gauge_1
+    growth_2 = abs(shaft_torque(plant, angle, room, room + gauge_2) - vented) / gauge_2
     return MeanChambers(
-        torque_per_pressure_1=abs(shaft_torque(plant, angle, room + gauge_1, room) - vented) / gauge_1,
-        torque_per_pressure_2=abs(shaft_torque(plant, angle, room, room + gauge_2) - vented) / gauge_2,
+        torque_per_pressure_1=growth_1,
+        torque_per_pressure_2=growth_2,
         volume_1=filled.volume_1 + half_1 * filled.compliance_1,
         volume_2=filled.volume_2 + half_2 * filled.compliance_2,
+        growth_1=growth_1,
+        growth_2=growth_2,
     )
 
 

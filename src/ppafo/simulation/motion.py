@@ -51,7 +51,8 @@ def _beside(scenario: Scenario, of_motion: Mapping[str, Quantity]) -> dict[str, 
     """Return the declaration of every number of a scenario, given those of its motion."""
     document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
     # A constant command follows no reference, whatever the scenario has in its place.
-    document |= {} if scenario.controller.kind == OPEN_LOOP else {"reference": {"kind": scenario.reference.kind}}
+    reference = {"kind": scenario.reference.kind, "of": scenario.controlled}
+    document |= {} if scenario.controller.kind == OPEN_LOOP else {"reference": reference}
     document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
     return quantities(document | ({} if scenario.supply_line is None else {SUPPLY_LINE: {}}), of_motion)
 

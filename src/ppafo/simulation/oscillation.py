@@ -1,4 +1,4 @@
-"""What a run says of its torque loop: the gains in force and where they come from, and whether the loop oscillates.
+"""What a run says of its loop: the gains in force and where they come from, and whether the loop oscillates.
 
 A loop oscillates where its command turns too often from more than half open one way to the other within one task: in a
 walk above 12 times a stride, else above 10 times a second. A law that only switches does so by design.
@@ -10,10 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.control import torque_loop
+from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.command import asked_samples
+from ppafo.metrics.metric import followed, has_reference
+from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.graph import Term
+from ppafo.report.display_units import metric_change
 from ppafo.signals import Recording
+from ppafo.simulation.declaration import controller_settings
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
@@ -34,9 +40,21 @@ _OF_LOOP = frozenset(
         torque_loop.OPENING,
         torque_loop.LEARNING_GAIN,
         torque_loop.LEAD,
+        angle_loop.ANGLE_STIFFNESS,
+        angle_loop.ANGLE_DAMPING,
+        angle_loop.RATE_FILTER,
+        angle_loop.INNER_GAIN,
+        angle_loop.GRAVITY,
+        angle_loop.INERTIA,
+        angle_loop.FRICTION,
     )
 )
-_FIRST = (torque_loop.PROPORTIONAL_GAIN, torque_loop.BOUNDARY, torque_loop.CONVERGENCE)
+_FIRST = (
+    torque_loop.PROPORTIONAL_GAIN,
+    torque_loop.BOUNDARY,
+    torque_loop.CONVERGENCE,
+    angle_loop.ANGLE_STIFFNESS,
+)
 """What sets how fast a loop is."""
 _SLOPES = ("derivative_gain", "damping")
 _NEAR = 0.02
@@ -60,16 +78,17 @@ class Gain:
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """The gains of a torque law, with the torque rate at full opening [N m/s] and the dead time [s] of the device."""
+    """The gains of a law, with the rate of what it controls at full opening, per ``unit``, and what comes late [s]."""
 
     gains: tuple[Gain, ...]
     torque_rate: float
     dead_time: float
+    unit: str = "N m"
 
     @property
     def sentence(self) -> str:
         """The gains in force and where they come from."""
-        loop = f"{self.torque_rate:.3g} N m/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
+        loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
         parts = [
             f"{', '.join(item.text for item in self.gains if item.computed == computed)} {origin}"
             for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})"))
@@ -80,9 +99,10 @@ class Gains:
 
 @dataclass(frozen=True, slots=True)
 class Oscillation:
-    """A torque loop that oscillates: reversals ``per`` stride or second, RMS error and RMS of what is wanted [N m].
+    """A loop that oscillates: reversals ``per`` stride or second, RMS error and RMS of what is wanted.
 
-    ``remedy`` says which gain would mend it.
+    Both are in SI, of what is ``controlled``; an angle or a pressure is wanted as far as it is from where the run
+    begins. ``remedy`` says which gain would mend it.
     """
 
     reversals: float
@@ -90,30 +110,47 @@ class Oscillation:
     error: float
     wanted: float
     remedy: str
+    controlled: str = TORQUE
 
     @property
     def sentence(self) -> str:
         """The verdict in one line."""
-        return (
-            f"the torque loop oscillates: {self.reversals:.3g} reversals a {self.per}, RMS {self.error:.2g} of "
-            f"{self.wanted:.2g} N m wanted; {self.remedy}"
+        followed = CONTROLLED[self.controlled]
+        # Differences of levels both, so that no gauge pressure is meant.
+        (error, unit), (wanted, _) = (
+            metric_change(number, followed.difference) for number in (self.error, self.wanted)
         )
+        return (
+            f"the {followed.words} loop oscillates: {self.reversals:.3g} reversals a {self.per}, RMS {error:.2g} of "
+            f"{wanted:.2g} {unit} wanted; {self.remedy}"
+        )
+
+
+def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]:
+    """Return the settings of a law of a scenario, in units of what it controls."""
+    return law.quantities if scenario.walks else controller_settings(scenario.controller.kind, scenario.controlled)
+
+
+def _terms(scenario: Scenario, law: ControllerKind) -> dict[str, Term]:
+    has_leg = not scenario.walks and getattr(scenario.motion, "leg", None) is not None
+    return loop_terms(scenario.device, law, scenario.walks, scenario.controlled, has_leg)
 
 
 def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains of a scenario's torque law in force; None for a law that has none."""
     if scenario.controller.kind == PYTHON_CONTROLLER:
         return None
-    items = [item for item in law.quantities if _OF_LOOP.intersection(item.follows)]
+    items = [item for item in settings_of(scenario, law) if _OF_LOOP.intersection(item.follows)]
     if not items:
         return None
-    links, terms = scenario.links, loop_terms(scenario.device, law, scenario.walks)
+    links, terms = scenario.links, _terms(scenario, law)
     found = tuple(
         Gain(item.name, item.unit, float(scenario.controller.settings[item.name]), f"controller.{item.name}" in links)
         for item in items
     )
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
-    return Gains(found, rate, late)
+    controlled = scenario.controlled if TORQUE in law.controls else TORQUE
+    return Gains(found, rate, late, CONTROLLED[controlled].plain_unit)
 
 
 def asks_gradually(scenario: Scenario, law: ControllerKind) -> bool:
@@ -142,27 +179,29 @@ def oscillation_of(
 ) -> Oscillation | None:
     """Return the verdict on a run with these metrics [SI]; None where its loop does not oscillate."""
     reversals, duration = metrics.get(REVERSALS, 0.0), float(np.ptp(recording.time[[0, -1]]))
-    if "reference" not in recording or reversals <= most_reversals(scenario, law, duration, stride_time):
+    if not has_reference(recording) or reversals <= most_reversals(scenario, law, duration, stride_time):
         return None
     asked = asked_samples(recording) if scenario.walks else np.ones(len(recording), dtype=np.bool_)
-    reference, torque = recording["reference"][asked], recording["torque"][asked]
+    reference, value = (series[asked] for series in followed(recording))
+    origin = 0.0 if scenario.controlled == TORQUE else value[0]
     scale, per = (stride_time, "stride") if stride_time > 0.0 else (1.0, "second")
     return Oscillation(
         reversals=reversals * scale / duration,
         per=per,
-        error=float(np.sqrt(np.mean((reference - torque) ** 2))),
-        wanted=float(np.sqrt(np.mean(reference**2))),
+        error=float(np.sqrt(np.mean((reference - value) ** 2))),
+        wanted=float(np.sqrt(np.mean((reference - origin) ** 2))),
         remedy=_remedy(scenario, law),
+        controlled=scenario.controlled,
     )
 
 
 def _remedy(scenario: Scenario, law: ControllerKind) -> str:
     """Return which gain the device asks for, or what else to look at where it has that one."""
-    item = next((item for item in law.quantities if set(_FIRST).intersection(item.follows)), None)
+    item = next((item for item in settings_of(scenario, law) if set(_FIRST).intersection(item.follows)), None)
     if item is None:
         return "give its law smaller gains, or a slower one"
     name = next(name for name in _FIRST if name in item.follows)
-    term = loop_terms(scenario.device, law, scenario.walks)[name]
+    term = _terms(scenario, law)[name]
     right = float(term.number(lambda path: number_at(scenario, path)))
     now = float(scenario.controller.settings[item.name])
     if abs(now - right) <= _NEAR * right:

@@ -35,6 +35,7 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
+from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.orifice import ExactOrifice
@@ -104,6 +105,7 @@ class Components:
     signal_delay: Any = 0.0
     sections: Mapping[str, Any] = field(default_factory=dict)
     leg: "CarriedLeg | None" = None
+    controlled: str = TORQUE
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,6 +268,7 @@ def _program(components: Components, steps: Steps, walk: Walk | None, has_delay:
         effects=effects,
         shank=None if components.leg is None else components.leg.shank,
         foot=_foot(components),
+        controlled=components.controlled,
     )
 
 
@@ -305,6 +308,7 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
         signal_delay=scenario.sensors.delay,
         sections={"sensors": scenario.sensors},
         leg=leg,
+        controlled=scenario.controlled,
     )
     run = compose_run(
         components, plant, lambda fed: scenario_steps(scenario, fed), lambda fed: initial_state(scenario, fed)

@@ -7,10 +7,12 @@ import numpy as np
 from ppafo.control.catalog import PROFILES
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.rows import rebuilt
+from ppafo.model.catalog import VALVES
 from ppafo.model.columns import over_runs
+from ppafo.model.controlled import ANGLE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
-from ppafo.simulation.scenario import ProfileChoice
+from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
@@ -46,9 +48,14 @@ def read_profile(reading: Reading, section: str, prescribed: Quantity) -> Profil
 
 
 def profile_problem(
-    device: str, stops: tuple[float, float], profile: ProfileChoice, duration: float, step: float
+    device: str,
+    stops: tuple[float, float],
+    profile: ProfileChoice,
+    duration: float,
+    step: float,
+    section: str = "motion.profile",
 ) -> str:
-    """Return where a profile leaves the stops [rad] of a device, named by ``device``; an empty text if nowhere."""
+    """Return where the profile of a section leaves the stops [rad] of a device, named by ``device``; "" if nowhere."""
     kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
     # The times that the engine asks for, as far as they can be gone through one by one.
     count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
@@ -63,7 +70,7 @@ def profile_problem(
         for moment, reached in places:
             if not stops[0] - TOLERANCE <= reached <= stops[1] + TOLERANCE:
                 return (
-                    f"[motion.profile] leaves the stops of {device}, {range_text(stops)}: it is at "
+                    f"[{section}] leaves the stops of {device}, {range_text(stops)}: it is at "
                     f"{quantity_text(reached, 'rad')} at {moment:.6g} s"
                 )
     return ""
@@ -72,3 +79,23 @@ def profile_problem(
 def range_text(stops: tuple[float, float]) -> str:
     """Return the range between two stops [rad] for a message."""
     return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"
+
+
+def reference_problem(scenario: Scenario) -> str:
+    """Return why no controller could follow the reference of a scenario of a vane; an empty text where one might."""
+    if scenario.controlled != ANGLE:
+        return ""
+    if vane_motion(scenario).profile is not None:
+        return (
+            f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' moves the angle by itself; "
+            "take motion.kind = 'free' or 'leg'"
+        )
+    valve = scenario.device.valve.kind
+    if VALVES[valve].vents_at_rest:
+        return (
+            f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at a command of 0 and holds no "
+            "angle; take one that is closed there, such as device.valve = 'proportional'"
+        )
+    actuator, run = scenario.device.actuator, scenario.run
+    stops = actuator.angle_min, actuator.angle_max
+    return profile_problem(scenario.device.name, stops, scenario.reference, run.duration, run.step, "reference")

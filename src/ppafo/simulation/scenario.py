@@ -13,6 +13,7 @@ from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
+from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Number, attribute_among
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
@@ -301,7 +302,8 @@ class Origin:
 class Scenario:
     """A device in one experiment.
 
-    The reference is a torque [N m]. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
+    The reference is a torque [N m], or of what else is ``controlled``: an angle [rad], or pressures [Pa] (
+    ``model.controlled``). Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
     supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
     beside the device's.
     """
@@ -320,6 +322,7 @@ class Scenario:
     gas_model: GasModel | None = None
     supply_line: SupplyLine | None = None
     links: Graph = field(default_factory=dict, compare=False)
+    controlled: str = TORQUE
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""

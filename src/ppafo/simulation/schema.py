@@ -14,6 +14,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import NAME, make_schema, one_of, optional, table
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, MotionKind
@@ -64,13 +65,18 @@ def named_or_all(name: str, kinds: Mapping[str, Any]) -> Mapping[str, Any]:
     return {name: kinds[name]} if name in kinds else kinds
 
 
-def profile_table(prescribed: Quantity, purpose: str, kind: str = "") -> Any:
-    """Return the section of a profile, one kind or all that are loaded; ``purpose`` ends the names of its models."""
+def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: dict[str, Any] | None = None) -> Any:
+    """Return the section of a profile, one kind or all that are loaded, with ``further`` fields.
+
+    ``purpose`` ends the names of its models.
+    """
     return one_of(
         [
             table(
                 f"{model_name(name)}{purpose}",
-                kind_field(name, profile.summary) | quantity_fields(declaration.profile_settings(name, prescribed)),
+                kind_field(name, profile.summary)
+                | (further or {})
+                | quantity_fields(declaration.profile_settings(name, prescribed)),
             )
             for name, profile in named_or_all(kind, PROFILES.loaded()).items()
         ]
@@ -213,8 +219,10 @@ def _scenario_file(sections: tuple[str, ...], kinds: tuple[tuple[str, str], ...]
         own["initial"] = optional(initial, "state of the gas at the start; atmosphere unless given")
     own["controller"] = (controller_table(controllers, "Controller"), Field(description="what commands the valve"))
     if "reference" in sections:
-        reference = profile_table(declaration.TORQUE_LEVEL, "Reference", named.get("reference", ""))
-        what = "torque that the controller follows; only one that follows none, as constant, may leave it out"
+        controlled = optional(Literal[tuple(CONTROLLED)], "what it is a value of; torque unless given")
+        named_kind = named.get("reference", "")
+        reference = profile_table(CONTROLLED[TORQUE].level, "Reference", named_kind, {"of": controlled})
+        what = "what the controller follows, a torque unless it says of what; one that follows none may leave it out"
         own["reference"] = optional(reference, what)
     if "sensors" in sections:
         # The one whole number of the file: half a seed means nothing.

@@ -125,7 +125,8 @@ class Result:
         remark = "" if self.status.is_completed else self.status.message
         atmosphere = self.scenario.device.supply.atmospheric_pressure
         valve = self.scenario.device.valve.kind
-        return shown(recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve))
+        joint = self.scenario.device.joint
+        return shown(recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve, joint))
 
     def error(self) -> "ErrorEstimate":
         """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.

@@ -8,12 +8,15 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ppafo.control import torque_loop
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.control import angle_loop, torque_loop
+from ppafo.control.angle_loop import Joint
 from ppafo.control.binding import bind
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
+from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Number
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Term
@@ -24,6 +27,14 @@ from ppafo.simulation.nominal import flow_of_area, flow_of_sonic
 PERIOD_PATH = "controller.period"
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
 """Names of what the gains are made of, among the terms."""
+_OF_DEVICE = (
+    "foot_plate.inertia",
+    "foot_plate.gravity_torque",
+    "friction.viscous_damping",
+    "friction.dynamic_torque",
+)
+LEG_PATHS = ("motion.foot_mass", "motion.foot_mass_centre", "motion.foot_inertia")
+"""What the foot of a leg adds."""
 
 
 class FlowNumbers(NamedTuple):
@@ -49,6 +60,35 @@ class SignalsOfWalk(NamedTuple):
 
     period: Annotated[float, Number("s", "")]
     bandwidth: Annotated[float, Number("Hz", "")]
+
+
+class OfJoint(NamedTuple):
+    """Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
+
+    period: Annotated[float, Number("s", "")]
+    bandwidth: Annotated[float, Number("Hz", "")]
+    delay: Annotated[float, Number("s", "")]
+    angle_bandwidth: Annotated[float, Number("Hz", "")]
+    inertia: Annotated[float, Number("kg m^2", "")]
+    gravity_torque: Annotated[float, Number("N m", "")]
+    viscous_damping: Annotated[float, Number("N m s/rad", "")]
+    dynamic_torque: Annotated[float, Number("N m", "")]
+
+
+class OfLeg(NamedTuple):
+    """The same with the foot of a leg: mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
+
+    period: Annotated[float, Number("s", "")]
+    bandwidth: Annotated[float, Number("Hz", "")]
+    delay: Annotated[float, Number("s", "")]
+    angle_bandwidth: Annotated[float, Number("Hz", "")]
+    inertia: Annotated[float, Number("kg m^2", "")]
+    gravity_torque: Annotated[float, Number("N m", "")]
+    viscous_damping: Annotated[float, Number("N m s/rad", "")]
+    dynamic_torque: Annotated[float, Number("N m", "")]
+    foot_mass: Annotated[float, Number("kg", "")]
+    foot_mass_centre: Annotated[float, Number("m", "")]
+    foot_inertia: Annotated[float, Number("kg m^2", "")]
 
 
 def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
@@ -115,19 +155,107 @@ def time_in_walk(signals: SignalsOfWalk) -> float:
     return lag_of_sensor(signals.bandwidth)
 
 
+def per_pressure_1(mean: MeanChambers) -> float:
+    """How what is controlled goes with the pressure in chamber 1: of a torque [m^3], which grows with it."""
+    return mean.torque_per_pressure_1
+
+
+def per_pressure_2(mean: MeanChambers) -> float:
+    """How what is controlled falls with the pressure in chamber 2: of a torque [m^3]."""
+    return mean.torque_per_pressure_2
+
+
+def whole_pressure(_mean: MeanChambers) -> float:
+    """1 [-], of a pressure that is controlled itself."""
+    return 1.0
+
+
+def no_pressure(_mean: MeanChambers) -> float:
+    """0 [-], of a pressure that is not."""
+    return 0.0
+
+
 def loop_of(
     settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
 ) -> TorqueLoop:
-    """The torque loop of a device: R = K q max(P_1 / V_1, P_2 / V_2), theta."""
+    """The loop of a device at a constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure."""
     mean = mean_chambers(settings, stops, around)
     per_flow = max(
-        mean.torque_per_pressure_1 * around.supply_pressure / mean.volume_1,
-        mean.torque_per_pressure_2 * around.dorsiflexion_pressure / mean.volume_2,
+        per_pressure_1(mean) * around.supply_pressure / mean.volume_1,
+        per_pressure_2(mean) * around.dorsiflexion_pressure / mean.volume_2,
     )
     return TorqueLoop(
         rate=valve_flow(numbers) * per_flow,
         dead_time=time_of_valve(valve, signals.period) + time_of_signals(signals),
     )
+
+
+def time_with_angle(signals: Any) -> float:
+    """How old a measurement is [s], and how late the slower of the sensors follow."""
+    late: float = max(lag_of_sensor(signals.bandwidth), lag_of_sensor(signals.angle_bandwidth))
+    age: float = signals.delay
+    return age + late
+
+
+def turning_alone(signals: OfJoint) -> tuple[float, float]:
+    """Inertia [kg m^2] and largest gravity torque [N m] of what the actuator moves."""
+    return signals.inertia, signals.gravity_torque
+
+
+def turning_with_foot(signals: OfLeg) -> tuple[float, float]:
+    """The same with a foot on it, about the ankle."""
+    moment = signals.foot_mass * signals.foot_mass_centre
+    inertia = signals.inertia + signals.foot_inertia + moment * signals.foot_mass_centre
+    return inertia, signals.gravity_torque + moment * STANDARD_GRAVITY
+
+
+def turning(signals: Any) -> tuple[float, float]:
+    """Stand for what turns."""
+    raise NotImplementedError
+
+
+def joint_of(settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float) -> Joint:
+    """The joint of a device, with its gas at the atmosphere's pressure, which is the softest spring of it."""
+    mean = mean_chambers(settings, stops, around)
+    inertia, weight = turning(signals)
+    spring_1 = mean.torque_per_pressure_1 * mean.growth_1 * around.atmospheric_pressure / mean.volume_1
+    spring_2 = mean.torque_per_pressure_2 * mean.growth_2 * around.atmospheric_pressure / mean.volume_2
+    return Joint(
+        inertia=inertia,
+        stiffness=spring_1 + spring_2,
+        damping=signals.viscous_damping,
+        friction=signals.dynamic_torque,
+        travel=travel,
+        gravity=weight,
+    )
+
+
+def slow_loop_of(
+    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
+) -> TorqueLoop:
+    """The loop of the angle that a law sees which opens the valve by its error."""
+    loop = torque_loop_of(settings, stops, around, numbers, valve, signals)
+    return angle_loop.slow_loop(loop, joint_of(settings, stops, around, signals, 0.0))
+
+
+def torque_loop_of(
+    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
+) -> TorqueLoop:
+    """Stand for the torque loop of a device."""
+    raise NotImplementedError
+
+
+def rule_of_joint(loop: TorqueLoop, joint: Joint) -> float:
+    """Stand for a rule of ``control.angle_loop``."""
+    raise NotImplementedError
+
+
+def gain_of_joint(
+    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any, travel: float
+) -> float:
+    """What a rule makes of the torque loop of a device and of its joint, which is to go so far at a time [rad]."""
+    loop = torque_loop_of(settings, stops, around, numbers, valve, signals)
+    return rule_of_joint(loop, joint_of(settings, stops, around, signals, travel))
 
 
 def rule(loop: TorqueLoop, *_number: float) -> float:
@@ -169,39 +297,95 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
 """What follows the torque loop alone, and by which rule."""
 
 
-def loop_terms(device: Device, law: ControllerKind, walks: bool) -> dict[str, Term]:
-    """Return what the gains of a law follow on a device, by the names of ``control.torque_loop``."""
+_OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
+    angle_loop.ANGLE_STIFFNESS: angle_loop.angle_stiffness,
+    angle_loop.ANGLE_DAMPING: angle_loop.angle_damping,
+    angle_loop.RATE_FILTER: angle_loop.rate_filter,
+    angle_loop.INNER_GAIN: angle_loop.inner_gain,
+    angle_loop.GRAVITY: angle_loop.gravity,
+    angle_loop.INERTIA: angle_loop.inertia,
+    angle_loop.FRICTION: angle_loop.friction,
+}
+"""What follows the torque loop and the joint, and by which rule."""
+
+_PER_PRESSURE: dict[str, dict[str, Callable[[MeanChambers], float]]] = {
+    "pressure_1": {"per_pressure_1": whole_pressure, "per_pressure_2": no_pressure},
+    "pressure_2": {"per_pressure_1": no_pressure, "per_pressure_2": whole_pressure},
+    "pressure_difference": {"per_pressure_1": whole_pressure, "per_pressure_2": whole_pressure},
+}
+"""How a pressure that is controlled goes with both."""
+
+
+class LoopFrames(NamedTuple):
+    """The loop of what is controlled and the torque loop, as functions of rows; the rows, what fills them, components.
+
+    ``joint`` is what ``joint_of`` needs, {} where it is not known.
+    """
+
+    loop: Callable[..., TorqueLoop]
+    torque_loop: Callable[..., TorqueLoop]
+    rows: tuple[type, ...]
+    sources: tuple[str, ...]
+    joint: dict[str, Callable[..., Any]]
+
+
+def _frames(device: Device, walks: bool, controlled: str, has_leg: bool) -> LoopFrames:
+    """Return the loops of a device, in a walk or with what is controlled, on a joint with a leg's foot or without."""
     valve = VALVES[device.valve.kind]
     chambers, sonic = chambers_of(device), isinstance(device.valve.orifice, SonicOrifice)
-    signals = SignalsOfWalk if walks else Signals
     names = {item.name for item in valve.quantities}
     timed = {"follow_time": valve.lag or valve.choose(valve_settings(device.valve)).command_delay}
-    loop = bind(
-        loop_of,
-        "loop_of_device",
-        {
-            "mean_chambers": chambers.function,
-            "valve_flow": sonic_flow if sonic else area_flow,
-            "time_of_valve": time_of_pair
-            if {"opening_delay", "closing_delay", "switching_interval"} <= names
-            else bind(time_of_spool, "time_of_spool_valve", timed),
-            "time_of_signals": time_in_walk if walks else time_in_scenario,
-        },
-    )
+    is_joint = controlled == ANGLE
+    signals = (OfLeg if has_leg else OfJoint) if is_joint else (SignalsOfWalk if walks else Signals)
+    components = {
+        "mean_chambers": chambers.function,
+        "valve_flow": sonic_flow if sonic else area_flow,
+        "time_of_valve": time_of_pair
+        if {"opening_delay", "closing_delay", "switching_interval"} <= names
+        else bind(time_of_spool, "time_of_spool_valve", timed),
+        "time_of_signals": time_with_angle if is_joint else (time_in_walk if walks else time_in_scenario),
+        **_PER_PRESSURE.get(controlled, {}),
+    }
+    loop = inner = bind(loop_of, "loop_of_device", components)
+    joint: dict[str, Callable[..., Any]] = {}
+    if is_joint:
+        parts = {"mean_chambers": chambers.function, "turning": turning_with_foot if has_leg else turning_alone}
+        joint = {"joint_of": bind(joint_of, "joint_of_device", parts), "torque_loop_of": inner}
+        loop = bind(slow_loop_of, "slow_loop_of_device", joint)
     orifice = ("sonic_conductance", "critical_ratio") if sonic else ("area", "discharge_coefficient")
     late = (PERIOD_PATH, "sensors.pressure_bandwidth", *(() if walks else ("sensors.delay",)))
+    of_joint = ("sensors.angle_bandwidth", *_OF_DEVICE) if is_joint else ()
     sources = (
         *chambers.sources,
         *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
         *(f"valve.{name}" for name in (*orifice, *(item.name for item in valve.quantities))),
         *late,
+        *of_joint,
+        *(LEG_PATHS if is_joint and has_leg else ()),
     )
-    rows = (*chambers.rows, FlowNumbers, valve.settings, signals)
+    return LoopFrames(loop, inner, (*chambers.rows, FlowNumbers, valve.settings, signals), sources, joint)
+
+
+def loop_terms(
+    device: Device, law: ControllerKind, walks: bool, controlled: str = TORQUE, has_leg: bool = False
+) -> dict[str, Term]:
+    """Return what the gains of a law follow on a device, by the names of ``control.torque_loop`` and ``angle_loop``.
+
+    ``controlled`` says what the law controls; with a leg the foot of it turns about the joint, too.
+    """
+    frames = _frames(device, walks, controlled, has_leg)
+    # A law of the angle alone has the torque loop inside it.
+    own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
+    names = {item.name for item in VALVES[device.valve.kind].quantities}
 
     def term(frame: Callable[..., float], by: Callable[..., float], *settings: str) -> Term:
-        return Term((*sources, *settings), bind(frame, f"{by.__name__}_of_device", {"loop_of": loop, "rule": by}), rows)
+        inner = {"loop_of": own_loop, "rule": by}
+        return Term((*frames.sources, *settings), bind(frame, f"{by.__name__}_of_device", inner), frames.rows)
 
     found = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
+    for name, of_joint in _OF_JOINT.items() if TORQUE not in law.controls else ():
+        bound = bind(gain_of_joint, f"{of_joint.__name__}_of_device", {**frames.joint, "rule_of_joint": of_joint})
+        found[name] = Term((*frames.sources, "controller.error_limit"), bound, frames.rows)
     opening = opening_beyond_band if "dead_band" in names else gain_of_loop_and_setting
     found[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
     # An integral, and what is learnt, go with the proportional gain, also where that one is given.

@@ -14,6 +14,7 @@ from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.metrics import evaluate
 from ppafo.metrics.metric import Metric
+from ppafo.model.controlled import CONTROLLED
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import gravity_torque, sliding_friction
 from ppafo.model.ports import friction_in_motion
@@ -84,7 +85,11 @@ def measured(
         steps = np.arange(times.size, dtype=np.float64) * run.record_every
         whole = np.round(steps)
         moments: Floats = np.where(np.abs(steps - whole) <= SAME_MOMENT, whole, steps) * run.step
-        channels["reference"] = (profile_values(scenario.reference, moments)[0], "N m")
+        followed = CONTROLLED[scenario.controlled]
+        channels[followed.reference] = (profile_values(scenario.reference, moments)[0], followed.unit)
+        if followed.channel not in channels:
+            value = followed.value(angle, pressure_1, pressure_2, torque)  # type: ignore[arg-type]
+            channels[followed.channel] = (np.asarray(value), followed.unit)
     channels |= gas_channels(scenario.device.gas, run, rows)
     channels |= of_leg or {}
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}

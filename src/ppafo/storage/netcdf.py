@@ -15,6 +15,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, one_line
+from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.signals import CHANNELS, Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes, write_file
@@ -39,10 +40,11 @@ def dataset_of(
     """
     import xarray
 
-    variables = {name: (TIME, recording[name], channel_attributes(recording, name)) for name in recording.names}
+    joint = joint_of(scenario)
+    variables = {name: (TIME, recording[name], channel_attributes(recording, name, joint)) for name in recording.names}
     for name, unit in (units or {}).items():
         values = recording.in_unit(name, unit, atmosphere)
-        variables[name] = (TIME, values, channel_attributes(recording, name) | {"units": unit})
+        variables[name] = (TIME, values, channel_attributes(recording, name, joint) | {"units": unit})
     coordinates = {TIME: (TIME, recording.time, _TIME_ATTRIBUTES)}
     return xarray.Dataset(variables, coordinates, global_attributes(recording, scenario))
 
@@ -58,10 +60,17 @@ def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) 
 _TIME_ATTRIBUTES = {"units": TIME_UNIT, "long_name": "time"}
 
 
-def channel_attributes(recording: Recording, name: str) -> dict[str, str]:
-    """Return unit and long name of a channel; a plain number has the unit 1, as the NetCDF conventions ask."""
+def joint_of(scenario: Mapping[str, Any] | None) -> Joint:
+    """Return what the device of a scenario's document turns; the ankle where it does not say."""
+    device = (scenario or {}).get("device")
+    words = device.get("joint") if isinstance(device, Mapping) else None
+    return Joint(**words) if isinstance(words, Mapping) else ANKLE
+
+
+def channel_attributes(recording: Recording, name: str, joint: Joint = ANKLE) -> dict[str, str]:
+    """Return unit and long name of a channel, about a joint; a plain number has the unit 1, as NetCDF asks."""
     unit = recording.unit(name)
-    summary = CHANNELS[name].summary if name in CHANNELS else name.replace("_", " ")
+    summary = joint.said(CHANNELS[name].summary) if name in CHANNELS else name.replace("_", " ")
     between = recording.channels[name].between
     declared = {} if between is None else {_BETWEEN: between}
     return {"units": _PLAIN_NUMBER_IN_NETCDF if unit == PLAIN_NUMBER else unit, "long_name": summary, **declared}
@@ -106,7 +115,7 @@ def netcdf_bytes(recording: Recording, scenario: Mapping[str, Any] | None = None
         time.attrs.update(_TIME_ATTRIBUTES)
         for name in recording.names:
             variable = file.create_variable(name, (TIME,), data=recording[name])
-            variable.attrs.update(channel_attributes(recording, name))
+            variable.attrs.update(channel_attributes(recording, name, joint_of(scenario)))
     return buffer.getvalue()
 
 

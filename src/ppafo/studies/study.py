@@ -12,6 +12,7 @@ from ppafo.engine.channels import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
+from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
@@ -46,8 +47,14 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> O
     _check_names("trajectories", outputs.trajectories, tuple(TRACED))
     _check_names("bands", outputs.bands, tuple(TRACED))
     channels = (*outputs.trajectories, *outputs.bands)
-    if "reference" in channels and all(scenario.controller.kind == OPEN_LOOP for scenario in scenarios):
-        raise StudyError("outputs: 'reference' needs a reference, and the controllers here follow none")
+    references = {kind.reference: name for name, kind in CONTROLLED.items()}
+    for channel in channels:
+        if channel in references and all(scenario.controller.kind == OPEN_LOOP for scenario in scenarios):
+            raise StudyError(f"outputs: '{channel}' needs a reference, and the controllers here follow none")
+        if channel in references and all(scenario.controlled != references[channel] for scenario in scenarios):
+            raise StudyError(
+                f"outputs: '{channel}' needs reference.of = '{references[channel]}', which no scenario has"
+            )
     # A metric that one configuration has is kept, empty for the others; 'all' takes those that any has.
     has = {name: [lacking(scenario, METRICS[name]) for scenario in scenarios] for name in metrics}
     missing = {name: reasons[0] for name, reasons in has.items() if all(reasons)}

@@ -25,8 +25,6 @@ Rows = dict[str, NDArray[Any]]
 _Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 """Columns in; rows out, and why the first of them failed."""
 FAILED = "failed"
-OSCILLATES = ("rms_error_hold", "oscillations_hold")
-"""What says whether a metric at one instant can be believed."""
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 """Runs between two reports: as a rule, and where a Python object controls."""
 
@@ -157,12 +155,11 @@ def failures_of(rows: Rows) -> int:
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
     """Return metrics with those that a judgement needs beside them, where the scenario offers them.
 
-    A metric at one instant needs oscillations of the torque, and each of them how often the command turns.
+    A metric at one instant needs oscillations of what is controlled, and each of them how often the command turns.
     """
     found = (*metrics, REVERSALS) if judges_loop(scenario) else tuple(metrics)
-    if ONE_INSTANT not in metrics or any(lacking(scenario, METRICS[name]) for name in OSCILLATES):
-        return tuple(dict.fromkeys(found))
-    return tuple(dict.fromkeys((*found, *OSCILLATES)))
+    companions = [name for metric in metrics for name in ONE_INSTANT.get(metric, ())]
+    return tuple(dict.fromkeys((*found, *(name for name in companions if not lacking(scenario, METRICS[name])))))
 
 
 def judges_loop(scenario: Scenario) -> bool:
@@ -179,6 +176,7 @@ def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bo
 
 def settled(rows: Rows, metric: str) -> Floats:
     """Return a metric for a judgement: no instant of a loop that oscillates counts as its error."""
-    if metric != ONE_INSTANT or not set(OSCILLATES) <= set(rows):
+    companions = ONE_INSTANT.get(metric, ())
+    if not companions or not set(companions) <= set(rows):
         return rows[metric]
-    return settled_error(rows[metric], *(rows[name] for name in OSCILLATES))
+    return settled_error(rows[metric], *(rows[name] for name in companions))

@@ -328,7 +328,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
     needs = kind.needs
     reasons = (
         (
-            "reference" in kind.channels,
+            bool(kind.of_reference),
             "a walk has no one reference that its torque follows: push_off_error is the error in push-off",
         ),
         (bool(kind.traced), "it needs the whole run over time, which is not kept of a walk"),

@@ -273,6 +273,24 @@ def test_the_reference_has_its_bits_at_samples_between_the_steps(tmp_path: Path)
     assert found == simulate("torque-task-proportional", overrides).recording["reference"].tolist()
 
 
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [("cylinder-servo", ("foot_plate.inertia", 12.0e-3)), ("pressure-loop", ("supply.pressure", 5.0e5))],
+    ids=["cylinder-servo", "pressure-loop"],
+)
+def test_what_is_no_torque_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
+    name: str, change: tuple[str, float], tmp_path: Path
+) -> None:
+    path, number = change
+    unit = {"foot_plate.inertia": "kg m^2", "supply.pressure": "Pa_a"}[path]
+    overrides = ("run.duration=0.2 s", f"{path}={number!r} {unit}")
+    library = Loaded(name, tmp_path)
+    recording = simulate(name, overrides).recording
+    columns = [recording.time, *(recording[channel] for channel in library.exported.program.outputs)]
+    found = Run(library, run_duration=0.2, **{path.replace(".", "_"): number}).course()
+    assert found == [np.array(row).tobytes() for row in zip(*columns, strict=True)]
+
+
 @pytest.mark.parametrize("taken", ["main", "unit", "fmi2", "check", "string", "board", "install"])
 def test_a_scenario_with_the_name_of_another_file_or_target_is_called_otherwise(taken: str) -> None:
     contents = c_library(replace(load_scenario("step-response"), name=taken))

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo.cli
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import fmu
 from ppafo.exports.c_library import c_library
@@ -94,9 +95,34 @@ def test_a_parameter_of_a_unit_moves_what_follows_it_as_set_does(unit: str, text
     assert {item: float(np.abs(found[item] - recording[item]).max()) for item in names} == dict.fromkeys(names, 0.0)
 
 
+def test_gains_that_nobody_gives_follow_the_parameters_of_a_unit(tmp_path: Path) -> None:
+    plain = tmp_path / "plain.toml"
+    plain.write_text((Path(ppafo.cli.__file__).parent / "templates" / "scenario.toml").read_text(encoding="utf-8"))
+    own = {"actuator.torque_constant": 2.5e-5, "valve.area": 1.2e-5, "actuator.dead_volume_1": 2.0e-5}
+    texts = [f"{path}={value!r} {unit}" for (path, value), unit in zip(own.items(), ("m^3", "m^2", "m^3"), strict=True)]
+    scenario = load_scenario(str(plain), [*SHORT, *texts])
+    shipped = load_scenario(str(plain), SHORT)
+    assert scenario.controller.proportional_gain != pytest.approx(shipped.controller.proportional_gain, rel=0.1)
+    unit = written(tmp_path, str(plain))
+    names = outputs_of(unit)
+    found = fmpy.simulate_fmu(
+        unit, output=names, output_interval=0.001, stop_time=0.3, step_size=0.001, start_values=own
+    )
+    recording = simulate(scenario).recording
+    assert {item: float(np.abs(found[item] - recording[item]).max()) for item in names} == dict.fromkeys(names, 0.0)
+
+
 def test_a_free_vane_with_an_open_loop_has_the_bits_of_the_lanes_too(tmp_path: Path) -> None:
     unit = written(tmp_path, "step-response", ())
     assert set(largest_difference(unit, "step-response", ()).values()) == {0.0}
+
+
+def test_a_position_servo_has_the_bits_of_the_lanes_too(tmp_path: Path) -> None:
+    quick = ("run.duration=0.3 s", "reference.frequency=3 Hz", "reference.amplitude=15 deg")
+    unit = written(tmp_path, "cylinder-servo", quick)
+    found = largest_difference(unit, "cylinder-servo", quick)
+    assert "reference_angle" in found
+    assert set(found.values()) == {0.0}
 
 
 def test_the_toolbox_for_units_finds_nothing(unit: str) -> None:

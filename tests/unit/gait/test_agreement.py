@@ -91,6 +91,16 @@ def test_a_curve_of_another_size_than_the_others_let_expect_is_said(
     assert any(words in line for line in remarks_of(columns | {name: scaled}))
 
 
+@pytest.mark.parametrize(("follows", "is_said"), [(0.6, False), (0.4, False), (0.32, True)])
+def test_an_ankle_that_turns_less_than_the_shank_while_the_foot_stands_is_usual_down_to_a_third(
+    columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]], follows: float, is_said: bool
+) -> None:
+    # It turned 0.96 times as far; the factors leave what the whole stride covers above 18 deg for the first two alone.
+    middle = float(np.mean(columns[ANKLE]))
+    scaled = columns | {ANKLE: middle + follows / 0.96 * (columns[ANKLE] - middle)}
+    assert any("times as far as shank_angle" in line for line in remarks_of(scaled)) is is_said
+
+
 def test_a_moment_without_a_force_is_judged_by_its_peak(
     columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
 ) -> None:

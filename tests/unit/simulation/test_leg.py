@@ -241,8 +241,9 @@ def test_either_valve_lifts_the_foot_in_swing_and_the_proportional_one_lifts_the
     found = [simulate(load_scenario(SWING, law)).metrics for law in laws]
     errors = [metrics["foot_angle_error"].value for metrics in found]
     toes = [metrics["toe_clearance_error"].value for metrics in found]
-    # With dead volumes of 36 cm^3: RMS errors of 0.16 rad (proportional), 0.10 rad (solenoid) and 0.58 rad (nothing).
-    assert max(errors[:2]) < 0.3 * errors[2]
+    # Of the error without help 0.28 (proportional) and 0.17 (solenoid) are left, with dead volumes of 36 cm^3.
+    assert errors[0] < 0.3 * errors[2]
+    assert errors[1] < 0.18 * errors[2]
     assert toes == sorted(toes, reverse=True)
     assert found[0]["gas_supplied"].value < 0.5 * found[1]["gas_supplied"].value
 

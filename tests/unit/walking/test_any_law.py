@@ -13,7 +13,9 @@ from ppafo.model.valves.kind import VENT
 from ppafo.walking import load_walk, walk
 from ppafo.walking.planning import law_of
 
-LAWS = sorted(name for name, law in CONTROLLERS.items() if name != "constant" and law.plan is None)
+LAWS = sorted(
+    name for name, law in CONTROLLERS.items() if name != "constant" and law.plan is None and "torque" in law.controls
+)
 NEW = sorted(name for name in LAWS if walking_controllers()[name] not in WALKING_CONTROLLERS.values())
 
 

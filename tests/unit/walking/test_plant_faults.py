@@ -64,7 +64,8 @@ def test_a_valve_stuck_open_is_found_and_only_a_shut_off_takes_its_torque_away(p
     assert np.abs(safe.recording["torque"][safe.recording.time > safe.events[0].time + 0.5]).max() < 2.0
 
 
-def test_the_sign_names_the_cause() -> None:
+@pytest.mark.parametrize("name", ["solenoid", "proportional"])
+def test_the_sign_names_the_cause(name: str) -> None:
     for part, kind, names in (
         ("regulator_1", "high", ("supply_high",)),
         ("regulator_2", "creeping", ("supply_high",)),
@@ -73,8 +74,11 @@ def test_the_sign_names_the_cause() -> None:
         ("hose_1", "off", ("supply_lost",)),
         # It fills too little and vents too slowly: both flags name a kinked hose.
         ("hose_2", "kinked", ("supply_low", "valve_shut")),
+        ("vane", "leaking", ("leak",)),
+        # What one chamber gains the other one loses here too, but none of it came there.
+        ("valve", "swapped", ("valve_open", "supply_lost")),
     ):
-        (event, *_) = broken("solenoid", part, kind).events
+        (event, *_) = broken(name, part, kind).events
         assert event.fault_flag is not None
         assert event.fault_flag.name in names, (part, kind)
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.metrics import METRICS
+from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
 from ppafo.report.kind import Interval
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
@@ -23,10 +24,7 @@ Masks = NDArray[np.bool_]
 OUTER_QUANTILES = (0.05, 0.95)
 """The quantiles over the draws that tables show beside a median."""
 COMPARED: dict[str, int] = {
-    "rms_error": -1,
-    "rms_error_ramp": -1,
-    "rms_error_hold": -1,
-    "peak_error": -1,
+    **{name: -1 for name in TRACKING if name not in ONE_INSTANT},
     "gas_supplied": -1,
     "mechanical_work": 0,
     "gas_per_work": -1,

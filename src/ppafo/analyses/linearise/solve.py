@@ -30,6 +30,7 @@ from ppafo.model.plant import (
 )
 from ppafo.model.ports import at_valve, friction_at_rest
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
+from ppafo.parameters.joint import Joint
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
@@ -423,7 +424,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         )
         edges += [] if is_same else [edge]
     a, b, c, d, found, shown = matrices
-    sides = sides_of(run, point)
+    sides = sides_of(run, point, scenario.device.joint)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
     return LinearModel(
@@ -456,8 +457,8 @@ def _matrices(plant: Plant, values: Mapping[str, float]) -> list[Floats]:
     return [np.array(item) for item in plant.function([*wanted, rates, outputs])(values)]
 
 
-def sides_of(run: Run, point: Point) -> dict[str, str]:
-    """Which side of each limit the point lies on, in words by place."""
+def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
+    """Which side of each limit the point lies on, in words by place; ``joint`` names what moves."""
     # Openings of the valve [-] at a point.
     found: Openings = run.program.valve.instant(run.valve, _settled(run, point.values), point.values["command"])
     at, plant, openings = point.values, run.plant, found
@@ -470,13 +471,18 @@ def sides_of(run: Run, point: Point) -> dict[str, str]:
     }
     said = {name: _regime(plant.valve_curve, *values) for name, values in paths.items()}
     said["leak over the vane"] = _regime(plant.leak_curve, first, second, 1.0)
-    motion = {None: "prescribed", 0.0: "at rest", 1.0: "slides in plantarflexion", -1.0: "slides in dorsiflexion"}
+    motion = {
+        None: "prescribed",
+        0.0: "at rest",
+        1.0: f"slides in {joint.positive}",
+        -1.0: f"slides in {joint.negative}",
+    }
     vane = motion[point.way]
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "against a stop" if is_at_stop else "sticks: friction holds it"
     valve = f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {max(openings):.4g}" if any(openings) else ""
-    return {"valve": valve or "closed", "ankle": vane, **said}
+    return {"valve": valve or "closed", joint.name: vane, **said}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:

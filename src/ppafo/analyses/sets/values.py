@@ -1,6 +1,7 @@
 """What is in a parameter set, value by value."""
 
 import textwrap
+from dataclasses import asdict
 from typing import Any
 
 from ppafo.parameters import ParameterSet
@@ -27,6 +28,7 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
         "default_valve": parameter_set.default_valve,
         "valves": dict(parameter_set.valve_kinds),
         "actuator": parameter_set.actuator_kind,
+        "joint": asdict(parameter_set.joint),
         "values": [{"path": path, **entry.model_dump(mode="json")} for path, entry in entries],
         "accepted": dict(parameter_set.accepted),
     }
@@ -51,6 +53,7 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         if value.get("uncertainty") is not None:
             written += f" +- {value['uncertainty']:.3g}"
         rows.append((value["path"], written, value.get("unit", ""), value["origin"], value["source"]))
+    joint = document["joint"]
     valves = ", ".join(f"{name} ({kind})" for name, kind in document["valves"].items())
     return Finding(
         name=document["name"],
@@ -60,6 +63,9 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         parts=[
             Part(said=_wrapped(cited)),
             Part(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
+            Part(
+                said=[f"joint: {joint['name']}, whose angle grows in {joint['positive']}, falls in {joint['negative']}"]
+            ),
             Part(
                 columns=columns_of(_COLUMNS, rows),
                 remarks=[

@@ -10,7 +10,10 @@ import numpy as np
 
 from ppafo.analyses.tune.problem import Gains, Problem, Term
 from ppafo.metrics import Metric
+from ppafo.metrics.metric import controlled_in
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
+from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.kind import TIME, Interval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -326,25 +329,27 @@ def _number(name: str, value: float | None) -> str:
 
 
 _SHOWN = (
-    ("torque", Kind("Torque", "N m", "torque")),
     ("command", Kind("Valve command")),
     ("supplied_mass", Kind("Gas supplied", "kg", "gas mass")),
 )
 
 
 def _task(before: Setting, after: Setting) -> list[Panel]:
-    """Return torque, command and gas over time with the gains before and after, on the nominal device."""
+    """Return what is controlled, command and gas over time with the gains before and after, on the nominal device."""
     panels = []
-    for row, (channel, kind) in enumerate(_SHOWN):
+    controlled = controlled_in(after.result.recording) or CONTROLLED[TORQUE]
+    words, unit = controlled.words, controlled.level.unit
+    lead = (controlled.channel, Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit)))
+    for row, (channel, kind) in enumerate((lead, *_SHOWN)):
         marks = []
         for setting, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
             recording = setting.result.recording
             style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
             marks.append(Mark("line", recording.time, recording[channel], label=label, colour=colour, style=style))
         recording = after.result.recording
-        if not row and "reference" in recording:
+        if not row and controlled.reference in recording:
             dashed = {"linestyle": "--", "linewidth": 1.2}
-            reference = Mark("line", recording.time, recording["reference"], (), "reference", BLACK, dashed)
+            reference = Mark("line", recording.time, recording[controlled.reference], (), "reference", BLACK, dashed)
             marks.append(reference)
         panels.append(Panel(TIME, kind, marks, legend="" if row else "above"))
     return panels

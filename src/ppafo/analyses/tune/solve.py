@@ -23,6 +23,7 @@ from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
+from ppafo.model.controlled import TORQUE
 from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
 from ppafo.simulation.numbers import TIMES, absolute, with_numbers
@@ -74,7 +75,7 @@ def shortfall(scenario: Scenario) -> Floats:
     With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
     difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
     """
-    if scenario.device.actuator.kind != VANE:
+    if scenario.device.actuator.kind != VANE or scenario.controlled != TORQUE:
         return np.zeros(1)
     supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
     lowest, highest = profile_bounds(scenario.reference)
@@ -259,7 +260,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     spread, explained = problem.spread, []
     for item in problem.constraints:
         values, is_most = runs.metrics[item.metric], item.is_most
-        follows = "reference" in METRICS[item.metric].channels
+        follows = bool(METRICS[item.metric].of_reference)
         if not follows or item.is_kept(float(bad_ends(values, spread, is_most)[0])):
             continue
         # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.

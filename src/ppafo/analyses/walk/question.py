@@ -23,12 +23,14 @@ def walk_with_and_without(
     minutes: Minutes | None = None,
     wearers: Count | None = None,
     seed: Whole = 1,
+    check: bool = False,
     overrides: Overrides = (),
     progress: Report | None = None,
 ) -> Finding[Any]:
     """Simulate walking with the device, without it, and healthy.
 
-    ScenarioError for bad input; a walk that diverges is a finding that has not passed.
+    ScenarioError for bad input; a walk that diverges is a finding that has not passed, and with ``check`` one whose
+    torque loop oscillates.
 
     scenario: name of a walk configuration, or a .toml file; default solenoid
     gait: name of a gait, or a gait file; default: the gait of the configuration
@@ -37,15 +39,21 @@ def walk_with_and_without(
     minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
+    check: end with exit code 1 where the torque loop oscillates; for one wearer
 
     >>> print(walk_with_and_without("solenoid", minutes=0.1).said[0])
     solenoid: completed, 4 strides of falisse2019-subject1
     """
+    from dataclasses import replace
+
     from ppafo.analyses.walk.answer import LONG, finding_of, reporter, wearers_finding
+    from ppafo.errors import ArgumentError
     from ppafo.simulation.scenario import Scenario
     from ppafo.walking.loading import check_duration_once, load_walk
     from ppafo.walking.walk import compare_walks, walk_population
 
+    if check and wearers is not None:
+        raise ArgumentError("check: judges the walk of one wearer; leave out wearers, or check")
     chosen = scenario
     # The options of the command line belong to a file: a scenario that was built has all of it already.
     if not isinstance(chosen, Scenario):
@@ -56,4 +64,5 @@ def walk_with_and_without(
         advance = reporter(report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
     comparison = compare_walks(chosen, minutes=minutes, progress=reporter(report, "min", LONG))
-    return finding_of(comparison)
+    found = finding_of(comparison)
+    return replace(found, passed=found.passed and comparison.with_device.oscillation is None) if check else found

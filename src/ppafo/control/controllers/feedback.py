@@ -1,9 +1,13 @@
-"""Laws that act on the torque error alone: PID (equation (13)), sliding mode, and damped proportional control."""
+"""Laws that act on the error alone: PID (equation (13)), sliding mode, and damped proportional control.
+
+Units are those of a torque; of what else is controlled, its unit stands in the place of N m.
+"""
 
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import BOUNDARY, INTEGRAL_GAIN, INTEGRAL_RATE, PROPORTIONAL_GAIN
+from ppafo.model.controlled import ANYTHING, seen_error, seen_value, steered
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -66,7 +70,7 @@ def pid_update(
     parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidState]:
     """Command from -1 to 1 from the torque error [N m]; rectangular integral, backward difference. Equation (13)."""
-    return pid_command(parameters, state, reference - measurement.torque, 0.0, period)
+    return pid_command(parameters, state, seen_error(reference, measurement), 0.0, period)
 
 
 def pid_restart(state: PidState, requested: float, continues: float) -> PidState:
@@ -85,6 +89,7 @@ PID = ControllerKind(
     initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
     update=pid_update,
     restart=pid_restart,
+    controls=ANYTHING,
 )
 
 
@@ -120,7 +125,7 @@ def sliding_update(
 
     The integral stands still outside the layer, where a longer error could not open the valve further.
     """
-    error = reference - measurement.torque
+    error = seen_error(reference, measurement)
     integral = state.integral + period * error
     surface = error + parameters.surface_slope * integral
     is_inside = abs(surface) < parameters.boundary_layer
@@ -142,6 +147,7 @@ SLIDING_MODE = ControllerKind(
     initial=SlidingModeState(0.0),
     update=sliding_update,
     restart=sliding_restart,
+    controls=ANYTHING,
 )
 
 
@@ -220,7 +226,8 @@ def damped_update(
     """Command from -1 to 1 by ``damped_command``, on top of the learnt command of the table."""
     gains = DampedGains(parameters.proportional_gain, parameters.damping, parameters.damping_filter)
     ahead = learnt_command(parameters, state.elapsed)
-    command, course = damped_command(gains, state.course, reference, measurement.torque, ahead, period)
+    wanted, value = steered(reference), steered(seen_value(measurement))
+    command, course = damped_command(gains, state.course, wanted, value, ahead, period)
     return command, DampedProportionalState(state.elapsed + period, course)
 
 
@@ -242,4 +249,5 @@ DAMPED_PROPORTIONAL = ControllerKind(
     parameters=DampedProportionalParameters,
     initial=DampedProportionalState(0.0, TorqueSlope(0.0, 0.0, 0.0)),
     update=damped_update,
+    controls=ANYTHING,
 )

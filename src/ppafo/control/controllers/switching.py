@@ -4,6 +4,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import OPENING
+from ppafo.model.controlled import ANYTHING, seen_error
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -53,7 +54,7 @@ def on_off_update(
     parameters: OnOffParameters, state: OnOffState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, OnOffState]:
     """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
-    error = reference - measurement.torque
+    error = seen_error(reference, measurement)
     return (1.0 if error >= -ROUNDING else -1.0), state
 
 
@@ -65,6 +66,7 @@ ON_OFF = ControllerKind(
     parameters=OnOffParameters,
     initial=OnOffState(),
     update=on_off_update,
+    controls=ANYTHING,
     only_switches=True,
 )
 
@@ -95,7 +97,7 @@ def dead_zone_update(
     Once open, the valve stays so until the error is below ``release``. 0 closes a proportional valve and vents both
     chambers of a solenoid pair.
     """
-    error = reference - measurement.torque
+    error = seen_error(reference, measurement)
     # A release beyond the dead zone would open and close the valve in turn, sample by sample.
     release = min(parameters.release, parameters.dead_zone)
     limit_up = release if state.direction > 0.0 else parameters.dead_zone
@@ -118,5 +120,6 @@ ON_OFF_DEAD_ZONE = ControllerKind(
     initial=OnOffDeadZoneState(0.0),
     update=dead_zone_update,
     restart=dead_zone_restart,
+    controls=ANYTHING,
     only_switches=True,
 )

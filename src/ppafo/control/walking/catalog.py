@@ -26,6 +26,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, ThresholdClock, ThresholdRules, TimingKind
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
+from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import GaitMeasurement, Measurement
 
@@ -139,6 +140,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         ),
         update=bind(law_that_walks_update, f"update_{name}", components),
         restart=None,
+        controls=(TORQUE,),
     )
 
 
@@ -227,14 +229,18 @@ WALKING_CONTROLLERS: Kinds[ControllerKind] = Kinds(
 def walking_controllers() -> dict[str, ControllerKind]:
     """Return all controllers that a walk file can name: those of walking, and every torque law by its own name.
 
-    A law that is one of walking is so under its own name too: ``pid`` is ``event_pid``. A constant command
-    follows no torque and does not walk, nor does a fixed-point law or one whose settings have names that walking
-    has taken.
+    A law that is one of walking is so under its own name too: ``pid`` is ``event_pid``. A constant command follows no
+    torque and does not walk, nor does a law that holds an angle, a fixed-point law, or one whose settings have names
+    that walking has taken.
     """
     laws = {
         name: law
         for name, law in CONTROLLERS.items()
-        if law is not switching.CONSTANT and law.plan is None and not shared_settings(law) and not reads_gait(law)
+        if law is not switching.CONSTANT
+        and TORQUE in law.controls
+        and law.plan is None
+        and not shared_settings(law)
+        and not reads_gait(law)
     }
     return dict(WALKING_CONTROLLERS) | {name: law_that_walks(law) for name, law in laws.items()}
 

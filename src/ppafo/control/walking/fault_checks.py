@@ -207,11 +207,12 @@ COMPRESSES = 0.02
 THIN, THIN_TIME = 6.0e4, 0.12
 """Pressure [Pa] below which no chamber stays for longer than this time [s]: a moving foot may lower one so for less."""
 
-FALL_TIME = 0.03
+FALL_TIME = 0.1
 """Time constant [s] of the slow pressures, which tell whether a reading falls."""
 
 FALLS = 0.03
-"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.1."""
+"""A reading falls that is below the slow one by more than this fraction: a venting chamber at 140 kPa by 0.3, and one
+behind a hose with a tenth of its conductance by 0.04, which is no fault of its sensor."""
 
 DWELLS, TURNS_BACK = 0.235, 0.35
 """Fractions of the stride in which a force and an ankle angle may stay within a step of their converter: in a usual

@@ -88,7 +88,13 @@ FAULT_FLAGS = {
         PRESSURES,
         SEEN,
     ),
-    (LEAK := 11.0): FaultFlag("leak", STOPPED, "a chamber loses gas that its valve keeps in: a leak", PRESSURES, SEEN),
+    (LEAK := 11.0): FaultFlag(
+        "leak",
+        STOPPED,
+        "a chamber loses gas that its valve keeps in: a leak, also across the vane",
+        PRESSURES,
+        SEEN,
+    ),
     (PRESSURE_SENSOR := 12.0): FaultFlag(
         "pressure_sensor",
         STOPPED,

@@ -139,7 +139,8 @@ class OnTheWay(NamedTuple):
 class Chamber(NamedTuple):
     """Content p V [J], pressure expected of its sensor [Pa], gas that passed lately [J], time of an alarm [s].
 
-    ``least`` [J] is the lowest content measured since the chamber was connected otherwise.
+    ``least`` [J] is the content measured when the chamber was connected to its supply, or the lowest one since it is no
+    longer: the lowest of many noisy readings would show gas that never came.
     """
 
     content: float
@@ -181,11 +182,18 @@ FORGETS = 0.128
 WARM = 1.1
 """Flow over isothermal flow: between isothermal gas and gas without walls."""
 
-OF_PASSED = 0.375
-"""Part of the gas that has passed which errors of area, volume, supply and heat explain."""
+OF_PASSED, KEPT = 0.5, 0.375
+"""Parts of the gas that has passed lately which errors of area, dead volume, supply and heat explain, and of it what a
+chamber that is not fed may have kept.
 
-OFFSET, OF_PRESSURE = 1.2e4, 1.0 / 16.0
-"""Error of a pressure [Pa] that offset, step and noise explain; fraction of it that two degrees of angle explain."""
+A tenth of area, a twentieth of supply and heat are a quarter; a dead volume twice what is believed halves the pressure
+that gas gives, and one of half of it raises it by half, in vanes whose dead volume is three quarters of the mean one.
+A chamber that does not vent at all keeps 0.6 of what passed lately, for what is believed follows the sensor.
+"""
+
+OFFSET, OF_PRESSURE, OF_ANGLE = 1.2e4, 0.05, 0.035
+"""Errors of a pressure that offset, step and noise explain [Pa], that a regulator explains [fraction of it], and of an
+angle [rad], 2 deg, which is one of the volume."""
 
 ALARM_TIME, ALARM_SAMPLES = 5.0e-3, 5.0
 """Time [s], and samples, that a residual lasts before it counts."""
@@ -285,15 +293,40 @@ def passed_chamber(
     low, high = min(held, room if vent > 0.0 else supply), max(held, supply if source > 0.0 else room)
     added = max((low - held) * volume, min((high - held) * volume, WARM * period * entered))
     share = period / FORGETS
-    # The lowest content counts from a change of the connection: what was before belongs to another cause.
+    # What was before a change of the connection belongs to another cause.
     turns = (source > vent) != was_fed
+    lowest = chamber.least if was_fed else min(chamber.least, measured * volume)
     return Chamber(
         content=chamber.content + added,
         pressure=chamber.pressure,
         passed=chamber.passed + abs(added) - share * chamber.passed,
         contrary=chamber.contrary,
-        least=measured * volume if turns else min(chamber.least, measured * volume),
+        least=measured * volume if turns else lowest,
     ), added if source > vent else 0.0
+
+
+def contradiction(
+    nominal: NominalDevice,
+    passed: float,
+    volume: float,
+    mean_volume: float,
+    measured: float,
+    expected: float,
+    fed: bool,
+    supply: float,
+) -> float:
+    """Residual of a chamber over what devices, sensors and heat explain [-]: above 1 too much gas, below -1 too little.
+
+    Gas that has ``passed`` lately [J], volumes now and in the mean [m^3], pressures [Pa]: read, expected, and that of
+    the ``supply``, which counts where the chamber is ``fed``.
+    """
+    at_rest = mean_volume * (OFFSET + OF_PRESSURE * abs(measured))
+    at_rest = at_rest + OF_ANGLE * nominal.nominal_displacement_per_radian * abs(measured)
+    of_passed = OF_PASSED if fed | (measured < expected) else KEPT
+    share = (measured - expected) * volume / (of_passed * passed + at_rest)
+    # However wide the valve and small the chamber are, a supply fills it to its own pressure only.
+    overfull = (measured - max(expected, supply)) * volume / at_rest
+    return max(share, overfull) if fed & (measured > expected) else share
 
 
 def met_chamber(
@@ -302,11 +335,14 @@ def met_chamber(
     volume: float,
     mean_volume: float,
     measured: float,
+    fed: bool,
+    supply: float,
     blind: bool,
     period: float,
 ) -> Chamber:
     """A chamber after a reading [Pa] in its volume [m^3]: residual, how long it has contradicted, what it teaches.
 
+    ``supply`` [Pa] is the pressure that feeds it where it is ``fed``.
     ``blind`` is True where the content is taken from the sensor: at first, and while the chambers are joined.
     """
     content = measured * volume if blind else chamber.content
@@ -315,14 +351,12 @@ def met_chamber(
     expected = measured if blind else chamber.pressure + (held - chamber.pressure) * period / (period + lag)
     # As gas content: what no movement of the ankle changes.
     residual = (measured - expected) * volume
-    # Both limits add: one grows with the gas that has passed, the other with the pressure (12 kPa and a sixteenth of
-    # it).
-    allowed = OF_PASSED * chamber.passed + mean_volume * (OFFSET + OF_PRESSURE * abs(measured))
+    share = contradiction(nominal, chamber.passed, volume, mean_volume, measured, expected, fed, supply)
     return Chamber(
         content=max(content + residual * min(period / FORGETS, 1.0), 0.0),
         pressure=expected,
         passed=0.0 if blind else chamber.passed,
-        contrary=chamber.contrary + period if abs(residual) > allowed else 0.0,
+        contrary=chamber.contrary + period if abs(share) > 1.0 else 0.0,
         least=measured * volume if blind else chamber.least,
     )
 
@@ -382,6 +416,8 @@ def next_observer(
         else state.lines
     )
     to_1, to_2 = supplied(nominal, lines)
+    # No line has more than its regulator gives, whatever it has lost on the way.
+    set_1, set_2 = nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure
     mean_1, mean_2 = volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
     # While the chambers are joined, gas passes that no nominal flow describes.
     blind = begins | ((joined > 0.0) & (coil_1.position < 0.5))
@@ -392,8 +428,8 @@ def next_observer(
         nominal, state.chamber_2, before_2, last_2, source_2, vent_2, to_2, fed_2, period
     )
     return Observer(
-        chamber_1=met_chamber(nominal, passed_1, now_1, mean_1, pressure_1, blind, period),
-        chamber_2=met_chamber(nominal, passed_2, now_2, mean_2, pressure_2, blind, period),
+        chamber_1=met_chamber(nominal, passed_1, now_1, mean_1, pressure_1, fed_1, set_1, blind, period),
+        chamber_2=met_chamber(nominal, passed_2, now_2, mean_2, pressure_2, fed_2, set_2, blind, period),
         command=command,
         coil_1=coil_1,
         coil_2=coil_2,
@@ -452,11 +488,18 @@ def is_vented(nominal: NominalDevice, coil: Coil, spool: float, command: float) 
     return (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((command > VENTS_ABOVE) | (spool < 0.0))
 
 
-SHOWS_GAS = 0.25
-"""Part of the pressure over the atmosphere that shows that some gas has come."""
+SHOWS_GAS = 0.05
+"""Part of the gas that has passed by which a content must have grown to show that some came: half of what a tenth of
+the flow gives, and several times what a hose that is open to the atmosphere shows."""
 
 NEARLY_FULL = 0.8
 """Part of the supply's pressure above which a chamber that is vented stays open to it."""
+
+
+def has_gas(chamber: Chamber, volume: float, measured: float) -> bool:
+    """True where a chamber with a reading [Pa] in its volume [m^3] shows that some gas came since it is fed."""
+    # Against the content when the feeding began: an offset of the sensor is in both.
+    return measured * volume - chamber.least > SHOWS_GAS * chamber.passed
 
 
 def cause_of(
@@ -467,23 +510,28 @@ def cause_of(
     supply: float,
     fed: bool,
     vented: bool,
+    lost_beside: float,
     period: float,
 ) -> float:
-    """The flag of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none."""
+    """The flag of a chamber with a reading [Pa] in its volume [m^3], fed from a supply [Pa] or vented; 0 for none.
+
+    ``lost_beside`` [J] is by how much the other chamber, if gas came to it, has less than expected.
+    """
     # In samples too: at a slow rate 5 ms would be a single noisy reading.
     alarm = chamber.contrary > max(ALARM_TIME, ALARM_SAMPLES * period) - SAME
-    room = nominal.nominal_atmospheric_pressure
-    gains = measured > chamber.pressure
-    some = measured - room > SHOWS_GAS * (chamber.pressure - room)
+    gained = (measured - chamber.pressure) * volume
+    gains = gained > 0.0
     # Gas that comes to a vented chamber is a valve stuck open where the supply shows, else one stuck shut under a foot.
     into_vent = (measured > NEARLY_FULL * supply) | (measured * volume > chamber.least + 0.5 * OFFSET * volume)
     # Fed: too much, too little, or nothing at all comes.
-    in_fill = SUPPLY_HIGH if gains else (SUPPLY_LOW if some else SUPPLY_LOST)
+    in_fill = SUPPLY_HIGH if gains else (SUPPLY_LOW if has_gas(chamber, volume, measured) else SUPPLY_LOST)
     in_vent = (VALVE_OPEN if into_vent else VALVE_SHUT) if gains else LEAK
     # Neither fed nor vented: what comes in passes a valve, what goes passes a leak.
     closed = VALVE_OPEN if gains else LEAK
     found = in_fill if fed else (in_vent if vented else closed)
-    return found if alarm else NO_FLAG
+    # What a chamber without a source gains has come across the vane where the other one lost as much of what came.
+    across = gains & (not fed) & (lost_beside > gained)
+    return (LEAK if across else found) if alarm else NO_FLAG
 
 
 def found_cause(
@@ -497,8 +545,10 @@ def found_cause(
     vented_1 = is_vented(nominal, state.coil_1, state.spool, state.command)
     vented_2 = is_vented(nominal, state.coil_2, -state.spool, state.command)
     to_1, to_2 = supplied(nominal, state.lines)
-    first = cause_of(nominal, state.chamber_1, now_1, pressure_1, to_1, fed_1, vented_1, period)
-    second = cause_of(nominal, state.chamber_2, now_2, pressure_2, to_2, fed_2, vented_2, period)
+    lost_1 = (state.chamber_1.pressure - pressure_1) * now_1 if has_gas(state.chamber_1, now_1, pressure_1) else 0.0
+    lost_2 = (state.chamber_2.pressure - pressure_2) * now_2 if has_gas(state.chamber_2, now_2, pressure_2) else 0.0
+    first = cause_of(nominal, state.chamber_1, now_1, pressure_1, to_1, fed_1, vented_1, lost_2, period)
+    second = cause_of(nominal, state.chamber_2, now_2, pressure_2, to_2, fed_2, vented_2, lost_1, period)
     return first if first > NO_FLAG else second
 
 

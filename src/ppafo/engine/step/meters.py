@@ -4,6 +4,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane
 from ppafo.engine.step.phases import present_pressures
 from ppafo.engine.step.sample import reference_at, torque_of
+from ppafo.model.controlled import TORQUE, controlled
 from ppafo.model.plant import ThermalParameters
 from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course, is_away
 
@@ -71,16 +72,26 @@ def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> Strid
 # The whole reference, before the first sample.
 
 
+def origin_of(parts: Program, lane: Lane) -> float:
+    """Where the size of a reference counts from: no torque, or where the run begins with what else is controlled."""
+    if parts.controlled == TORQUE:
+        return 0.0
+    pressure_1, pressure_2 = present_pressures(parts, lane)
+    torque = torque_of(parts, lane, lane.state.angle, pressure_1, pressure_2)
+    return float(controlled(lane.state.angle, pressure_1, pressure_2, torque))
+
+
 def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None:
-    """The last value of the reference, its largest as far as its ends say, and no hold yet."""
-    value = reference_at(parts, lane, last * interval * lane.timing.step)
-    largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step)), abs(value))
+    """The last value of the reference, how far its ends are from its origin, and no hold yet."""
+    value, origin = reference_at(parts, lane, last * interval * lane.timing.step), origin_of(parts, lane)
+    largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step) - origin), abs(value - origin))
     lane.course = Course(last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0)
 
 
 def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """The largest value so far."""
-    largest = max(lane.course.largest, abs(reference_at(parts, lane, index * interval * lane.timing.step)))
+    """How far it has been from there so far."""
+    value = reference_at(parts, lane, index * interval * lane.timing.step)
+    largest = max(lane.course.largest, abs(value - origin_of(parts, lane)))
     lane.course = lane.course._replace(largest=largest, tolerance=SAME_LEVEL * largest)
 
 

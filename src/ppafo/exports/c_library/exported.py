@@ -12,6 +12,7 @@ from ppafo.exports.c_library.boundary import Boundary
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import WALK, MetricKind
 from ppafo.metrics.readable import has_channels
+from ppafo.model.controlled import CONTROLLED
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
 """Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
@@ -60,7 +61,8 @@ def exported(program: Program) -> ExportedProgram:
     missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
     states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
     if REQUEST not in states if program.walks else not program.has_reference:
-        missing.add("reference")
+        missing |= {kind.reference for kind in CONTROLLED.values()}
+    missing |= {kind.reference for name, kind in CONTROLLED.items() if name != program.controlled}
     offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
     metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
     # By name: the same metrics in another order are the same program.

@@ -16,6 +16,7 @@ from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.exported import ExportedProgram, Further
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import VALVES
+from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph
@@ -39,7 +40,7 @@ OUTPUTS = {
     "pressure_2": ("Pa", "pressure in chamber 2, absolute"),
     "torque": ("N m", "torque of the actuator, above 0 turns the toes down"),
     "command": ("-", "command to the valve, -1 to 1"),
-    "reference": ("N m", "requested torque"),
+    **{kind.reference: (kind.unit, f"requested {kind.words}") for kind in CONTROLLED.values()},
     "temperature_1": ("K", "temperature in chamber 1"),
     "temperature_2": ("K", "temperature in chamber 2"),
     "mass_1": ("kg", "gas in chamber 1"),

@@ -10,6 +10,7 @@ from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import ExportedProgram
 from ppafo.exports.c_library.files import Library, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
+from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.profiles import profile_parameters
@@ -94,7 +95,7 @@ def plant_of(item: Scenario) -> PlantAlone:
     """
     chosen = _prescribed_vane(item) if not item.walks else _commanded_walk(item)
     library, motion = library_of(chosen), chosen.motion
-    command, unseen, highest = COMMAND, {"command", "reference"}, 1.0
+    command, unseen, highest = COMMAND, {"command", *(kind.reference for kind in CONTROLLED.values())}, 1.0
     further: tuple[Input, ...] = ()
     first: tuple[tuple[str, str], ...] = ()
     lead: tuple[tuple[str, str], ...] = ()

@@ -7,6 +7,7 @@ from xml.etree import ElementTree as Xml
 
 from ppafo.exports.c_library.files import OUTPUTS, Library, Setting
 from ppafo.exports.c_library.plant import Input
+from ppafo.model.controlled import CONTROLLED
 from ppafo.units import base_value, dimension
 from ppafo.version import __version__
 
@@ -16,7 +17,8 @@ FIXED_NAMES = ("period", "delay", "seed")
 """Names of further settings that cannot change under way: they count steps or begin the noise."""
 TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
 """Settings of the wearer that may change: the weight of a leg stays."""
-STEPPED = ("command", "reference", "strides", "contact", "controller_phase", "safe_state")
+REFERENCES = tuple(kind.reference for kind in CONTROLLED.values())
+STEPPED = ("command", *REFERENCES, "strides", "contact", "controller_phase", "safe_state")
 """Outputs that jump from sample to sample."""
 
 

@@ -24,6 +24,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
+from ppafo.model.controlled import TORQUE
 from ppafo.model.valves import vent_valve
 from ppafo.parameters.plant import valve_settings
 from ppafo.report.recording_figure import recording_figure
@@ -57,6 +58,11 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
+    if scenario.controlled != TORQUE:
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{scenario.controlled}': a controller at the wire is sent a torque; "
+            "take a scenario whose reference is one"
+        )
     period = 1.0 / rate
     chosen = replace(
         scenario,

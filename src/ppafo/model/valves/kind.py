@@ -70,6 +70,8 @@ class ValveKind:
 
     ``lag(settings)`` is the time [s] after which its flow has followed a command, None for the dead time alone.
 
+    One that ``vents_at_rest`` joins both chambers to the atmosphere at a command of 0, where others are closed.
+
     ``choose(settings)`` returns the simplest model that is exact for the settings. It may look only at which of them
     are 0: runs of an ensemble with zeros in the same settings share one model.
     """
@@ -79,6 +81,7 @@ class ValveKind:
     settings: type
     choose: Callable[[Any], ValveModel]
     lag: Callable[[Any], float] | None = None
+    vents_at_rest: bool = False
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:

@@ -250,4 +250,5 @@ KIND = ValveKind(
     settings=TimedSolenoid,
     choose=choose,
     lag=lag,
+    vents_at_rest=True,
 )

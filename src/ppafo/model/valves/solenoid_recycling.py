@@ -189,4 +189,5 @@ KIND = ValveKind(
     settings=RecyclingSettings,
     choose=choose,
     lag=solenoid.lag,
+    vents_at_rest=True,
 )

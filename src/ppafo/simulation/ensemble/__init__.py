@@ -12,7 +12,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
-from ppafo.metrics.readable import REFERENCE
+from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import Outcome, Request, intervals, offered
@@ -121,7 +121,10 @@ def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> 
 def _check_channel(base: Scenario, name: str) -> None:
     if name not in TRACED:
         raise ScenarioError(f"{base.name}: the channel '{name}' cannot be traced{_hint(name, TRACED)}")
-    if name == REFERENCE and base.controller.kind == OPEN_LOOP:
+    controlled = next((kind.name for kind in CONTROLLED.values() if kind.reference == name), base.controlled)
+    if controlled != base.controlled:
+        raise ScenarioError(f"{base.name}: there is no '{name}' to trace: reference.of is '{base.controlled}'")
+    if name == CONTROLLED[controlled].reference and base.controller.kind == OPEN_LOOP:
         raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
     if name.startswith("temperature_") and base.gas_model is None:
         raise ScenarioError(f"{base.name}: '{name}' needs gas with an energy balance ([gas_model] kind = \"thermal\")")

@@ -4,12 +4,13 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
-from ppafo.metrics.readable import REFERENCE
 from ppafo.model.columns import Problem, at
+from ppafo.model.controlled import ANGLE
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
 from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
@@ -27,6 +28,7 @@ def rules(scenario: Scenario) -> tuple[Problem, ...]:
 
     return (
         _beyond_the_stops(scenario),
+        _reference_beyond_the_stops(scenario),
         (
             delay > scenario.run.duration,
             lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
@@ -39,25 +41,42 @@ def _beyond_the_stops(scenario: Scenario) -> Problem:
     """A vane that begins, is held or is to move beyond the stops."""
     actuator, motion = scenario.device.actuator, vane_motion(scenario)
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
-    lowest, highest = profile_bounds(profile)
+    if profile.kind != "constant":
+        return _profile_beyond_the_stops(scenario, profile, "motion.profile")
+    level = profile.level
+
+    def angle_line(run: int) -> str:
+        low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
+        path = path_of_locked_angle(scenario) or LOCKED_ANGLE
+        return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
+
+    return _is_beyond_the_stops(scenario, profile), angle_line
+
+
+def _reference_beyond_the_stops(scenario: Scenario) -> Problem:
+    """An angle that no controller can reach."""
+    if scenario.controlled != ANGLE or scenario.controller.kind == OPEN_LOOP:
+        return np.zeros(1, dtype=np.bool_), lambda _: ""
+    return _profile_beyond_the_stops(scenario, scenario.reference, "reference")
+
+
+def _is_beyond_the_stops(scenario: Scenario, profile: ProfileChoice) -> NDArray[np.bool_]:
+    """Tell in which runs (runs,) a profile leaves the stops at any time."""
+    actuator, (lowest, highest) = scenario.device.actuator, profile_bounds(profile)
     lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
-    outside = np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
-    if profile.kind == "constant":
-        level = profile.level
+    return np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
 
-        def angle_line(run: int) -> str:
-            low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
-            path = path_of_locked_angle(scenario) or LOCKED_ANGLE
-            return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
-        return outside, angle_line
+def _profile_beyond_the_stops(scenario: Scenario, profile: ProfileChoice, section: str) -> Problem:
+    """A profile of a section that leaves the stops."""
+    actuator, outside = scenario.device.actuator, _is_beyond_the_stops(scenario, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
     found: dict[int, str] = {}
     for run in np.flatnonzero(outside).tolist():
         stops = at(actuator.angle_min, run), at(actuator.angle_max, run)
         own = ProfileChoice(profile.kind, {name: at(value, run) for name, value in profile.settings.items()})
         duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
-        found[run] = profile_problem(scenario.device.name, stops, own, duration, step)
+        found[run] = profile_problem(scenario.device.name, stops, own, duration, step, section)
         outside[run] = bool(found[run])
     return outside, lambda run: found[run]
 
@@ -90,5 +109,9 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
     leg = vane_motion(scenario).leg
     if LED_SHANK in kind.needs and not (leg is not None and leg.gait):
         return "it needs a leg whose shank follows a gait"
-    is_open = scenario.controller.kind == OPEN_LOOP
-    return "its controller follows no reference" if is_open and REFERENCE in kind.channels else ""
+    if not kind.of_reference:
+        return ""
+    if scenario.controller.kind == OPEN_LOOP:
+        return "its controller follows no reference"
+    controlled = scenario.controlled
+    return "" if kind.of_reference == controlled else f"reference.of is '{controlled}', not '{kind.of_reference}'"

@@ -94,6 +94,24 @@ def test_a_device_that_is_a_little_different_gives_no_sign(nominal: NominalDevic
 
 
 @pytest.mark.parametrize("nominal", [PAIR, SPOOL])
+@pytest.mark.parametrize("dead", [0.5, 2.0])
+def test_a_dead_volume_of_half_or_twice_what_is_believed_gives_no_sign(nominal: NominalDevice, dead: float) -> None:
+    # The vane of the paper: its dead volumes are most of its chambers.
+    mostly_dead = nominal._replace(
+        nominal_displacement_per_radian=14.51e-6, nominal_dead_volume_1=36.0e-6, nominal_dead_volume_2=36.0e-6
+    )
+    real = mostly_dead._replace(nominal_dead_volume_1=dead * 36.0e-6, nominal_dead_volume_2=dead * 36.0e-6)
+    assert found(mostly_dead, real, FILLS) == fault_flags.NO_FLAG
+    assert found(real, mostly_dead, FILLS) == fault_flags.NO_FLAG
+
+
+@pytest.mark.parametrize("nominal", [PAIR, SPOOL])
+def test_a_supply_a_third_too_high_is_found_once_the_chamber_is_full(nominal: NominalDevice) -> None:
+    high = nominal._replace(nominal_dorsiflexion_pressure=4.0 / 3.0 * SUPPLY)
+    assert found(nominal, high, [VENT] * 20 + [-1.0] * 2000) == fault_flags.SUPPLY_HIGH
+
+
+@pytest.mark.parametrize("nominal", [PAIR, SPOOL])
 @pytest.mark.parametrize(
     ("pressure", "flag"),
     [(1.9 * SUPPLY, fault_flags.SUPPLY_HIGH), (0.45 * SUPPLY, fault_flags.SUPPLY_LOW), (ROOM, fault_flags.SUPPLY_LOST)],

@@ -454,7 +454,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         works=works,
         pressure=pressure,
         lowest_pressure=None if tried.first is None else float(tried.pressure[tried.first]),
-        gains=trials.gain_numbers(int(tried.trial.gains[place])),
+        gains=trials.gain_numbers(valve, float(tried.pressure[place]), int(tried.trial.gains[place])),
         error=error,
         gas=gas,
         gas_in_all=gas_in_all,

@@ -4,9 +4,10 @@ Each pressure is tried with many gains, and some openings, of one valve at once.
 granted about how the error depends on the pressure.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,13 @@ from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.trials import STREAMS, run_trials
 from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.constants import PASCALS_PER_PSI
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.torque_loop import PROPORTIONAL_GAIN
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.signals.recording import Floats
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.torque_loop import loop_terms
 from ppafo.studies.draws import seeds_of_noise
 
 Limit = Literal["torque", "flow", "control", "pressure"]
@@ -130,14 +135,17 @@ class Trials:
         chosen = np.where(works.any(axis=1), gas.argmin(axis=1), error.argmin(axis=1))
         return trial.at(np.arange(pressure.size) * sets + chosen)
 
-    def gain_numbers(self, number: int) -> dict[str, float]:
-        """Return the gains of a set in SI, by path."""
-        settings = self.problem.scenario.controller.settings
-        pairs = zip(self.problem.gains, self.gain_sets[number], strict=True)
-        return {path: float(factor * settings[path.rpartition(".")[2]]) for path, factor in pairs}
+    def gain_numbers(self, valve: Part, pressure: float, number: int) -> dict[str, float]:
+        """Return the gains of a set in SI, by path, with a valve at a pressure [Pa absolute]."""
+        columns = self.columns(valve, np.array([pressure]), np.array([number]), np.ones(1))
+        return {path: float(columns[path][0]) for path in self.problem.gains}
 
     def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
-        """Return the columns of trials in SI: figures of the parts, both supply pressures, gains."""
+        """Return the columns of trials in SI: figures of the parts, both supply pressures, gains.
+
+        The scenario's gains are those of its own device: with other parts, and at another pressure, they are the same
+        multiple of what the rules of ``control.torque_loop`` ask for.
+        """
         problem, count = self.problem, pressure.size
         columns = {path: np.full(count, number) for path, number in valve.model_numbers.items()}
         columns |= {path: columns[path] * opening for path in _OPENINGS if path in columns}
@@ -146,9 +154,16 @@ class Trials:
                 columns[f"actuator.{name}"] = np.full(count, problem.actuator.values[name])
         columns |= {"supply.pressure": pressure, "supply.dorsiflexion_pressure": pressure}
         settings = problem.scenario.controller.settings
+        follows = self.right_gain(columns) / self.right_gain({}) if problem.gains else 1.0
         for index, path in enumerate(problem.gains):
-            columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]]
+            columns[path] = self.gain_sets[gains, index] * settings[path.rpartition(".")[2]] * follows
         return columns
+
+    def right_gain(self, columns: Mapping[str, Floats]) -> Any:
+        """Return the proportional gain [1/(N m)] that the rules ask for, with some numbers in place of the device's."""
+        scenario = self.problem.scenario
+        term = loop_terms(scenario.device, CONTROLLERS[scenario.controller.kind], False)[PROPORTIONAL_GAIN]
+        return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 
 def highest_pressure(problem: SizingProblem, valve: Part) -> float:

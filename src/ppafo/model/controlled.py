@@ -1,0 +1,149 @@
+"""What a law controls: the torque of the actuator, the angle, the pressure in a chamber or the difference of both.
+
+``controlled`` and ``steered`` are ports: a program whose reference is no torque has the functions of its entry in the
+table in their place. To add one: a function and a line of ``CONTROLLED``.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+from ppafo.signals.meter import Sample
+
+TORQUE, ANGLE = "torque", "angle"
+"""Names of two that other parts of the package must tell from the rest."""
+
+
+def controlled(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
+    """The torque [N m], of an angle [rad], absolute pressures [Pa] and a torque [N m]."""
+    return torque
+
+
+def controlled_angle(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
+    """The angle [rad]."""
+    return angle
+
+
+def controlled_pressure_1(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
+    """The absolute pressure in chamber 1 [Pa]."""
+    return pressure_1
+
+
+def controlled_pressure_2(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
+    """The absolute pressure in chamber 2 [Pa]."""
+    return pressure_2
+
+
+def controlled_difference(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
+    """The pressure in chamber 1 less the one in chamber 2 [Pa]."""
+    return pressure_1 - pressure_2
+
+
+def steered(error: float) -> float:
+    """An error, in the unit of the reference, as a law acts on it: above 0 where a command above 0 is needed."""
+    return error
+
+
+def turned_round(error: float) -> float:
+    """An error of what a command above 0 lowers, as a law acts on it."""
+    return -error
+
+
+def seen_value(measurement: Measurement) -> float:
+    """What the sensors show of what is controlled, in the unit of the reference."""
+    return controlled(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
+
+
+def seen_error(reference: float, measurement: Measurement) -> float:
+    """Reference less what the sensors show of it, above 0 where a command above 0 is needed."""
+    return steered(reference - seen_value(measurement))
+
+
+def value_in(sample: Sample) -> float:
+    """What is controlled, at a sample, in the unit of the reference."""
+    return controlled(sample.angle, sample.pressure_1, sample.pressure_2, sample.torque)
+
+
+@dataclass(frozen=True, slots=True)
+class Controlled:
+    """Something that a reference can be a value of.
+
+    ``words`` name it in a sentence, ``level`` declares a value of it, ``difference`` is the unit of a difference of two
+    values. ``value(angle, pressure_1, pressure_2, torque)`` gives it of what sensors show. ``size`` is about as much of
+    it as 1 N m is of a torque: the ranges of gains are scaled by it. A command above 0 raises it, or lowers it where
+    ``sign`` is -1.
+    """
+
+    name: str
+    words: str
+    level: Quantity
+    difference: str
+    value: Callable[[float, float, float, float], float]
+    size: float = 1.0
+    sign: float = 1.0
+
+    @property
+    def channel(self) -> str:
+        """Its channel in a recording; the one of a difference of pressures is recorded where it is controlled."""
+        return self.name
+
+    @property
+    def reference(self) -> str:
+        """The channel of its reference in a recording."""
+        return "reference" if self.name == TORQUE else f"reference_{self.name}"
+
+    @property
+    def unit(self) -> str:
+        """Unit of its channels in a recording [SI]."""
+        return "Pa" if self.level.unit == "Pa_a" else self.level.unit
+
+    @property
+    def plain_unit(self) -> str:
+        """Unit of a difference without a word on what it counts from, as the units of gains have it."""
+        return self.difference.removesuffix("_d")
+
+    def setting(self, quantity: Quantity) -> Quantity:
+        """Return the setting of a law that acts on this in the place of a torque, of the one that acts on a torque.
+
+        A default of the torque law that is not 0 means nothing in another unit, and is none.
+        """
+        if self.name == TORQUE or "N m" not in quantity.unit:
+            return quantity
+        if quantity.unit == "N m":
+            unit, scale = self.difference, self.size
+        else:
+            unit = quantity.unit.replace("(N m)", self.plain_unit).replace("N m", self.plain_unit)
+            scale = 1.0 / self.size
+        return replace(
+            quantity,
+            unit=unit,
+            default=0.0 if quantity.default == 0.0 else None,
+            minimum=quantity.minimum * scale,
+            maximum=quantity.maximum * scale,
+        )
+
+
+_PRESSURE = Quantity("level", "Pa_a", "", None, 1.0e3, 1.0e8)
+
+CONTROLLED: dict[str, Controlled] = {
+    item.name: item
+    for item in (
+        Controlled(TORQUE, "torque", Quantity("level", "N m", "", None, -1.0e4, 1.0e4), "N m", controlled),
+        Controlled(ANGLE, "angle", Quantity("level", "rad", "", None, -10.0, 10.0), "rad", controlled_angle),
+        Controlled("pressure_1", "chamber 1 pressure", _PRESSURE, "Pa_d", controlled_pressure_1, 1.0e5),
+        Controlled("pressure_2", "chamber 2 pressure", _PRESSURE, "Pa_d", controlled_pressure_2, 1.0e5, -1.0),
+        Controlled(
+            "pressure_difference",
+            "pressure difference",
+            Quantity("level", "Pa_d", "", None, -1.0e8, 1.0e8),
+            "Pa_d",
+            controlled_difference,
+            1.0e5,
+        ),
+    )
+}
+"""What a reference can be of, by the word that a file has in ``reference.of``."""
+
+ANYTHING = tuple(CONTROLLED)
+"""What a law can follow that acts on the error alone."""

@@ -1,0 +1,34 @@
+"""What an actuator turns, in words: the joint and its two directions."""
+
+from dataclasses import dataclass
+
+OPPOSITES = {
+    "plantarflexion": "dorsiflexion",
+    "flexion": "extension",
+    "abduction": "adduction",
+    "inversion": "eversion",
+    "pronation": "supination",
+    "internal rotation": "external rotation",
+}
+OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
+"""What movements of a joint are called, and those against them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """What the actuator turns, in words: the joint, what a growing angle is called there, and a falling one."""
+
+    name: str = "ankle"
+    positive: str = "plantarflexion"
+    negative: str = "dorsiflexion"
+
+    def said(self, text: str) -> str:
+        """Return a text about an ankle as one about this joint."""
+        words = zip(("ankle", "plantarflexion", "dorsiflexion"), (self.name, self.positive, self.negative), strict=True)
+        for usual, own in words:
+            text = text.replace(usual, own).replace(usual.capitalize(), own.capitalize())
+        return text
+
+
+ANKLE = Joint()
+"""The joint of a set that names none."""

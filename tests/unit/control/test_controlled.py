@@ -1,0 +1,101 @@
+"""What a law controls: one table, which laws, meters, metrics and readings of files ask."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+
+from ppafo.control.angle_loop import Joint, angle_damping, angle_stiffness, bandwidth, slow_loop
+from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.controllers.cascade import CASCADE
+from ppafo.control.torque_loop import TorqueLoop, proportional_gain
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.sensors import Measurement
+from ppafo.signals.recording import CHANNELS
+
+SEEN = Measurement(angle=1.4, pressure_1=3.0e5, pressure_2=1.2e5, torque=2.6)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("torque", 2.6), ("angle", 1.4), ("pressure_1", 3.0e5), ("pressure_2", 1.2e5), ("pressure_difference", 1.8e5)],
+)
+def test_each_is_read_of_what_the_sensors_show(name: str, value: float) -> None:
+    assert CONTROLLED[name].value(*SEEN) == pytest.approx(value)
+
+
+def test_each_has_channels_of_its_own_in_recordings() -> None:
+    names = [kind.reference for kind in CONTROLLED.values()]
+    assert len(set(names)) == len(names)
+    for kind in CONTROLLED.values():
+        assert CHANNELS[kind.reference].unit == CHANNELS[kind.channel].unit == kind.unit
+
+
+def test_a_gain_is_per_unit_of_what_is_controlled_and_a_default_of_another_unit_is_none() -> None:
+    settings = {item.name: item for item in CONTROLLERS["pid"].quantities}
+    gain, slope = (CONTROLLED["angle"].setting(settings[name]) for name in ("proportional_gain", "derivative_gain"))
+    assert (gain.unit, slope.unit, slope.default) == ("1/rad", "s/rad", 0.0)
+    assert CONTROLLED["pressure_1"].setting(settings["integral_gain"]).unit == "1/(Pa s)"
+    zone = next(item for item in CONTROLLERS["on_off_dead_zone"].quantities if item.name == "dead_zone")
+    of_pressure = CONTROLLED["pressure_2"].setting(zone)
+    assert (of_pressure.unit, of_pressure.default, of_pressure.maximum) == ("Pa_d", None, 1.0e5 * zone.maximum)
+    assert CONTROLLED[TORQUE].setting(zone) is zone
+
+
+@pytest.mark.parametrize("name", [name for name in CONTROLLERS if name.endswith("_fixed_point")])
+def test_a_fixed_point_law_follows_a_torque_alone_whatever_its_float_form_follows(name: str) -> None:
+    assert CONTROLLERS[name].controls == (TORQUE,)
+    assert len(CONTROLLERS[name.removesuffix("_fixed_point")].controls) == len(CONTROLLED)
+
+
+def test_a_walk_is_offered_laws_of_a_torque_alone() -> None:
+    offered = walking_controllers()
+    assert "cascade" not in offered
+    assert all(kind.controls == (TORQUE,) for kind in offered.values())
+
+
+LOOP = TorqueLoop(rate=80.0, dead_time=2.0e-3)
+JOINT = Joint(inertia=8.4e-3, stiffness=2.0, damping=4.0e-3, friction=0.02, travel=0.1, gravity=0.3)
+
+
+def test_two_equal_roots_as_quick_as_dead_time_or_torque_rate_allow() -> None:
+    frequency = bandwidth(LOOP, JOINT)
+    assert frequency == pytest.approx(min(1.0 / 0.016, (80.0 / (8.4e-3 * 0.1)) ** (1.0 / 3.0)))
+    # s^2 + (d_a/I) s + k_a/I has one root twice.
+    half = 0.5 * angle_damping(LOOP, JOINT) / JOINT.inertia
+    assert half**2 == pytest.approx(angle_stiffness(LOOP, JOINT) / JOINT.inertia)
+    slow_valve = LOOP._replace(dead_time=0.05)
+    assert bandwidth(slow_valve, JOINT) == pytest.approx(1.0 / 0.4)
+
+
+def test_a_law_on_the_angle_alone_keeps_half_the_gain_at_which_the_mass_swings_on_its_gas() -> None:
+    smooth = JOINT._replace(friction=0.0)
+    loop = slow_loop(LOOP, smooth)
+    # s (I s^2 + d s + S) + k R by Routh: it swings from k R/S = d/I on.
+    assert proportional_gain(loop) * LOOP.rate / smooth.stiffness == pytest.approx(
+        0.5 * smooth.damping / smooth.inertia
+    )
+    assert slow_loop(LOOP, JOINT).dead_time < loop.dead_time, "dry friction damps"
+
+
+def asked_torque(angle: float, reference: float) -> float:
+    """The command of a cascade whose inner gain is 1, where nothing moves and the actuator has no torque."""
+    given = dict.fromkeys((item.name for item in CASCADE.quantities), 0.0)
+    row = CASCADE.parameters(**given | {"error_limit": 0.1, "angle_stiffness": 5.0, "torque_gain": 1.0})
+    seen = Measurement(angle=angle, pressure_1=1.0e5, pressure_2=1.0e5, torque=0.0)
+    command, _ = CASCADE.update(row, CASCADE.initial, reference, seen, 1.0e-3)
+    return float(command)
+
+
+def test_a_cascade_acts_on_no_more_than_its_error_limit() -> None:
+    assert asked_torque(1.5, 1.55) == pytest.approx(0.25)
+    assert asked_torque(1.5, 2.5) == pytest.approx(0.5)
+    assert asked_torque(2.5, 1.5) == pytest.approx(-0.5)
+
+
+def test_the_second_chamber_has_the_other_sign() -> None:
+    signs: dict[str, Callable[[float], bool]] = {"pressure_2": lambda sign: sign < 0.0}
+    for name, kind in CONTROLLED.items():
+        assert signs.get(name, lambda sign: sign > 0.0)(kind.sign), name
+        assert math.isfinite(kind.size)

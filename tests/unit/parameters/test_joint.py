@@ -1,0 +1,67 @@
+"""A set says what its actuator turns: the joint and its two directions, in tables, figures and reports."""
+
+import json
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+from ppafo.analyses.sets.values import shown_values
+from ppafo.errors import ParameterError
+from ppafo.parameters import load_device, load_parameter_set
+from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
+from ppafo.report.recording_figure import draw_stored_result
+from ppafo.running import simulate
+from ppafo.simulation.loading import load_scenario
+from ppafo.storage import read_result
+
+CYLINDER = (resources.files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
+ELBOW = '\n[joint]\nname = "elbow"\npositive = "flexion"\n'
+
+
+@pytest.fixture
+def elbow(tmp_path: Path) -> Path:
+    file = tmp_path / "elbow.toml"
+    file.write_text(CYLINDER.replace('name = "cylinder-lever"', 'name = "elbow"', 1) + ELBOW, encoding="utf-8")
+    return file
+
+
+def test_the_sets_that_ship_turn_an_ankle() -> None:
+    assert load_device("ppafo2011").joint == ANKLE == Joint("ankle", "plantarflexion", "dorsiflexion")
+
+
+def test_a_set_names_its_joint_and_the_opposite_is_known(elbow: Path) -> None:
+    loaded = load_parameter_set(elbow)
+    assert load_device(loaded).joint == Joint("elbow", "flexion", "extension")
+    written = parse_parameter_set(parameter_set_toml(loaded).encode(), "again", elbow.parent)
+    assert written.joint == loaded.joint
+    assert "joint: elbow, whose angle grows in flexion, falls in extension" in str(shown_values(loaded))
+
+
+@pytest.mark.parametrize(
+    ("joint", "message"),
+    [
+        ('name = "elbow"', "'joint.positive' is missing|joint.positive"),
+        ('name = "elbow"\npositive = "flexoin"', "opposite is not known.*flexion.*joint.negative"),
+        ('name = "elbow"\npositive = "flexion"\nsign = "up"', "unknown key 'joint.sign'"),
+        ('name = ""\npositive = "flexion"', "joint.name"),
+    ],
+)
+def test_words_that_cannot_be_are_refused(joint: str, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        parse_parameter_set(f"{CYLINDER}\n[joint]\n{joint}\n".encode(), "elbow.toml")
+
+
+def test_figures_and_recordings_speak_of_the_joint(elbow: Path, tmp_path: Path) -> None:
+    result = simulate(load_scenario("cylinder-servo", [f"device.set={elbow}", "run.duration=0.1 s"]))
+    titles = [axes.get_title() + axes.get_title(loc="left") + axes.get_ylabel() for axes in result.plot().axes]
+    assert any("Elbow angle" in title for title in titles)
+    assert not any("nkle" in title for title in titles)
+    assert result.dataset()["angle"].attrs["long_name"] == "elbow angle, growing in flexion"
+    folder = result.save(tmp_path / "out")
+    assert json.loads((folder / "run.json").read_text())["scenario"]["device"]["joint"]["name"] == "elbow"
+    drawn = draw_stored_result(read_result(folder))
+    assert any(
+        "Elbow angle" in axes.get_title() + axes.get_title(loc="left") + axes.get_ylabel() for axes in drawn.axes
+    )
