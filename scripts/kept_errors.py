@@ -16,7 +16,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo import scenario_from_dict
-from tests.convergence.kept_errors import kept
+from tests.convergence.kept_errors import Kept, kept
 from tests.convergence.tasks import TASKS, task
 
 
@@ -28,7 +28,8 @@ def main() -> int:
     parser.add_argument("--family", choices=list(TASKS), action="append", help="only this family; may be repeated")
     parsed = parser.parse_args()
     print(f"{'family':<22}{'tasks':>7}{'determined':>12}{'above':>7}{'angle':>8}{'pressure':>10}{'temperature':>13}")
-    above, determined = {}, 0
+    above: dict[tuple[str, int], Kept] = {}
+    determined = 0
     for family in parsed.family or TASKS:
         cases = [kept(scenario_from_dict(task(family, parsed.seed, number))) for number in range(parsed.draws)]
         sure = {number: case for number, case in enumerate(cases) if case.is_determined}

@@ -235,10 +235,11 @@ def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
         found = [MARGIN * float(difference) for difference in largest]
         changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
         errors = {name: MARGIN * change for name, change in changes.items()}
-    angle, pressure, *temperature = found
+    angle, pressure = found[:2]
+    temperature = found[2] if len(found) > 2 else None
     shares = _shares(result, errors)
     worst = max(shares, key=lambda name: shares[name], default="")
-    return ErrorEstimate(angle, pressure, errors, *(temperature or [None]), worst, shares.get(worst, 0.0))
+    return ErrorEstimate(angle, pressure, errors, temperature, worst, shares.get(worst, 0.0))
 
 
 def _courses_of(result: Ran) -> list[str]:
