@@ -31,9 +31,9 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from ppafo.engine.compilers import FLAGS
 from ppafo.engine.entries import INLINE
-from ppafo.engine.lane_source import write_lanes
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
+from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import SimulationError
 from ppafo.golden_bits import GOLDEN, Hashes, digest, golden_hashes, names, plain_batch

@@ -6,8 +6,11 @@ from typing import Any
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
+from ppafo.engine.entries import INLINE
 from ppafo.engine.lanes import RECORDED_ANGLE
+from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.program import Program
+from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import energy_balance, isothermal, lines, walk
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import MetricKind
@@ -39,6 +42,11 @@ def is_of_any(kind: MetricKind) -> bool:
 def meters() -> tuple[MeterKind, ...]:
     """Every meter of the metrics of recordings; those of walks have samples of their own."""
     return tuple({meter.name: meter for kind in METRICS.values() if is_of_any(kind) for meter in kind.meters}.values())
+
+
+def lane_source(program: Program) -> str:
+    """Source text of the module whose ``advance`` runs one block of a program."""
+    return write_lanes(program, SourceCollector(INLINE))
 
 
 def drawn_programs(count: int, seed: int = 1) -> Iterator[Program]:

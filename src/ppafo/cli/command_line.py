@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, final
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, final
 
 from ppafo.arguments import Word, number, whole_number
 from ppafo.arguments.door import without_names
@@ -37,6 +37,15 @@ OUT = "out"
 """The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
 
 
+class Verb(Protocol):
+    """A function whose signature is the arguments of a command, and whose result is what the command says."""
+
+    __module__: str
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Answer; PpafoError for bad input."""
+
+
 @dataclass(frozen=True, slots=True)
 class Command:
     """A command: its verb as ``module:function``, and what its signature does not say.
@@ -54,13 +63,13 @@ class Command:
     listed: str = ""
     default_folder: str = ""
     first_line: str = ""
-    found: Callable[..., Any] | None = None
+    found: Verb | None = None
     """The verb itself, of another package, in place of where it is."""
 
-    def function(self) -> Callable[..., Any]:
+    def function(self) -> Verb:
         """Load and return the verb."""
-        function: Callable[..., Any] = self.found or kind_at(self.verb)
-        return function
+        verb: Verb = self.found or kind_at(self.verb)
+        return verb
 
     @property
     def summary(self) -> str:
@@ -103,7 +112,7 @@ class Reading:
     choices: tuple[str, ...] | None = None
 
 
-def _help_by_parameter(verb: Callable[..., Any], names: Sequence[str]) -> dict[str, str]:
+def _help_by_parameter(verb: Verb, names: Sequence[str]) -> dict[str, str]:
     """Return the lines ``name: help`` of the docstring; more indented lines go on with them."""
     found: dict[str, str] = {}
     latest = ""
@@ -141,7 +150,7 @@ def reading_of(annotation: Any) -> Reading:
             return Reading(word, is_flag, is_repeated or word.is_repeated)
 
 
-def parameters_of(verb: Callable[..., Any]) -> Iterator[tuple[inspect.Parameter, Reading]]:
+def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
     annotations = annotations_of(verb)
     for parameter in inspect.signature(verb).parameters.values():

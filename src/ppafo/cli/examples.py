@@ -22,7 +22,7 @@ class Example:
     commands: tuple[str, ...]
 
     def document(self) -> dict[str, object]:
-        """Return the same as plain data."""
+        """Return summary, page and commands as plain data."""
         return {"summary": self.summary, "page": self.page, "commands": list(self.commands)}
 
 

@@ -3,7 +3,20 @@
 import types
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
+
+
+class Frame(NamedTuple):
+    """What a function was bound from: the function, and what some names of its module stand for in it, by name."""
+
+    function: Callable[..., Any]
+    components: tuple[tuple[str, Any], ...]
+
+
+def frame_of(function: Callable[..., Any]) -> Frame | None:
+    """Return the frame of a function that ``bind`` made; None for any other."""
+    found: Frame | None = vars(function).get("frame")
+    return found
 
 
 def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) -> Callable[..., Any]:
@@ -25,4 +38,5 @@ def _bound(frame: Callable[..., Any], name: str, components: tuple[tuple[str, An
     # The name and module decide the name in the composed text, where two laws must not share one.
     made.__module__ = frame.__module__
     made.__annotations__ = frame.__annotations__
+    vars(made)["frame"] = Frame(frame, components)
     return made

@@ -30,9 +30,9 @@ def plain(value: Any) -> Any:
                 shown |= shown.pop(inner, {})
         return shown
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, tuple | list):
-        return [plain(item) for item in value]
+        return [plain(inner) for inner in value]
     return _plain_leaf(value)
 
 
@@ -62,9 +62,9 @@ def is_nested_too_deeply(document: Any) -> bool:
     """Tell whether tables and lists lie in each other more than ``MAXIMUM_LEVELS`` deep, or in themselves."""
     level: list[Any] = [document]
     for _ in range(MAXIMUM_LEVELS + 1):
-        level = [item for item in level if isinstance(item, Mapping | list | tuple)]
-        if not level:
+        tables = [value for value in level if isinstance(value, Mapping | list | tuple)]
+        if not tables:
             return False
-        inside = (item for table in level for item in (table.values() if isinstance(table, Mapping) else table))
-        level = list({id(item): item for item in inside}.values())
-    return any(isinstance(item, Mapping | list | tuple) for item in level)
+        inside = (value for table in tables for value in (table.values() if isinstance(table, Mapping) else table))
+        level = list({id(value): value for value in inside}.values())
+    return any(isinstance(value, Mapping | list | tuple) for value in level)

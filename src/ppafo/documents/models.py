@@ -35,18 +35,20 @@ def all_problems(details: list[ErrorDetails], model: type[BaseModel]) -> str:
 
     Of the many reasons why a value is none of several types the first is said, and of many problems the first ones.
     """
-    above = {item["loc"][:length] for item in details for length in range(len(item["loc"]))}
+    above = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
     # What is wrong with a table or list because of something in it is said there.
-    spots = {item["loc"]: (_spot(model, item["loc"]), item) for item in details if item["loc"] not in above}
-    of_values = {spot.path: (spot, item) for spot, item in reversed(spots.values()) if not is_gap(item)}
-    ordered = sorted(reversed(of_values.values()), key=lambda found: found[1]["type"] != "extra_forbidden")
+    spots = {detail["loc"]: (_spot(model, detail["loc"]), detail) for detail in details if detail["loc"] not in above}
+    of_values = {spot.path: (spot, detail) for spot, detail in reversed(spots.values()) if not is_gap(detail)}
+    ordered = sorted(reversed(of_values.values()), key=lambda problem: problem[1]["type"] != "extra_forbidden")
     said = []
-    for spot, item in ordered[:_MAXIMUM_SAID]:
-        is_unknown = item["type"] == "extra_forbidden"
-        said.append(_unknown_key(spot, model) if is_unknown else _SENTENCES.get(item["type"], _any_other)(spot, item))
+    for spot, detail in ordered[:_MAXIMUM_SAID]:
+        if detail["type"] == "extra_forbidden":
+            said.append(_unknown_key(spot, model))
+        else:
+            said.append(_SENTENCES.get(detail["type"], _any_other)(spot, detail))
     if len(ordered) > _MAXIMUM_SAID:
         said.append(f"and {len(ordered) - _MAXIMUM_SAID} more like these")
-    gaps = [f"{spot.path}{_GAPS[item['type']]}" for spot, item in spots.values() if is_gap(item)]
+    gaps = [f"{spot.path}{_GAPS[detail['type']]}" for spot, detail in spots.values() if is_gap(detail)]
     if gaps:
         said.append(said_missing(gaps))
     return "; ".join(said)
@@ -83,20 +85,20 @@ def _spot(model: Any, location: Iterable[int | str]) -> _Spot:
 
 def _kinds(node: Any) -> dict[str, Any]:
     """Return the members of a union of kinds by kind, nothing for any other type."""
-    tables = [item for item in _models_in(node) if "kind" in item.model_fields]
-    return {get_args(item.model_fields["kind"].annotation)[0]: item for item in tables}
+    tables = [table for table in _models_in(node) if "kind" in table.model_fields]
+    return {get_args(table.model_fields["kind"].annotation)[0]: table for table in tables}
 
 
 def _below(node: Any, part: str) -> Any:
     """Return the type of what a table has at a key, or a table or list by names or numbers at any; None if unknown."""
     if not _is_model(node):
-        members = [item for item in get_args(node) if item is not Ellipsis]
+        members = [member for member in get_args(node) if member is not Ellipsis]
         return members[-1] if members else None
     if part not in node.model_fields:
         return None
     annotation = node.model_fields[part].annotation
     # What may be left out, as X | None, is an X where it is there.
-    members = [item for item in get_args(annotation) if item is not type(None)]
+    members = [member for member in get_args(annotation) if member is not type(None)]
     return members[0] if get_origin(annotation) in (Union, UnionType) and len(members) == 1 else annotation
 
 
@@ -128,19 +130,19 @@ def _models_in(node: Any) -> list[Any]:
     """Return the tables that a value of some type can be; those in a list or under free names have no place to name."""
     if get_origin(node) is Annotated:
         return _models_in(get_args(node)[0])
-    return [item for item in get_args(node) if _is_model(item)] if get_origin(node) in (Union, UnionType) else []
+    return [member for member in get_args(node) if _is_model(member)] if get_origin(node) in (Union, UnionType) else []
 
 
 def _unknown_word(spot: _Spot, detail: ErrorDetails) -> str:
     """Say which words may stand there; the kind of a table is one of them."""
     is_kind, context = detail["type"] == "union_tag_invalid", detail["ctx"]
-    given = context["tag"] if is_kind else detail["input"]
+    word = context["tag"] if is_kind else detail["input"]
     said = context["expected_tags"] if is_kind else context["expected"].replace(" or ", ",")
     allowed = [name.strip(" '") for name in said.split(",")]
     refused = (
-        f"{spot.path}.kind = {quote(given)} is not known" if is_kind else f"{spot.path} = {quote(given)} is not allowed"
+        f"{spot.path}.kind = {quote(word)} is not known" if is_kind else f"{spot.path} = {quote(word)} is not allowed"
     )
-    return f"{refused}{nearest_name(str(given), allowed)}; allowed: {', '.join(allowed)}"
+    return f"{refused}{nearest_name(str(word), allowed)}; allowed: {', '.join(allowed)}"
 
 
 def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:

@@ -10,17 +10,16 @@ MAXIMUM_BYTES_TYPED = 1_000_000
 
 def read_regular_file(path: Path, maximum: int | None = None) -> bytes:
     """Return the content of a regular file, refused above ``maximum`` bytes; any OSError has its reason as text."""
-    found = path.stat()
-    mode = found.st_mode
-    if stat.S_ISDIR(mode):
+    status = path.stat()
+    if stat.S_ISDIR(status.st_mode):
         raise IsADirectoryError(None, "it is a directory, not a file")
-    if not stat.S_ISREG(mode):
+    if not stat.S_ISREG(status.st_mode):
         raise OSError(None, "it is a device or a pipe, not a regular file")
-    if maximum is None or found.st_size <= maximum:
+    if maximum is None or status.st_size <= maximum:
         with path.open("rb") as file:
             # Python takes the room for as much as is asked for; what grows meanwhile, or states no size, is read on.
-            content = file.read(found.st_size + 1)
-            if len(content) > found.st_size:
+            content = file.read(status.st_size + 1)
+            if len(content) > status.st_size:
                 content += file.read() if maximum is None else file.read(maximum + 1 - len(content))
         if maximum is None or len(content) <= maximum:
             return content
@@ -39,7 +38,7 @@ def decoded(content: bytes) -> str:
     if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return content.decode("utf-16")
     # Without a mark: two plain characters, each with a byte of zero behind it or before it.
-    for place, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
-        if len(content) >= _TWO_CHARACTERS and not any(content[place:4:2]) and all(content[1 - place : 4 : 2]):
+    for zero, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        if len(content) >= _TWO_CHARACTERS and not any(content[zero:4:2]) and all(content[1 - zero : 4 : 2]):
             return content.decode(encoding)
     return content.decode("utf-8-sig")

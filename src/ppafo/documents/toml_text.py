@@ -48,7 +48,7 @@ class TomlKind:
 
     def names(self) -> tuple[str, ...]:
         """Return the names of the files that come with the package."""
-        names = (Path(item.name) for item in self.shipped.iterdir())
+        names = (Path(file.name) for file in self.shipped.iterdir())
         return tuple(sorted(name.stem for name in names if name.suffix == _SUFFIX))
 
     def read(self, name_or_path: str | Path) -> bytes:

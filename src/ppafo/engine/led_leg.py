@@ -4,6 +4,7 @@ Foot, foot plate and vane turn as one body, whose inertia the plant has; what sh
 here. A walk's free foot has the same physics with more around it (``scheme/walking.py``).
 """
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,13 +16,19 @@ from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 
+
+def gait_bounds(_gait: ShankSeries) -> tuple[float, float]:
+    """No bounds: a shank goes where its gait was recorded, and nothing asks for more."""
+    return -math.inf, math.inf
+
+
 GAIT_SHANK = ProfileKind(
     name="gait",
     summary="The shank of a gait, whose ground is left out.",
     quantities=(),
     parameters=ShankSeries,
     value=shank_in_gait,
-    bounds=lambda gait: (-gait.start, gait.start),
+    bounds=gait_bounds,
 )
 """A shank whose knee moves too: its value is a ``ShankNow``. Any other profile leads a shank whose knee rests."""
 

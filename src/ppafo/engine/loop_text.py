@@ -10,13 +10,14 @@ from copy import deepcopy
 from types import FunctionType
 from typing import NamedTuple, Protocol
 
-from ppafo.engine.entries import indent
+from ppafo.engine.entries import HEADER, indent
 from ppafo.engine.generator import Composed, StepText
-from ppafo.engine.lane_rows import HANDED, VECTOR, lanes_of
+from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED, VECTOR, lanes_of
 from ppafo.engine.plain_python import parse_module
+from ppafo.engine.program import Program
 from ppafo.engine.reduction import HISTORIES, NUMBER, Reduction, Slot, is_known_part, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
-from ppafo.engine.source_text import Names
+from ppafo.engine.source_text import Names, SourceCollector
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
 from ppafo.errors import ProgramError
@@ -433,3 +434,9 @@ def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
     return "\n".join(
         [sample, f"def advance({', '.join(arguments)}):", *indent([*body, repr("Where it stands now."), *left])]
     )
+
+
+def write_lanes(program: Program, collector: SourceCollector, lanes: int = 0) -> str:
+    """Source text of a program of some lanes, 0 for as many as fit; ``collector`` then has all that it is made from."""
+    advance = lane_loop(StepText(program, collector), COMPILED, "advance", ARGUMENTS, lanes)
+    return f"{HEADER}\n\n{collector.text()}\n\n\n{advance}\n"

@@ -17,6 +17,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
+from ppafo.control.binding import frame_of
 from ppafo.engine.rows import is_row
 from ppafo.engine.source_text import MadeFrom, Read
 
@@ -135,6 +136,10 @@ def _named(item: Any) -> str:
     stands: Any = reduce(lambda owner, name: getattr(owner, name, None), names[1:], sys.modules.get(names[0]))
     if stands is item:
         return ".".join(names)
+    frame = frame_of(item) if isinstance(item, FunctionType) else None
+    if frame is not None:
+        components = ", ".join(f"{name}: {_described(component)}" for name, component in frame.components)
+        return f"{'.'.join(names)}({_named(frame.function)}; {components})"
     if is_row(item):
         # Made of others, such as the settings of a law with those of its estimator: its fields are all of it.
         kinds = (_named(kind) if is_row(kind) else repr(kind) for kind in item.__annotations__.values())

@@ -1,7 +1,7 @@
 """The environments as Gymnasium has them: one, or many side by side."""
 
-import copy
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,7 @@ FLAWED_SENSORS = (
     "sensors.angle_resolution=0.1 deg",
     "sensors.pressure_resolution=0.05 psi_d",
 )
-"""Those of the scenario torque-task-slow-valve."""
+"""Delay, noise and resolution of the sensors of the scenario torque-task-slow-valve."""
 FLAWED_WALK_SENSORS = (
     *FLAWED_SENSORS[1:],
     "sensors.force_noise=5 N",
@@ -80,104 +80,101 @@ HEADROOM = 2.0
 Observations = np.ndarray[Any, np.dtype[np.float32]]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What environments are made with beside their task; ``PneumaticEnv`` says what each is."""
+
+    scenario: str | Path | None = None
+    overrides: Sequence[str] = ()
+    actions: str = CONTINUOUS
+    randomise: bool = True
+    vary: Ranges | None = None
+    targets: tuple[str, str] = TARGETS
+    duration: float | None = None
+    error_weight: float | None = None
+    gas_weight: float | None = None
+    frame_skip: int = 1
+    observations: str = PHYSICAL
+
+    def __post_init__(self) -> None:
+        _check_word("actions", self.actions, (CONTINUOUS, ON_OFF))
+        _check_word("observations", self.observations, (PHYSICAL, SCALED))
+        if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
+            raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of samples, at least 1")
+
+
+def _check_word(name: str, word: Any, allowed: tuple[str, str]) -> None:
+    if word not in allowed:
+        hint = nearest_name(word, allowed)
+        raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
+
+
+def settings_of(arguments: Mapping[str, Any]) -> Settings:
+    """Return settings by name; ScenarioError for a name that is none."""
+    names = [field.name for field in fields(Settings)]
+    for name in arguments:
+        if name not in names:
+            hint = nearest_name(name, names)
+            raise ScenarioError(f"an environment has no argument '{name}'{hint}; it has {', '.join(names)}")
+    return Settings(**arguments)
+
+
 class World:
     """What one environment and many have in common: episodes, spaces, and lanes for as many as are asked for."""
 
-    def __init__(
-        self,
-        task: str,
-        scenario: str | Path | None,
-        overrides: Sequence[str],
-        actions: str,
-        randomise: bool,
-        vary: Ranges | None,
-        targets: tuple[str, str],
-        duration: float | None,
-        error_weight: float | None,
-        gas_weight: float | None,
-        frame_skip: int,
-        observations: str,
-    ) -> None:
-        self._arguments = (
-            task,
-            scenario,
-            overrides,
-            actions,
-            randomise,
-            vary,
-            targets,
-            duration,
-            error_weight,
-            gas_weight,
-            frame_skip,
-            observations,
-        )
+    def __init__(self, task: str, settings: Settings) -> None:
+        self.settings = settings
         self.task = TASKS[task]
-        for name, given, allowed in (
-            ("actions", actions, (CONTINUOUS, ON_OFF)),
-            ("observations", observations, (PHYSICAL, SCALED)),
-        ):
-            if given not in allowed:
-                hint = nearest_name(given, allowed)
-                raise ScenarioError(f"{name} = {given!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
-        if not (isinstance(frame_skip, int) and frame_skip >= 1):
-            raise ScenarioError(f"frame_skip = {frame_skip!r}: must be a whole number of samples, at least 1")
-        self.frame_skip = frame_skip
         usual, flaws = DEFAULTS[task]
-        file, flaws = (usual, flaws) if scenario is None else (scenario, ())
-        words = over(flaws, overrides, ScenarioError)
-        varied = VARIED.get(task, {}) if vary is None and scenario is None else vary or {}
+        is_usual = settings.scenario is None
+        file = usual if settings.scenario is None else settings.scenario
+        words = over(flaws if is_usual else (), settings.overrides, ScenarioError)
+        varied = VARIED.get(task, {}) if settings.vary is None and is_usual else settings.vary or {}
+        duration = settings.duration
         self.episodes: ScenarioEpisodes | WalkEpisodes
         if self.task.walks:
             if varied:
                 raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
             walk = load_walk(file, words)
             seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
-            self.episodes = walk_episodes(walk, randomise, seconds)
+            self.episodes = walk_episodes(walk, settings.randomise, seconds)
         else:
             own = () if duration is None else (f"run.duration={float(duration)!r} s",)
-            words = over(words, own, ScenarioError)
-            chosen = load_scenario(file, words)
+            chosen = load_scenario(file, over(words, own, ScenarioError))
             chosen.device.check_vane("an environment")
             if task == "torque" and chosen.controlled != TORQUE:
                 raise ScenarioError(
                     f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
                     "another scenario, or the task 'angle'"
                 )
-            self.episodes = scenario_episodes(chosen, randomise, varied, targets)
+            self.episodes = scenario_episodes(chosen, settings.randomise, varied, settings.targets)
         bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = Judging(
-            error_weight=self.task.error_weight if error_weight is None else error_weight,
-            gas_weight=self.task.gas_weight if gas_weight is None else gas_weight,
+            error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,
+            gas_weight=self.task.gas_weight if settings.gas_weight is None else settings.gas_weight,
             bounds=bounds,
         )
         self.observation_space = gymnasium.spaces.Box(*bounds.astype(np.float32), dtype=np.float32)
         self._middle, self._half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])
-        self.is_scaled = observations == SCALED
+        self.is_scaled = settings.observations == SCALED
         if self.is_scaled:
             self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, bounds.shape[1:], np.float32)
-        self.is_continuous = actions == CONTINUOUS
+        self.is_continuous = settings.actions == CONTINUOUS
         self.action_space: Any = gymnasium.spaces.Discrete(COMMANDS)
         if self.is_continuous:
             self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1 + self.task.walks,), np.float32)
 
-    def __reduce__(self) -> "tuple[type[World], tuple[Any, ...]]":
+    def __reduce__(self) -> "tuple[type[World], tuple[str, Settings]]":
         """Pickle by what it was made of: programs and what they are compiled to are found again."""
-        return World, self._arguments
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "World":
-        """Return the same: nothing in it changes from step to step but the generators of its spaces."""
-        other = copy.copy(self)
-        vars(other).update(
-            {name: copy.deepcopy(vars(self)[name], memo) for name in ("observation_space", "action_space")}
-        )
-        memo[id(self)] = other
-        return other
+        return World, (self.task.name, self.settings)
 
     def __copy__(self) -> "World":
-        other = object.__new__(World)
-        vars(other).update(vars(self))
-        return other
+        """Return this world itself: nothing in it changes from step to step."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "World":
+        """Return this world itself: an environment copies its spaces, with their generators, on its own."""
+        return self
 
     def lanes(self, count: int) -> Environments:
         """Return lanes for some environments."""
@@ -206,7 +203,7 @@ class World:
             bad = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
             raise SimulationError(f"the action of environment {bad} is {given[bad]}; it must be finite")
         seen = lanes.step()
-        for _ in range(self.frame_skip - 1):
+        for _ in range(self.settings.frame_skip - 1):
             seen = seen.then(lanes.step())
         return self._shown(seen)
 
@@ -253,38 +250,10 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
 
     metadata: dict[str, Any] = {"render_modes": [PICTURE], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own declaration
 
-    def __init__(
-        self,
-        task: str,
-        scenario: str | Path | None = None,
-        overrides: Sequence[str] = (),
-        actions: str = CONTINUOUS,
-        randomise: bool = True,
-        vary: Ranges | None = None,
-        targets: tuple[str, str] = TARGETS,
-        duration: float | None = None,
-        error_weight: float | None = None,
-        gas_weight: float | None = None,
-        frame_skip: int = 1,
-        observations: str = PHYSICAL,
-        render_mode: str | None = None,
-    ) -> None:
+    def __init__(self, task: str, render_mode: str | None = None, **settings: Any) -> None:
         if render_mode not in (None, PICTURE):
             raise ScenarioError(f"render_mode = {render_mode!r}: must be '{PICTURE}' or None")
-        self.world = World(
-            task,
-            scenario,
-            overrides,
-            actions,
-            randomise,
-            vary,
-            targets,
-            duration,
-            error_weight,
-            gas_weight,
-            frame_skip,
-            observations,
-        )
+        self.world = World(task, settings_of(settings))
         self.observation_space, self.action_space = self.world.observation_space, self.world.action_space
         self.render_mode = render_mode
         self._drawn: Floats | None = None
@@ -315,7 +284,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._drawn = drawn[:, 0]
         self._trail = []
         if self.render_mode is not None:
-            self._period = self.episode().controller.period * self.world.frame_skip
+            self._period = self.episode().controller.period * self.world.settings.frame_skip
             self._remember(float(seen.errors[0]))
         return seen.observations[0], {}
 
@@ -372,33 +341,10 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self,
         num_envs: int,
         task: str,
-        scenario: str | Path | None = None,
-        overrides: Sequence[str] = (),
-        actions: str = CONTINUOUS,
-        randomise: bool = True,
-        vary: Ranges | None = None,
-        targets: tuple[str, str] = TARGETS,
-        duration: float | None = None,
-        error_weight: float | None = None,
-        gas_weight: float | None = None,
-        frame_skip: int = 1,
-        observations: str = PHYSICAL,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        **settings: Any,
     ) -> None:
-        self.world = World(
-            task,
-            scenario,
-            overrides,
-            actions,
-            randomise,
-            vary,
-            targets,
-            duration,
-            error_weight,
-            gas_weight,
-            frame_skip,
-            observations,
-        )
+        self.world = World(task, settings_of(settings))
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}

@@ -347,10 +347,18 @@ def _search(work: _Work, start: Floats) -> Floats:
 
         # The first pass is robust: a number can lose its gradient at a bound while the clock is still wrong.
         result = least_squares(
-            weighted, point, slopes, (work.low, work.high), method="trf", x_scale="jac", xtol=1.0e-9, gtol=None,
-            ftol=_FINE if number else _ROUGH, loss="linear" if number else "soft_l1",
+            weighted,
+            point,
+            slopes,
+            (work.low, work.high),
+            method="trf",
+            x_scale="jac",
+            xtol=1.0e-9,
+            gtol=None,
+            ftol=_FINE if number else _ROUGH,
+            loss="linear" if number else "soft_l1",
             max_nfev=_FEW_EVALUATIONS if number > 1 else _EVALUATIONS,
-        )  # fmt: skip
+        )
         point = np.asarray(result.x)
         before, (noise, _) = noise, work.deviations(work.one(point)[:, None])
         if number and result.status > 0 and float(np.abs(np.log(noise / before)).max()) < _SETTLED:

@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Protocol, get_args, get_origin, get_type_hints
 
 VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
 PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
@@ -94,18 +94,29 @@ def number_of(hint: Any) -> Quantity | None:
     return next((item for item in declared if isinstance(item, Quantity)), None)
 
 
-def attribute_among(section: object, name: str, *fields: str) -> Any:
-    """Return what a section has by ``name`` in one of its ``fields``, a mapping or an object, for its ``__getattr__``.
+class Holding(Protocol):
+    """A section of a scenario or device that has numbers of its fields ``HELD``, mappings or objects, as its own."""
 
-    AttributeError where none has it.
-    """
-    if not name.startswith("_") and name not in fields:  # a copy asks for these before there are any fields
-        for field in fields:
+    HELD: ClassVar[tuple[str, ...]]
+
+
+def held_in(section: Holding, name: str) -> str | None:
+    """Return which field of ``HELD`` has a number; None where none has it."""
+    for field in section.HELD:
+        inner = getattr(section, field)
+        if name in inner if isinstance(inner, Mapping) else hasattr(inner, name):
+            return field
+    return None
+
+
+def held(section: Holding, name: str) -> Any:
+    """Return a number of one of the fields of ``HELD``, for ``__getattr__``; AttributeError where none has it."""
+    # A copy asks for names that begin so, and for the fields themselves, before there are any.
+    if not name.startswith("_") and name not in section.HELD:
+        field = held_in(section, name)
+        if field is not None:
             inner = getattr(section, field)
-            if isinstance(inner, Mapping) and name in inner:
-                return inner[name]
-            if hasattr(inner, name) and not isinstance(inner, Mapping):
-                return getattr(inner, name)
+            return inner[name] if isinstance(inner, Mapping) else getattr(inner, name)
     raise AttributeError(f"{type(section).__name__} has no '{name}'")
 
 

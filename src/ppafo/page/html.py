@@ -97,7 +97,7 @@ def digest(text: str) -> str:
 
 
 def packed_once(content: bytes) -> str:
-    """Return the same of what many pages hold, from the disk where it was packed before."""
+    """Return content that many pages hold, compressed, in base 85; from the disk where it was packed before."""
     return kept_bytes("packed", hashlib.sha256(content).hexdigest(), lambda: packed(content).encode()).decode()
 
 

@@ -76,7 +76,7 @@ def _known() -> dict[str, Any]:
 def computed_opening(
     scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
-    """Return the same as ``opening_of``, computed."""
+    """Return what a page shows of a scenario before it has simulated anything: runs and bands, computed now."""
     from ppafo.simulation.ensemble import run_ensemble  # a report computes nothing
 
     known = [one["name"] for one in module.description["metrics"]]

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
-from ppafo.model.declaration import Number, attribute_among
+from ppafo.model.declaration import Number, held
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
 from ppafo.parameters.joint import ANKLE, Joint
@@ -73,10 +73,11 @@ class Actuator:
     kind: str = VANE
     settings: Mapping[str, float] = field(default_factory=dict)
     table: Any = None
+    HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
-        return attribute_among(self, name, "settings")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,10 +134,11 @@ class Valve:
     kind: str
     orifice: Orifice | SonicOrifice
     settings: Mapping[str, float]
+    HELD: ClassVar[tuple[str, ...]] = ("settings", "orifice")
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting, or a number of the orifice, by its name."""
-        return attribute_among(self, name, "settings", "orifice")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)

@@ -107,7 +107,7 @@ def parameter_file() -> type[BaseModel]:
 
 
 def whole_parameter_file() -> type[BaseModel]:
-    """Return the same for all valves, actuators and effects of this package too."""
+    """Return the model of a parameter file that may have every valve, actuator and effect of this package."""
     for kinds in _KINDS:
         kinds.load_own()
     return parameter_file()

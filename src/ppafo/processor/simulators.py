@@ -345,7 +345,7 @@ _SHIFT = 7
 _NANOSECONDS = 2**_SHIFT
 """What an instruction takes of the machine's time [ns]: more than two ticks of the counter, so that none is missed."""
 _COUNTER_BITS = 24
-"""Those of SysTick, which counts the ticks of the processor's clock down."""
+"""Bits of SysTick, the counter that counts the ticks of the processor's clock down."""
 _PIECE = 1024
 """Bytes that are read or written at once; a packet has no room for many more."""
 _FORM_OF_OUTPUTS = struct.Struct("<hhII")

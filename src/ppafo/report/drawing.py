@@ -70,7 +70,7 @@ def _load_late(name: str) -> None:
 
 @contextmanager
 def _replaced(names: dict[str, Any], name: str, stand_in: object) -> Iterator[None]:
-    """Let a name stand for something else for the length of a ``with`` block."""
+    """Replace a name in a dictionary for the length of a ``with`` block."""
     before = names.get(name)
     names[name] = stand_in
     try:
@@ -84,7 +84,7 @@ def _replaced(names: dict[str, Any], name: str, stand_in: object) -> Iterator[No
 
 @contextmanager
 def _attribute_replaced(owner: Any, name: str, stand_in: object) -> Iterator[None]:
-    """The same of an attribute of a class; nothing where it is not there, as in another version."""
+    """Replace an attribute of a class for the length of a ``with`` block; nothing where another version has none."""
     before = vars(owner).get(name)
     if before is None:
         yield

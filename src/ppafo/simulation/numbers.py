@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.catalog import VALVES, device_effects, find_effects
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import Quantity, held_in
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
@@ -39,8 +39,6 @@ _TEXTS = (
     "motion.shank.kind",
     "motion.shank.gait",
 )
-_HOLDERS = ("settings", "orifice", "leg")
-"""Fields whose numbers are attributes of what has them."""
 _RATE, _PERIOD = "controller.rate", "controller.period"
 _UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
@@ -58,15 +56,14 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
     """Return the declaration of every number of a device, by path; both forms of an orifice."""
-    found = {
-        f"{section}.{item.name}": item
-        for section in _DEVICE_SECTIONS
-        for item in members(section, device.actuator.kind)
-    }
-    found |= {f"actuator.leak.{item.name}": item for item in ORIFICE}
-    effects, gas = device_effects(), device.gas.species
-    found |= {f"{effect.section}.{item.name}": item for effect in effects for item in effect.quantities_in(gas)}
-    return found | {f"valve.{item.name}": item for item in (*ORIFICE, *VALVES[device.valve.kind].quantities)}
+    kind, species = device.actuator.kind, device.gas.species
+    declared = [(section, quantity) for section in _DEVICE_SECTIONS for quantity in members(section, kind)]
+    declared += [("actuator.leak", quantity) for quantity in ORIFICE]
+    declared += [
+        (effect.section, quantity) for effect in device_effects() for quantity in effect.quantities_in(species)
+    ]
+    declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
+    return {f"{section}.{quantity.name}": quantity for section, quantity in declared}
 
 
 def device_number_at(device: Device, path: str) -> float:
@@ -80,62 +77,62 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     What follows a number that is replaced moves with it. An orifice given in the other form takes that form; both
     numbers of it must be there.
     """
-    given = {chosen_path(path, scenario): number for path, number in numbers.items()}
-    chosen = moving_together(scenario, given)
-    # All links that are left are the scenario's own, for what was given follows nothing any more.
-    if given:
+    replaced = {chosen_path(path, scenario): number for path, number in numbers.items()}
+    moved = moving_together(scenario, replaced)
+    # All links that are left are the scenario's own, for what is replaced follows nothing any more.
+    if replaced:
         device = replace(scenario.device, links={})
-        scenario = replace(scenario, device=device, links=left(scenario.graph, given))
-    for section, place in _ORIFICES.items():
+        scenario = replace(scenario, device=device, links=left(scenario.graph, replaced))
+    for section, attributes in _ORIFICES.items():
         form = other_form(scenario.device, section)
-        if any(f"{section}.{name}" in chosen for name in form):
-            new = {name: chosen.pop(f"{section}.{name}") for name in form}
+        if any(f"{section}.{name}" in moved for name in form):
+            in_form = {name: moved.pop(f"{section}.{name}") for name in form}
             kind = SonicOrifice if "sonic_conductance" in form else Orifice
-            scenario = _replace_number(scenario, place, kind(**new))
-    for path, number in chosen.items():
-        scenario = _replace_number(scenario, _place(path, scenario), number)
+            scenario = _replace_number(scenario, attributes, kind(**in_form))
+    for path, number in moved.items():
+        scenario = _replace_number(scenario, _attributes(path, scenario), number)
     return scenario
 
 
-def moving_together(scenario: Scenario, given: Mapping[str, Any]) -> dict[str, Any]:
+def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str, Any]:
     """Return numbers by path with all that follow them as in a file with these numbers; ``TIMES`` do not follow.
 
     What was changed since the scenario was loaded follows nothing any more.
     """
     links = links_that_hold(scenario)
     # What follows the sample period follows a rate that is given for it.
-    period = {_PERIOD: 1.0 / given[_RATE]} if _RATE in given and _PERIOD not in given else {}
-    found = resolved(links, {**given, **period}, lambda path: _number(scenario, _place(path, scenario)))
-    return {path: number for path, number in found.items() if path not in period}
+    period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
+    moved = resolved(links, {**replaced, **period}, lambda path: _number(scenario, _attributes(path, scenario)))
+    return {path: number for path, number in moved.items() if path not in period}
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario without links of numbers that were changed since it was loaded."""
-    return holding(scenario.graph, lambda path: _number(scenario, _place(path, scenario)))
+    return holding(scenario.graph, lambda path: _number(scenario, _attributes(path, scenario)))
 
 
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
-    return float(_number(scenario, _place(chosen_path(path, scenario), scenario)))
+    return float(_number(scenario, _attributes(chosen_path(path, scenario), scenario)))
 
 
-def _number(node: Any, place: tuple[str, ...]) -> Any:
-    for part in place:
-        node = _inner(node, part)
+def _number(node: Any, attributes: tuple[str, ...]) -> Any:
+    for name in attributes:
+        node = _inner(node, name)
     return node
 
 
-def _inner(node: Any, part: str) -> Any:
+def _inner(node: Any, name: str) -> Any:
     # A device has settings of the effects that its set names; those of all others are their defaults.
-    if part == EFFECT_SETTINGS and isinstance(node, Device):
+    if name == EFFECT_SETTINGS and isinstance(node, Device):
         return all_settings(node)
-    return node[part] if isinstance(node, Mapping) else getattr(node, part)
+    return node[name] if isinstance(node, Mapping) else getattr(node, name)
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
     """Return the names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
-    return tuple(item.name for item in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
+    return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:
@@ -145,29 +142,25 @@ def path_of_locked_angle(scenario: Scenario) -> str | None:
     return LOCKED_ANGLE if LOCKED_ANGLE in scenario.motion.motion_kind.places else "motion.profile.level"
 
 
-def _place(path: str, scenario: Scenario) -> tuple[str, ...]:
+def _attributes(path: str, scenario: Scenario) -> tuple[str, ...]:
     """Return the attributes that lead from the scenario to a number: its path, unless its motion says otherwise."""
-    places = scenario.motion.motion_kind.places
-    if path in places:
-        return places[path]
-    parts = tuple(path.split("."))
-    return ("device", *parts) if parts[0] in _OF_DEVICE else parts
+    of_motion = scenario.motion.motion_kind.places
+    if path in of_motion:
+        return of_motion[path]
+    names = tuple(path.split("."))
+    return ("device", *names) if names[0] in _OF_DEVICE else names
 
 
-def _replace_number(node: Any, parts: tuple[str, ...], number: Any) -> Any:
-    name, inside = parts[0], parts[1:]
+def _replace_number(node: Any, attributes: tuple[str, ...], number: Any) -> Any:
+    name, inside = attributes[0], attributes[1:]
     inner = _replace_number(_inner(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
         return {**node, name: inner}
-    if any(item.name == name for item in fields(node)):
+    if any(field.name == name for field in fields(node)):
         return replace(node, **{name: inner})
-    # Among its settings, in its orifice or on its leg: there it is an attribute of its own all the same.
-    holder = next(field for field in _HOLDERS if _has(getattr(node, field, None), name))
-    return replace(node, **{holder: _replace_number(getattr(node, holder), parts, number)})
-
-
-def _has(inner: Any, name: str) -> bool:
-    return name in inner if isinstance(inner, Mapping) else hasattr(inner, name)
+    holder = held_in(node, name)
+    assert holder is not None, f"a declared number '{name}' is in a {type(node).__name__}"
+    return replace(node, **{holder: _replace_number(getattr(node, holder), attributes, number)})
 
 
 @dataclass(frozen=True, slots=True)

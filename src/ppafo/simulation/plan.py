@@ -461,7 +461,7 @@ def state_with_volumes(
     pressure_1: float,
     pressure_2: float,
 ) -> PlantState:
-    """As ``state_at_start``, of chambers whose volumes [m^3] at that angle and those pressures are known."""
+    """The vane at an angle [rad] with a rate [rad/s], and chambers [m^3] filled to absolute pressures [Pa]."""
     return PlantState(
         angle=angle,
         angular_velocity=angular_velocity,

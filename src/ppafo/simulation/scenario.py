@@ -14,7 +14,7 @@ from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import Number, attribute_among
+from ppafo.model.declaration import Number, held
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Graph
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
@@ -34,10 +34,11 @@ class ProfileChoice:
 
     kind: str
     settings: Mapping[str, float]
+    HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
-        return attribute_among(self, name, "settings")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,10 +84,11 @@ class FreeMotion:
     leg: Leg | None = None
     profile: ClassVar[None] = None
     locked_angle: ClassVar[None] = None
+    HELD: ClassVar[tuple[str, ...]] = ("leg",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a number of the leg by its name."""
-        return attribute_among(self, name, "leg")
+        return held(self, name)
 
     @property
     def motion_kind(self) -> MotionKind:
@@ -272,10 +274,11 @@ class Control:
     settings: Mapping[str, float]
     period: float
     custom: PythonController | None = None
+    HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
-        return attribute_among(self, name, "settings")
+        return held(self, name)
 
 
 @dataclass(frozen=True, slots=True)

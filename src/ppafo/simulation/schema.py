@@ -187,7 +187,7 @@ def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:
 
 
 def whole_scenario_file() -> type[BaseModel]:
-    """Return the same for all controllers of this package too."""
+    """Return the model of a scenario file that may have every controller of this package."""
     CONTROLLERS.load_own()
     return scenario_file()
 

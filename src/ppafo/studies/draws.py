@@ -74,7 +74,7 @@ class Uncertainty:
         return self.columns(uniform)
 
     def with_noise_of(self, scenarios: Iterable[Scenario]) -> "Uncertainty":
-        """Return the same with a noise stream for each draw, where any of some scenarios is noisy."""
+        """Return the uncertainty with a noise stream for each draw as well, where any of some scenarios is noisy."""
         drawn, scores = with_noise(self.drawn, self.scores, scenarios, self.paths)
         return replace(self, drawn=drawn, scores=scores)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 
 from ppafo.engine.entries import INLINE
-from ppafo.engine.lane_source import write_lanes
+from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.translation import typed

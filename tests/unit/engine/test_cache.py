@@ -12,7 +12,6 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import INLINE
-from ppafo.engine.lane_source import lane_source
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import isothermal
@@ -20,6 +19,7 @@ from ppafo.errors import SimulationError
 from ppafo.model import orifice
 from ppafo.model.valves.proportional import IDEAL
 from tests.compilers_here import ScriptCompiler
+from tests.composed_programs import lane_source
 from tests.reference.reference_slopes import right_hand_side_source
 
 START = """

@@ -5,7 +5,6 @@ from typing import Any
 
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, lanes_of
-from ppafo.engine.lane_source import lane_source
 from ppafo.engine.loop_text import LoopText, RowsOfLanes
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
@@ -16,6 +15,7 @@ from ppafo.simulation.plan import plan_run
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
+from tests.composed_programs import lane_source
 
 
 def test_blocks_are_as_large_as_the_first_cache_allows_and_never_less_than_a_vector() -> None:

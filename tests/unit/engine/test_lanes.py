@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from ppafo.engine.lane_rows import lanes_of
-from ppafo.engine.lanes import Batch, begin_block, run_batch
+from ppafo.engine.lanes import Batch, LaneBlock, begin_block, run_batch
+from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together, state_row_numbers
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -162,3 +163,29 @@ def test_noise_depends_on_the_seed_and_not_on_the_place() -> None:
     assert np.array_equal(results[0].record, results[39].record)
     other = dataclasses.replace(runs[0], sensors=runs[0].sensors._replace(seed=99.0))
     assert not np.array_equal(results[0].record, run_together([other])[0].record)
+
+
+class BegunError(Exception):
+    """The first block begins."""
+
+
+SAID = (
+    "ppafo: Python runs these models, which takes about 3 min 0 s; compiled it takes seconds: install gcc or clang, "
+    "or 'pip install ppafo[native]', which brings zig"
+)
+
+
+@pytest.mark.parametrize(("count", "said"), [(1, []), (300, [SAID])])
+def test_where_python_runs_them_many_runs_say_before_they_begin_how_long_they_take(
+    count: int, said: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def begin(_block: LaneBlock, _steps: int) -> None:
+        raise BegunError
+
+    monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
+    monkeypatch.setattr(LaneBlock, "advance", begin)
+    alone = batch_of(plan_run(load_scenario("torque-task-proportional")))
+    columns = (np.repeat(rows, count, axis=1) for rows in (alone.parameters, alone.states))
+    with pytest.raises(BegunError):
+        run_batch(Batch(alone.program, alone.clock, *columns))
+    assert caplog.messages == said

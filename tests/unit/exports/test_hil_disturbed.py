@@ -20,7 +20,9 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, SILENT, RealTime
-from ppafo.exports.hil.run import HardwareRun, Plant, plant_of, run_plant
+from ppafo.exports.hil.plant import Plant, plant_of
+from ppafo.exports.hil.result import HardwareRun
+from ppafo.exports.hil.run import run_plant
 from ppafo.exports.hil.wire import Reader, Sample, open_port, sample_bytes
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.loading import load_scenario

@@ -13,7 +13,9 @@ from ppafo.engine.lanes import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, RealTime, Row
-from ppafo.exports.hil.run import HardwareRun, Plant, check_baud, longest_silence, plant_of, run_plant
+from ppafo.exports.hil.plant import Plant, check_baud, plant_of
+from ppafo.exports.hil.result import HardwareRun, longest_silence
+from ppafo.exports.hil.run import run_plant
 from ppafo.exports.hil.wire import OVER, VENTED, Answer, Sample, answer_bytes
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT

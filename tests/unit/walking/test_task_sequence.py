@@ -9,7 +9,6 @@ import pytest
 
 from ppafo.analyses.endurance.draw import walk_gas
 from ppafo.analyses.walk.task_sequence import task_sequence_parts
-from ppafo.engine.lane_source import lane_source
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait
 from ppafo.model.contact import FLAT
@@ -21,6 +20,7 @@ from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.strides import steady_strides, task_sequence_metrics
 from ppafo.walking.task_sequence import FILE, TaskSequence, load_task_sequence
 from ppafo.walking.walk import Comparison
+from tests.composed_programs import lane_source
 
 HEAD = 'schema_version = 1\nname = "tried"\n'
 STAND = '[[segment]]\nkind = "stand"\nduration = "1 s"\n'

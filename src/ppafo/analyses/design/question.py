@@ -65,8 +65,8 @@ def design(
     from ppafo.analyses.design.front.solve import find_front
     from ppafo.analyses.design.loading import load_design
     from ppafo.analyses.design.profile import answer as profile
-    from ppafo.analyses.design.profile.answer import size_for_profile
     from ppafo.analyses.design.profile.problem import SizingProblem
+    from ppafo.analyses.design.profile.solve import size_for_profile
     from ppafo.analyses.design.solve import FOR_A_WEARER
     from ppafo.analyses.design.wearer import answer as wearer
     from ppafo.analyses.design.wearer.solve import size_for_wearer

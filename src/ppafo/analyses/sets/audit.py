@@ -25,80 +25,99 @@ def audited(
     Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
     """
     sets = [apply_overrides(load_parameter_set(name), overrides) for name in names]
-    # Each is compared with the set that was given, else with the one that its file names, if it names any.
-    parents: list[ParameterSet | None] = []
-    for one in sets:
-        with refused_as(ParameterError, "--parent" if parent else f"{one.file}: parent", ParameterError):
-            parents.append(load_parameter_set(parent or one.parent) if parent or one.parent else None)
-    found = [(one, audit(one, parent=other)) for one, other in zip(sets, parents, strict=True)]
-    documents: list[dict[str, Any]] = [
-        {
-            "set": one.name,
-            "overrides": list(overrides),
-            "counts": _counts(findings),
-            "findings": [finding.document() for finding in findings],
-            "parent": None if other is None else other.name,
-            "changes": [] if other is None else [asdict(change) for change in changes(one, other)],
-        }
-        for (one, findings), other in zip(found, parents, strict=True)
-    ]
-    compares = parents[0] is not None or bool(overrides)
-    is_one = len(found) == 1
-    if is_one:
+    parents = [_parent(parameter_set, parent) for parameter_set in sets]
+    findings = [audit(parameter_set, parent=before) for parameter_set, before in zip(sets, parents, strict=True)]
+    documents = [_document(*audited_set, overrides) for audited_set in zip(sets, parents, findings, strict=True)]
+    if len(sets) == 1:
+        compares = parents[0] is not None or bool(overrides)
         changed = changed_paths(sets[0], parents[0]) if compares and not is_whole else None
-        parts = _parts(*found[0], changed)
+        parts = _parts(sets[0], findings[0], changed)
         if parents[0] is not None:
-            name, parent, values = sets[0].name, parents[0].name, documents[0]["changes"]
-            count = f"{len(values)} value{'' if len(values) == 1 else 's'}" if values else "nothing"
-            rows = [(one["path"], one["before"] or None, one["after"] or None, one["origin"]) for one in values]
-            said = f"{name} changes {count} of its parent {parent}"
-            parts.insert(0, Part(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4))
+            parts.insert(0, _changes_part(sets[0].name, parents[0].name, documents[0]["changes"]))
     else:
-        # A row for each finding and a column for each set, with how serious it is there.
-        verdicts = [{one.id: "accepted" if one.accepted else one.severity for one in findings} for _, findings in found]
-        head = ["finding", *(one.name for one in sets)]
-        ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
-        parts = [Part(columns=columns_of(head, ([name, *(each.get(name) for each in verdicts)] for name in ids)))]
+        parts = [_table(sets, findings)]
     return Report(
-        name=f"audit-{sets[0].name}" if is_one else "audit",
+        name=f"audit-{sets[0].name}" if len(sets) == 1 else "audit",
         kicker="Audit",
-        title=", ".join(one.name for one in sets),
+        title=", ".join(parameter_set.name for parameter_set in sets),
         said=(),
         parts=parts,
-        found=documents[0] if is_one else {"sets": documents},
-        passed=not any(_counts(findings)["error"] for _, findings in found),
+        found=documents[0] if len(sets) == 1 else {"sets": documents},
+        passed=not any(document["counts"]["error"] for document in documents),
         kind="measured",
         command="sets audit",
     )
+
+
+def _parent(parameter_set: ParameterSet, parent: str | None) -> ParameterSet | None:
+    """Return the set to compare with: the one of the argument, else the one that the file names, if it names any."""
+    name = parent or parameter_set.parent
+    if not name:
+        return None
+    with refused_as(ParameterError, "--parent" if parent else f"{parameter_set.file}: parent", ParameterError):
+        return load_parameter_set(name)
+
+
+def _document(
+    parameter_set: ParameterSet, parent: ParameterSet | None, findings: list[Finding], overrides: Sequence[str]
+) -> dict[str, Any]:
+    return {
+        "set": parameter_set.name,
+        "overrides": list(overrides),
+        "counts": _counts(findings),
+        "findings": [finding.document() for finding in findings],
+        "parent": None if parent is None else parent.name,
+        "changes": [] if parent is None else [asdict(change) for change in changes(parameter_set, parent)],
+    }
 
 
 def _counts(findings: list[Finding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
+def _counted(count: int, noun: str) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Part:
+    """Return what a set changes of its parent."""
+    rows = [(change["path"], change["before"] or None, change["after"] or None, change["origin"]) for change in changed]
+    said = f"{name} changes {_counted(len(rows), 'value') if rows else 'nothing'} of its parent {parent}"
+    return Part(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
+
+
+def _table(sets: list[ParameterSet], findings: list[list[Finding]]) -> Part:
+    """Return a row for each finding and a column for each set, with how serious it is there."""
+    verdicts = [
+        {finding.id: "accepted" if finding.accepted else finding.severity for finding in of_set} for of_set in findings
+    ]
+    head = ["finding", *(parameter_set.name for parameter_set in sets)]
+    ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
+    return Part(columns=columns_of(head, ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)))
+
+
 def _parts(parameter_set: ParameterSet, findings: list[Finding], changed: frozenset[str] | None) -> list[Part]:
     """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
     shown = [
-        one
-        for one in findings
+        finding
+        for finding in findings
         if changed is None
-        or one.severity == "error"
-        or not one.values
-        or any(value.path in changed for value in one.values)
+        or finding.severity == "error"
+        or not finding.values
+        or any(value.path in changed for value in finding.values)
     ]
-    summary = ", ".join(f"{n} {severity}{'' if n == 1 else 's'}" for severity, n in _counts(findings).items())
+    summary = ", ".join(_counted(count, severity) for severity, count in _counts(findings).items())
     left = len(findings) - len(shown)
-    rest = f"; {left} of them concern{'s' if left == 1 else ''} no changed value: --all" if left else ""
-    return [*(Part(said=_lines(one)) for one in shown), Part(said=[f"{parameter_set.name}: {summary}{rest}"])]
+    if left:
+        summary += f"; {left} of them {'concerns' if left == 1 else 'concern'} no changed value: --all"
+    return [*(Part(said=_lines(finding)) for finding in shown), Part(said=[f"{parameter_set.name}: {summary}"])]
 
 
 def _lines(finding: Finding) -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
-    lines += [
-        f"{_INDENT}{value.path} = {value.value if isinstance(value.value, str) else f'{value.value:.6g}'} {value.unit} "
-        f"({value.origin})"
-        for value in finding.values
-    ]
+    for value in finding.values:
+        text = value.value if isinstance(value.value, str) else f"{value.value:.6g}"
+        lines.append(f"{_INDENT}{value.path} = {text} {value.unit} ({value.origin})")
     lines += textwrap.wrap(finding.paragraph, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT)
     if finding.accepted:
         accepted = f"Accepted by the set: {finding.accepted}"

@@ -32,7 +32,9 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def moving(parts: Program, lane: Lane) -> MovingGas:
-    """The first stage of chambers that move."""
+    """The first stage of chambers that move; lines, and a gas that is not ideal, have more around it."""
+    if parts.has_true_masses:
+        return lane.real_gas.moving
     return lane.moving_gas if parts.feed is None else lane.fed_gas.chambers
 
 

@@ -56,7 +56,7 @@ class Recorded:
         )
 
     def document(self) -> dict[str, Any]:
-        """Return the same as plain data, in SI units."""
+        """Return samples, channels, losses and how it ended as plain data, in SI units."""
         recording = self.recording
         return {
             "samples": len(recording),

@@ -1,284 +1,25 @@
-"""A scenario at the wire, from its settings to a folder: plant, run, result, log, how the link did.
+"""A scenario at the wire, from its settings to what came of it.
 
-The plant is the compiled module with one run, whose command comes from outside. Why in this process and not in one of
-its own: docs/decisions/0022-processor-and-hardware-in-the-loop.md.
+The plant runs in this process: why not in one of its own, docs/decisions/0022-processor-and-hardware-in-the-loop.md.
 """
 
-import csv
-import io
 import os
 import platform
 import random
-import statistics
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from collections.abc import Callable
 
-import numpy as np
-
-from ppafo.documents.json_text import json_text, plain
-from ppafo.engine.lanes import Advancing, load_program
-from ppafo.engine.loading import backend_described
-from ppafo.engine.run import Run, batch_of
-from ppafo.errors import ScenarioError
+from ppafo.engine.run import batch_of
 from ppafo.exports.hil import wire
-from ppafo.exports.hil.loop import Bench, Exchange, LockStep, Pace, RealTime, Row, without_collections
-from ppafo.model.controlled import TORQUE
-from ppafo.model.valves import vent_valve
-from ppafo.parameters.plant import valve_settings
-from ppafo.report.recording_figure import recording_figure
-from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
-from ppafo.simulation.plan import plan_run
+from ppafo.exports.hil.loop import Bench, LockStep, Pace, RealTime, without_collections
+from ppafo.exports.hil.plant import Plant, check_baud, plant_of
+from ppafo.exports.hil.result import HardwareRun, Machine, timing_of
 from ppafo.simulation.sampled import SampledRun
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
-from ppafo.simulation.simulate import Result, result_of
-from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import result_of
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-
-CHANNELS_SENT = 5
-
-
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """A scenario without its controller: how it is run, and what compiled it."""
-
-    scenario: Scenario
-    run: Run
-    module: Advancing
-    compiled_by: str
-    period: float
-
-
-def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
-    """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
-    if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
-        raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
-    if scenario.controlled != TORQUE:
-        raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': a controller at the wire is sent a torque; "
-            "take a scenario whose reference is one"
-        )
-    period = 1.0 / rate
-    chosen = replace(
-        scenario,
-        # No step may be longer than a sample: a command acts from its sample on.
-        run=replace(scenario.run, step=min(scenario.run.step, period)),
-        controller=Control(PYTHON_CONTROLLER, {}, period),
-    )
-    run = plan_run(chosen)
-    valve = chosen.device.valve
-    if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve_settings(valve))))
-    module = load_program(batch_of(run).program)
-    return Plant(chosen, run, module, backend_described(), period)
-
-
-def check_baud(baud: int, rate: int) -> None:
-    """Refuse a serial line that cannot carry the samples."""
-    needed = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE * rate
-    if baud < needed:
-        raise ScenarioError(
-            f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
-            f"here at most {baud // (wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE)}"
-        )
-
-
-LOG_COLUMNS = (
-    *("sequence [-]", "due [s]", "sent_late [s]", "answered_after [s]"),
-    *("command [-]", "controller_time [s]", "vented [-]"),
-)
 _LARGEST_RUN = 2**16 - 1
-_PER_THOUSAND = 1.0e3
 _SAME = 1.0e-9
-_BINS = 60
-_SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
-"""Ends of the axis of times [ms]; longer ones make it longer."""
-
-
-@dataclass(frozen=True, slots=True)
-class Machine:
-    """What the plant ran on: system, cores, Python, and the load (mean number of processes that run, 1 min) around it.
-
-    The load is None where the system does not tell it.
-    """
-
-    system: str
-    cores: int
-    python: str
-    load_before: float | None
-    load_after: float | None
-
-
-def load_now() -> float | None:
-    """Processes that run on this computer, on average over the last minute [-]."""
-    try:
-        return os.getloadavg()[0]
-    except (AttributeError, OSError):
-        return None
-
-
-class Timing(NamedTuple):
-    """How late samples were sent, after how long they were answered [s], and how many had no answer of their own.
-
-    Samples with which a stopped run was vented are not among them: they were not sent.
-    """
-
-    sent_late: list[float]
-    answered_after: list[float]
-    missed: int
-
-
-def timing_of(rows: Sequence[Row]) -> Timing:
-    """Return the timing of the samples of a log."""
-    sent = [row for row in rows if row.sent_late is not None]
-    answered = [row.answered_after for row in sent if row.answered_after is not None]
-    return Timing([row.sent_late for row in sent if row.sent_late is not None], answered, len(sent) - len(answered))
-
-
-@final
-@dataclass(frozen=True, slots=True)
-class HardwareRun:
-    """A run at the wire: the result, what went over the wire and when, and the machine."""
-
-    plant: Plant
-    result: Result
-    exchange: Exchange
-    timing: Timing
-    machine: Machine
-
-    @property
-    def is_good(self) -> bool:
-        """True where the run went to its end, and nothing vented the plant."""
-        return self.result.status.is_completed and not self.exchange.vented
-
-    def document(self) -> dict[str, Any]:
-        """The content of ``link.json``, in SI units."""
-        exchange, timing = self.exchange, self.timing
-        return {
-            "rate": round(1.0 / self.plant.period),
-            "samples": len(timing.sent_late),
-            "answered": len(timing.answered_after),
-            "missed": timing.missed,
-            "longest_silence": longest_silence(exchange.rows) * self.plant.period,
-            "sent_late": spread(timing.sent_late),
-            "answered_after": spread(timing.answered_after),
-            "stood_still": list(exchange.stood_still),
-            "taken": exchange.taken,
-            "refused": dict(exchange.refused),
-            "ignored": dict(exchange.ignored),
-            "strangers": exchange.strangers,
-            "is_real_time": exchange.is_real_time,
-            "vented": exchange.vented or None,
-            "vented_at": exchange.vented_at,
-            "is_stopped": exchange.is_stopped,
-            "failure": exchange.failure or None,
-            "plant": self.plant.compiled_by,
-            "machine": {name: getattr(self.machine, name) for name in Machine.__slots__},
-        }
-
-    def outcome(self, port: str) -> dict[str, Any]:
-        """Return scenario, port, status, link and metrics as plain data."""
-        return {
-            "scenario": self.result.scenario.name,
-            "port": port,
-            "status": plain(self.result.status),
-            "link": self.document(),
-            "metrics": {name: plain(metric) for name, metric in self.result.metrics.items()},
-        }
-
-    def text(self) -> str:
-        """The run in words."""
-        exchange, timing, machine = self.exchange, self.timing, self.machine
-        others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
-        silence = longest_silence(exchange.rows) * self.plant.period
-        loads = "".join(
-            f", load {load:.2f} {when}"
-            for load, when in ((machine.load_before, "before"), (machine.load_after, "after"))
-            if load is not None
-        )
-        still = exchange.stood_still
-        stood = f"stood still {len(still)} times, {sum(still):.3g} s in all" if still else "never stood still"
-        lines = [
-            f"samples    {len(timing.sent_late)} sent, {len(timing.answered_after)} answered, {timing.missed} missed; "
-            f"longest silence {silence * _PER_THOUSAND:.3g} ms",
-            *(
-                (
-                    f"answers    {described_spread(timing.answered_after)}",
-                    f"sent late  {described_spread(timing.sent_late)}",
-                    f"time       {stood}",
-                )
-                if exchange.is_real_time
-                else ("time       in lock step with the answers",)
-            ),
-            f"dropped    {wire.described_refusals(exchange.refused, others)}",
-            f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
-            f"plant      {self.plant.compiled_by}",
-        ]
-        if exchange.vented:
-            lines.append(f"VENTED     at {exchange.vented_at:.6g} s: {exchange.vented}")
-        return "\n".join([*lines, *([f"port       {exchange.failure}"] if exchange.failure else [])])
-
-    def files(self) -> dict[str, bytes]:
-        """The files beside a result's own, by name."""
-        # The log as a table; an empty cell is something that was not there.
-        buffer = io.StringIO()
-        writer = csv.writer(buffer, lineterminator="\n")
-        writer.writerow(LOG_COLUMNS)
-        for row in self.exchange.rows:
-            stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
-            times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
-            writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
-        found = {
-            "log.csv": buffer.getvalue().encode(),
-            "link.json": f"{json_text(self.document())}\n".encode(),
-        }
-        if self.exchange.is_real_time:
-            figure = render_figure(self.plot(), ("png", "svg"))
-            found |= {f"link.{form}": content for form, content in figure.items()}
-        vented_at = self.exchange.vented_at
-        if vented_at is not None and len(before := self.result.recording.time[self.result.recording.time < vented_at]):
-            # A fit wants the part in which the controller acted.
-            found["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
-        return found
-
-    def plot_signals(self) -> "Figure":
-        """Figure of the signals of the run; the reason of venting stands below."""
-        exchange, status = self.exchange, self.result.status
-        vented = (
-            ""
-            if exchange.vented_at is None
-            else f"vented (command 2) from {exchange.vented_at:.6g} s on: {exchange.vented}"
-        )
-        remark = vented if status.is_completed else status.message
-        atmosphere = self.plant.scenario.device.supply.atmospheric_pressure
-        return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark, atmosphere)
-
-    def plot(self) -> "Figure":
-        """Histograms of how late samples were sent, and after how long they were answered."""
-        period, load, timing = self.plant.period * _PER_THOUSAND, self.machine.load_after, self.timing
-        beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
-        with house_style():
-            figure, ((late, after),) = figure_of_free_panels((7.2, 3.3), Margins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
-            figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
-            said = (
-                f"Dashed: one sample, {period:g} ms. {timing.missed} of {len(timing.sent_late)} samples missed{beside}"
-            )
-            figure.text(0.017, 0.03, said, va="bottom", fontsize=9)
-            _histogram(late, timing.sent_late, "Samples, after they were due")
-            _histogram(after, timing.answered_after, "Answers, after their sample")
-            late.set_ylabel("Samples")
-            for axes in (late, after):
-                axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
-            return figure
-
-    def save(self, folder: Path, further: dict[str, bytes]) -> None:
-        """Write the result folder with log, figures of the link and what else there is."""
-        self.result.save(folder, {**self.files(), **further})
+"""Two sample periods that differ by less, as a fraction, are one."""
 
 
 def run_plant(
@@ -326,7 +67,7 @@ def run_at(
             check_baud(baud, rate)
         plant, period = plant_of(scenario, rate), scenario.controller.period
         if plant.period > period * (1.0 + _SAME):
-            apart, wanted = plant.period * _PER_THOUSAND, period * _PER_THOUSAND
+            apart, wanted = plant.period * 1.0e3, period * 1.0e3
             say(
                 f"--rate {rate}: a sample every {apart:.4g} ms, for a controller of the scenario that decides every "
                 f"{wanted:.4g} ms; it has the wrong gains unless it was exported for this rate: give "
@@ -339,45 +80,9 @@ def run_at(
         port.close()
 
 
-def spread(values: Sequence[float]) -> dict[str, float] | None:
-    """Median, 99th percentile and largest of some times [s]; None where there are none."""
-    if not values:
+def load_now() -> float | None:
+    """Processes that run on this computer, on average over the last minute [-]."""
+    try:
+        return os.getloadavg()[0]
+    except (AttributeError, OSError):
         return None
-    return {
-        "median": statistics.median(values),
-        "percentile_99": float(np.percentile(values, 99.0)),
-        "largest": max(values),
-    }
-
-
-def described_spread(values: Sequence[float]) -> str:
-    """Median, 99th percentile and largest of some times, in words."""
-    found = spread(values)
-    if found is None:
-        return "none"
-    shown = {name: f"{value * _PER_THOUSAND:.3g} ms" for name, value in found.items()}
-    return f"median {shown['median']}, 99 % within {shown['percentile_99']}, at most {shown['largest']}"
-
-
-def longest_silence(rows: Sequence[Row]) -> int:
-    """Most samples one after the other that were sent and not answered."""
-    longest = current = 0
-    for row in rows:
-        current = current + 1 if row.answered_after is None and row.sent_late is not None else 0
-        longest = max(longest, current)
-    return longest
-
-
-def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
-    """Times in ms on a logarithmic axis; those below 0.01 ms are in its first bin."""
-    axes.set_title(title)
-    axes.set_xlabel("Time (ms)")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    shown = np.maximum(np.asarray(values) * _PER_THOUSAND, _SHORTEST_SHOWN)
-    edges = np.geomspace(_SHORTEST_SHOWN, max(_LONGEST_SHOWN, 1.01 * shown.max(initial=0.0)), _BINS)
-    axes.hist(shown, edges.tolist(), color=ACTUAL.colour)
-    axes.set_xlim(edges[0], edges[-1])
-    axes.set_ylim(0.5, None)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter("{x:g}")

@@ -145,7 +145,7 @@ _LEAST_LEAN = 0.5
 """Fraction of the range of the shank angle by which the shank leans forward over its own contact; over the other
 foot's it swings back."""
 _LEAST_LEAN_OF_PART = 0.1
-"""The same for a contact that the record cuts."""
+"""Fraction of the range by which the shank leans forward over a contact that the record cuts."""
 
 
 def force_of_plates(

@@ -1,6 +1,7 @@
 """The trajectory fit: runs as residuals of the one estimator, and what comes of it as values of the device."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -122,18 +123,18 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     ``report`` hears what is being done. IdentificationError where it cannot be run.
     """
     numbers = numbers_of(problem)
-    free = [item.free for item in numbers]
-    start = np.array([one.start for one in free])
+    free = [number.free for number in numbers]
+    start = np.array([number.start for number in free])
     prepared = tuple(
         prepare(
-            item,
-            numbers_in(item.label, numbers, start),
-            reach_of([one for one in numbers if one.acts_in(item.label)]),
+            experiment,
+            numbers_in(experiment.label, numbers, start),
+            reach_of([number for number in numbers if number.acts_in(experiment.label)]),
         )
-        for item in problem.experiments
+        for experiment in problem.experiments
     )
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(prepared)} recordings"))
-    found = estimate(
+    fitted = estimate(
         lambda points: residuals_of(prepared, numbers, points),
         free,
         blocks_of(prepared, numbers, start),
@@ -141,58 +142,42 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         report,
         is_motion=True,
     )
-    conflict = conflict_in_words(found, "the model lacks something")
-    sought = [place for place, item in enumerate(numbers) if not item.is_tolerance]
-    estimates = tuple(_estimate(problem, found, numbers[place], place, conflict) for place in sought)
-    errors, known = np.sqrt(np.diag(found.covariance)), []
-    for place in (place for place, item in enumerate(numbers) if item.is_tolerance):
-        name, item = free[place].name, numbers[place]
-        shares = {one.path: dict(found.shares[one.path]).get(name, 0.0) for one in estimates}
-        widens = max(shares, key=lambda path: shares[path], default="")
-        (before, first), (after, last) = (
-            (math.exp(value), math.exp(value) * error) if item.is_logarithm else (value, error)
-            for value, error in (
-                (item.free.start, item.free.deviation), (float(found.values[place]), float(errors[place]))
-            )
-        )  # fmt: skip
-        known.append(
-            Known(
-                name=name,
-                unit=item.unit,
-                before=before,
-                before_error=first,
-                after=after,
-                after_error=last,
-                widens=widens,
-                share=shares.get(widens, 0.0),
-            )
-        )
+    conflict = conflict_in_words(fitted, "the model lacks something")
+    sought = [row for row, number in enumerate(numbers) if not number.is_tolerance]
+    estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in sought)
+    tolerated = [row for row, number in enumerate(numbers) if number.is_tolerance]
+    errors = np.sqrt(np.diag(fitted.covariance))
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
-    part = found.covariance[np.ix_(sought, sought)]
-    signals = signals_of(prepared, numbers, found.values[:, None])
-    scenarios = tuple(with_numbers(one.scenario, numbers_in(one.label, numbers, found.values)) for one in prepared)
+    part = fitted.covariance[np.ix_(sought, sought)]
+    signals = signals_of(prepared, numbers, fitted.values[:, None])
+    scenarios = tuple(
+        with_numbers(experiment.scenario, numbers_in(experiment.label, numbers, fitted.values))
+        for experiment in prepared
+    )
     models, measurements, channels = [], [], []
-    for experiment, one, values in zip(problem.experiments, prepared, signals, strict=True):
-        fitted = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in values.items()}
-        samples = {item.name: Channel(item.values, CHANNELS[item.name].unit) for item in one.channels}
-        models.append(Recording(f"model of {one.label}", one.time, fitted, kind="simulated"))
-        measurements.append(Recording(experiment.label, one.time, samples, kind=experiment.recording.kind))
-        channels += [_channel(found, experiment.label, item, values[item.name][:, 0]) for item in one.channels]
-    remarks = [text for text in dict.fromkeys(broken_rule(item.device) for item in scenarios) if text]
-    if not found.has_converged:
-        starts = (f'start = "{one.value:.4g} {one.unit}"'.replace(' -"', '"') + f" of {one.path}" for one in estimates)
+    for experiment, run, columns in zip(problem.experiments, prepared, signals, strict=True):
+        modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
+        samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
+        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
+        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
+        channels += [
+            _channel(fitted, experiment.label, channel, columns[channel.name][:, 0]) for channel in run.channels
+        ]
+    remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
+    if not fitted.has_converged:
+        starts = ", ".join(map(_start_of, estimates))
         remarks.append(
-            f"the search stopped after {found.evaluations} runs before it converged; give the parameters "
-            f"{', '.join(starts)}, where it ended"
+            f"the search stopped after {fitted.evaluations} runs before it converged; give the parameters {starts}, "
+            "where it ended"
         )
     return TrajectoryFit(
         problem=problem,
         numbers=numbers,
-        fit=found,
+        fit=fitted,
         estimates=estimates,
         covariance=part,
         correlation=part / np.outer(errors[sought], errors[sought]),
-        known=tuple(known),
+        known=tuple(_known(fitted, numbers[row], row, float(errors[row]), estimates) for row in tolerated),
         channels=tuple(channels),
         models=tuple(models),
         measurements=tuple(measurements),
@@ -202,50 +187,91 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     )
 
 
+def _start_of(item: Estimate) -> str:
+    """Return an estimate as the start that a problem file may give for it."""
+    text = f"{item.value:.4g}" if item.unit in ("", "-") else f"{item.value:.4g} {item.unit}"
+    return f'start = "{text}" of {item.path}'
+
+
+def _known(fitted: Fit, number: Number, row: int, error: float, estimates: Sequence[Estimate]) -> Known:
+    """Return what a fit says of a number that is known to a tolerance, and whose interval that widens most."""
+    name, free = number.free.name, number.free
+    shares = {item.path: dict(fitted.shares[item.path]).get(name, 0.0) for item in estimates}
+    widens = max(shares, key=lambda path: shares[path], default="")
+    before, before_error = _in_its_unit(number, free.start, free.deviation)
+    after, after_error = _in_its_unit(number, float(fitted.values[row]), error)
+    return Known(
+        name=name,
+        unit=number.unit,
+        before=before,
+        before_error=before_error,
+        after=after,
+        after_error=after_error,
+        widens=widens,
+        share=shares.get(widens, 0.0),
+    )
+
+
+def _in_its_unit(number: Number, value: float, error: float) -> tuple[float, float]:
+    """Return a number and its standard error in its unit [SI]; the fit may have moved its logarithm."""
+    if not number.is_logarithm:
+        return value, error
+    return math.exp(value), math.exp(value) * error
+
+
 _OWN_SHARE = 0.2
 _AT_BOUND = 1.0e-6
 
 
-def _estimate(problem: TrajectoryProblem, found: Fit, item: Number, place: int, conflict: str) -> Estimate:
+def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int, conflict: str) -> Estimate:
     """Return one estimate with its verdict and sentence."""
-    value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
-    name = item.free.name
-    bound = next(
-        (end for end in (item.free.low, item.free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None
-    )
+    value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
+    name, free = number.free.name, number.free
+    bound = next((end for end in (free.low, free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None)
     # A number with a small weight only accompanies a combination that is open.
-    combination = next((one for one in found.unidentified if abs(one.get(name, 0.0)) >= _OWN_SHARE), None)
+    combination = next((weights for weights in fitted.unidentified if abs(weights.get(name, 0.0)) >= _OWN_SHARE), None)
     verdict: Verdict = "identified"
     if combination is not None:
         verdict = "not identifiable"
         # So far from where it was linearised the interval of a straight line means nothing.
-        low, high = min(low, item.free.low), max(high, item.free.high)
+        low, high = min(low, free.low), max(high, free.high)
         others = [other for other in combination if other != name]
         text = f"trades off against {' and '.join(others)}" if others else "the recordings are hardly sensitive to it"
         text += "; fix it, give a prior, or make another recording"
     elif bound is not None:
-        end, unit = in_shown_unit(bound, item.unit)
+        end, unit = in_shown_unit(bound, number.unit)
         verdict, text = "at its bound", f"the recordings want a value at or beyond {end:.6g} {unit}".rstrip(" -")
     elif conflict:
         # Said of every number: which of them the missing physics moves is not known.
         verdict, text = "holds for this model only", conflict
     else:
-        text = widened_by(found, name)
-    recordings = tuple(one.source or one.recording.label for one in problem.experiments if item.acts_in(one.label))
+        text = widened_by(fitted, name)
+    recordings = tuple(
+        experiment.source or experiment.recording.label
+        for experiment in problem.experiments
+        if number.acts_in(experiment.label)
+    )
     return Estimate(
-        path=name, value=value, unit=item.unit, low=low, high=high, verdict=verdict, explanation=text,
-        recordings=recordings, confidence=problem.confidence,
-    )  # fmt: skip
+        path=name,
+        value=value,
+        unit=number.unit,
+        low=low,
+        high=high,
+        verdict=verdict,
+        explanation=text,
+        recordings=recordings,
+        confidence=problem.confidence,
+    )
 
 
-def _channel(found: Fit, experiment: str, measured: Measured, model: Floats) -> ChannelFit:
+def _channel(fitted: Fit, experiment: str, measured: Measured, model: Floats) -> ChannelFit:
     left = measured.values - model
     return ChannelFit(
         experiment=experiment,
         channel=measured.name,
         unit=CHANNELS[measured.name].unit,
-        noise=found.noise[measured.name],
-        order=found.correlation[measured.name],
+        noise=fitted.noise[measured.name],
+        order=fitted.correlation[measured.name],
         rms=float(np.sqrt(np.mean(left * left))),
         largest=float(np.max(np.abs(left))),
         span=float(np.ptp(measured.values)),

@@ -256,8 +256,17 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
 
 
 _NUMBERS_OF_RUN = (
-    "plant", "thermal", "valve_orifice", "leak_orifice", "initial", "valve", "command_delay", "lines", "effects", "leg"
-)  # fmt: skip
+    "plant",
+    "thermal",
+    "valve_orifice",
+    "leak_orifice",
+    "initial",
+    "valve",
+    "command_delay",
+    "lines",
+    "effects",
+    "leg",
+)
 """What of a run follows from the numbers of its scenario; program, clock and prescribed motion stay."""
 
 

@@ -101,9 +101,14 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
     friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
     if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
         yield FreeParameter(
-            _STRIBECK, limit * math.exp(-_ONE_SIDED * _FACTOR), _LEAST * limit, 4.0 * limit, _FACTOR,
-            is_tolerance=True, is_logarithm=True,
-        )  # fmt: skip
+            _STRIBECK,
+            limit * math.exp(-_ONE_SIDED * _FACTOR),
+            _LEAST * limit,
+            4.0 * limit,
+            _FACTOR,
+            is_tolerance=True,
+            is_logarithm=True,
+        )
 
 
 def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[float, float]]:

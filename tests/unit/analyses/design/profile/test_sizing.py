@@ -12,15 +12,10 @@ import pytest
 
 from ppafo.analyses.design import trials
 from ppafo.analyses.design.loading import json_schema, load_design
-from ppafo.analyses.design.profile.answer import (
-    Sizing,
-    _lasting_bottle,
-    finding_of,
-    smallest_bottle,
-    suggestion_sentence,
-)
+from ppafo.analyses.design.profile.answer import Sizing, finding_of, suggestion_sentence
 from ppafo.analyses.design.profile.problem import choose_knots
 from ppafo.analyses.design.profile.search import Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.analyses.design.profile.solve import _lasting_bottle, smallest_bottle
 from ppafo.analyses.design.question import design
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError

@@ -1,0 +1,218 @@
+"""The point of a linear model: an instant of a run, or the steady state that a scenario asks for."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ppafo.analyses.linearise.plant import VALVE, plant_of, valve_states, without_slew_limit
+from ppafo.control.kind import OPEN_LOOP
+from ppafo.control.profiles import CONSTANT
+from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
+from ppafo.engine.lanes import Floats, run_batch
+from ppafo.engine.led_leg import torque_of_leg
+from ppafo.engine.linking import python_place
+from ppafo.engine.rows import numbers, rebuilt
+from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
+from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.controlled import TORQUE
+from ppafo.model.plant import ThermalParameters, chamber_mass, chamber_pressures, chamber_volumes
+from ppafo.model.ports import friction_at_rest
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.profiles import profile_values
+from ppafo.simulation.sampled import run_sampled
+from ppafo.simulation.scenario import FreeMotion, Scenario
+
+STEADY = 1.0e-9
+"""Largest rate of a state [1/s], over the size of the state, that counts as none."""
+_FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
+"""Sizes of commands [-] from which the steady state is looked for."""
+_SIZES = {"pressure": 1.0e5, "temperature": 300.0, "torque": 1.0}
+_MOST_STEPS = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """Values of all symbols of the plant by name [SI], at a ``time`` [s] of the run; None for a steady state.
+
+    ``way`` is the direction of a free vane, 0 where friction or a stop holds it; None where the ankle is prescribed.
+    """
+
+    time: float | None
+    values: Mapping[str, float]
+    way: float | None
+
+
+def point_at(scenario: Scenario, time: float) -> Point:
+    """The point that the run of a scenario passes at a time [s], to the nearest step; ScenarioError outside the run."""
+    # Allowance for rounding: the end of the run itself is a valid time.
+    if not 0.0 <= time <= scenario.run.duration * (1.0 + 1.0e-12):
+        raise ScenarioError(
+            f"{scenario.name}: --at {time:g} s is outside the run, which lasts {scenario.run.duration:g} s"
+        )
+    whole = plan_run(scenario)
+    steps = min(round(time / whole.step), whole.step_count)
+    return Point(steps * whole.step, *_after(scenario, whole, steps))
+
+
+def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], float | None]:
+    """Values after some steps of a run, and the way of its vane."""
+    batch = batch_of(replace(run, step_count=steps))
+    custom = scenario.controller.custom
+    outcome = run_batch(batch) if custom is None else run_sampled(batch, custom)
+    rows = {name: float(outcome.states[row, 0]) for name, row in state_row_numbers(run).items()}
+    if rows["result.failure_time"] < NEVER_FAILED or not all(map(np.isfinite, rows.values())):
+        raise SimulationError(f"{scenario.name}: the run diverges before {steps * run.step:g} s (ppafo simulate)")
+    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    if run.program.angle is not None:
+        angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
+    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    values = {"angle": angle, "angular_velocity": rate, "command": rows["result.command"]}
+    values |= {"pressure_1": float(pressure_1), "pressure_2": float(pressure_2)}
+    driven = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
+    values |= {name: float(getattr(run.plant, name)) for name in driven}
+    values |= {name: rows[path] for name, path in valve_states(run.program).items()}
+    if isinstance(run.thermal, ThermalParameters):
+        warm = [rows[f"state.mass_{side}"] / rows[f"masses.mass_{side}"] for side in (1, 2)]
+        values |= {f"temperature_{side}": run.thermal.temperature * warm[side - 1] for side in (1, 2)}
+    return values, _way(run, values, steps * run.step)
+
+
+def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
+    """Direction of a free vane, 0 where it is held, at a time [s]."""
+    if run.program.angle is not None:
+        return None
+    rate, angle = values["angular_velocity"], values["angle"]
+    if rate != 0.0:
+        return 1.0 if rate > 0.0 else -1.0
+    volumes, product = chamber_volumes(run.plant, angle), run.plant.gas_product
+    masses = [chamber_mass(values[f"pressure_{side}"], volumes[side - 1], product) for side in (1, 2)]
+    limit, plant = python_place(friction_at_rest, run.program.effects, run.effects), run.plant
+    if limit is not None:
+        pressures = values["pressure_1"], values["pressure_2"]
+        plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
+    added = 0.0 if run.leg is None else torque_of_leg(run.program, run.leg, time, angle)
+    return mode_at_rest(plant, angle, torque_on_vane(plant, angle, *masses) + added)
+
+
+def equilibrium(scenario: Scenario) -> Point:
+    """The steady state that a scenario asks for; ScenarioError where there is none.
+
+    The ankle stands where it is at the end of the run, with no velocity; nothing in the chambers or in the valve
+    changes any more; the actuator has the torque that the reference has at the end of the run, or, where the
+    controller is a constant command, the command is that one.
+    """
+    whole = plan_run(scenario)
+    if whole.leg is not None and whole.program.shank is not CONSTANT:
+        raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
+    values, _ = _after(scenario, whole, whole.step_count)
+    values["angular_velocity"] = 0.0
+    is_open_loop = scenario.controller.kind == OPEN_LOOP
+    if scenario.controlled != TORQUE and not is_open_loop:
+        line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; take --at with a time"
+        raise ScenarioError(f"{scenario.name}: {line}")
+    end = np.array([scenario.run.duration])
+    wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
+    run = without_slew_limit(whole)
+    held = None if run.program.angle is not None else 0.0
+    steady = _steady(run, held, values, wanted)
+    if steady is None:
+        if wanted is None:
+            line = f"no equilibrium found for the command {values['command']:g}"
+            raise ScenarioError(f"{scenario.name}: {line}; take --at with a time")
+        line = f"no equilibrium at {wanted:.4g} N m, the last value of the reference"
+        full = dict.fromkeys(("command", *opening_names(values)), 1.0 if wanted > 0.0 else -1.0)
+        most = _steady(run, held, {**values, **full}, None)
+        if most is not None:
+            torque = run.plant.torque_constant * (most["pressure_1"] - most["pressure_2"])
+            line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
+        other = " or hold the ankle" if isinstance(scenario.motion, FreeMotion) else ""
+        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")
+    way = _way(run, steady, scenario.run.duration)
+    if way:
+        raise ScenarioError(
+            f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque moves the vane; "
+            "take --at with a time, or another torque"
+        )
+    # A valve that is closed but for rounding is closed.
+    steady |= {name: 0.0 for name in ("command", *opening_names(steady)) if abs(steady[name]) < STEADY}
+    # What the valve takes from its command at once was no unknown.
+    at_rest = dict(zip(valve_states(run.program), numbers(settled(run, steady)), strict=True))
+    return Point(None, steady | at_rest, way)
+
+
+def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: float | None) -> dict[str, float] | None:
+    """Values of a steady state with a torque [N m], or with the present command; None where none is found."""
+    # Where the search begins: at the end of the run, then about the pressures that have the torque.
+    starts = [dict(values)]
+    lowest, torque = run.plant.atmospheric_pressure, wanted or 0.0
+    surplus = abs(torque) / run.plant.torque_constant
+    for size in _FIRST_COMMANDS:
+        command = values["command"] if wanted is None else size if torque >= 0.0 else -size
+        pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
+        fed = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
+        starts.append({**values, **fed, **dict.fromkeys(opening_names(values), command)})
+    import casadi
+
+    # All rates, and the torque where one is wanted, as functions of all states, and the command where that is free.
+    plant = plant_of(run, held)
+    names = [*plant.states, *([] if wanted is None else ["command"])]
+    sizes = np.array([_SIZES.get(name.partition("_")[0], 1.0) for name in names])
+    # Rates over the sizes of their states, so that pascals and openings count alike.
+    rates = [plant.rates[name] / size for name, size in zip(plant.states, sizes.tolist(), strict=False)]
+    unknowns = casadi.vertcat(*(plant.symbols[name] for name in names))
+    residual = casadi.vertcat(*rates, *([] if wanted is None else [plant.outputs["torque"] - wanted]))
+    function = plant.function([residual, casadi.jacobian(residual, unknowns)])
+    reached = (_newton(function, names, sizes, start) for start in starts)
+    return next((steady for steady in reached if steady is not None), None)
+
+
+def opening_names(values: Mapping[str, float]) -> list[str]:
+    """Names of the openings of the valve among some values."""
+    return [name for name in values if name in (f"{VALVE}requested", f"{VALVE}opening")]
+
+
+def _newton(
+    function: Callable[[Mapping[str, float]], Any], names: Sequence[str], sizes: Floats, start: Mapping[str, float]
+) -> dict[str, float] | None:
+    """Values at which a function is 0, by Newton's method with steps cut where they lead too far; None where none."""
+
+    def at(values: Mapping[str, float]) -> tuple[Floats, Floats]:
+        residual, slopes = (np.array(column) for column in function(values))
+        return residual.ravel(), slopes
+
+    values = dict(start)
+    residual, slopes = at(values)
+    for _ in range(_MOST_STEPS):
+        largest = float(np.max(np.abs(residual)))
+        if largest < STEADY:
+            return values if abs(values["command"]) <= 1.0 + STEADY else None
+        if not (np.isfinite(largest) and np.isfinite(slopes).all()):
+            return None
+        # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
+        step = np.linalg.lstsq(slopes * sizes, -residual, rcond=None)[0] * sizes
+        share = 1.0
+        while share > 1.0e-6:
+            # Values after a step, pressures at least half of what they were, the command within -1 to 1.
+            moved = dict(values)
+            for name, change in zip(names, (share * step).tolist(), strict=True):
+                moved[name] = values[name] + change
+                if name.startswith(("pressure", "temperature")):
+                    moved[name] = max(moved[name], 0.5 * values[name])
+                if name == "command":
+                    moved[name] = min(max(moved[name], -1.0), 1.0)
+            residual, slopes = at(moved)
+            if np.isfinite(residual).all() and float(np.max(np.abs(residual))) < largest:
+                break
+            share *= 0.5
+        else:
+            return None
+        values = moved
+    return None
+
+
+def settled(run: Run, values: Mapping[str, float]) -> Any:
+    """State of the valve after the changes that it makes at once."""
+    state: Any = rebuilt(run.program.valve.state, [values[name] for name in valve_states(run.program)])
+    return run.program.valve.settle(run.valve, state, values["command"], 0.0)

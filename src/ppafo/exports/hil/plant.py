@@ -1,0 +1,61 @@
+"""The plant at the wire: the compiled module with one run, whose command comes from outside."""
+
+from dataclasses import dataclass, replace
+
+from ppafo.engine.lanes import Advancing, load_program
+from ppafo.engine.loading import backend_described
+from ppafo.engine.run import Run, batch_of
+from ppafo.errors import ScenarioError
+from ppafo.exports.hil import wire
+from ppafo.model.controlled import TORQUE
+from ppafo.model.valves import vent_valve
+from ppafo.parameters.plant import valve_settings
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
+
+CHANNELS_SENT = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Plant:
+    """A scenario without its controller: how it is run, and what compiled it."""
+
+    scenario: Scenario
+    run: Run
+    module: Advancing
+    compiled_by: str
+    period: float
+
+
+def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
+    """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
+    if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
+        raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
+    if scenario.controlled != TORQUE:
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{scenario.controlled}': a controller at the wire is sent a torque; "
+            "take a scenario whose reference is one"
+        )
+    period = 1.0 / rate
+    chosen = replace(
+        scenario,
+        # No step may be longer than a sample: a command acts from its sample on.
+        run=replace(scenario.run, step=min(scenario.run.step, period)),
+        controller=Control(PYTHON_CONTROLLER, {}, period),
+    )
+    run = plan_run(chosen)
+    valve = chosen.device.valve
+    if valve.kind == "proportional":
+        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve_settings(valve))))
+    module = load_program(batch_of(run).program)
+    return Plant(chosen, run, module, backend_described(), period)
+
+
+def check_baud(baud: int, rate: int) -> None:
+    """Refuse a serial line that cannot carry the samples."""
+    needed = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE * rate
+    if baud < needed:
+        raise ScenarioError(
+            f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
+            f"here at most {baud // (wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE)}"
+        )

@@ -1,0 +1,251 @@
+"""What came of a run at the wire: the result, its log, and how the link did."""
+
+import csv
+import io
+import statistics
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, final
+
+import numpy as np
+
+from ppafo.documents.json_text import json_text, plain
+from ppafo.exports.hil import wire
+from ppafo.exports.hil.loop import Exchange, Row
+from ppafo.exports.hil.plant import Plant
+from ppafo.report.recording_figure import recording_figure
+from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
+from ppafo.simulation.simulate import Result
+from ppafo.storage.comma_separated import marked_csv_bytes
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+LOG_COLUMNS = (
+    *("sequence [-]", "due [s]", "sent_late [s]", "answered_after [s]"),
+    *("command [-]", "controller_time [s]", "vented [-]"),
+)
+_PER_THOUSAND = 1.0e3
+_BINS = 60
+_SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
+"""Ends of the axis of times [ms]; longer ones make it longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What the plant ran on: system, cores, Python, and the load (mean number of processes that run, 1 min) around it.
+
+    The load is None where the system does not tell it.
+    """
+
+    system: str
+    cores: int
+    python: str
+    load_before: float | None
+    load_after: float | None
+
+
+class Timing(NamedTuple):
+    """How late samples were sent, after how long they were answered [s], and how many had no answer of their own.
+
+    Samples with which a stopped run was vented are not among them: they were not sent.
+    """
+
+    sent_late: list[float]
+    answered_after: list[float]
+    missed: int
+
+
+def timing_of(rows: Sequence[Row]) -> Timing:
+    """Return the timing of the samples of a log."""
+    sent = [row for row in rows if row.sent_late is not None]
+    answered = [row.answered_after for row in sent if row.answered_after is not None]
+    return Timing([row.sent_late for row in sent if row.sent_late is not None], answered, len(sent) - len(answered))
+
+
+@final
+@dataclass(frozen=True, slots=True)
+class HardwareRun:
+    """A run at the wire: the result, what went over the wire and when, and the machine."""
+
+    plant: Plant
+    result: Result
+    exchange: Exchange
+    timing: Timing
+    machine: Machine
+
+    @property
+    def is_good(self) -> bool:
+        """True where the run went to its end, and nothing vented the plant."""
+        return self.result.status.is_completed and not self.exchange.vented
+
+    def document(self) -> dict[str, Any]:
+        """The content of ``link.json``, in SI units."""
+        exchange, timing = self.exchange, self.timing
+        return {
+            "rate": round(1.0 / self.plant.period),
+            "samples": len(timing.sent_late),
+            "answered": len(timing.answered_after),
+            "missed": timing.missed,
+            "longest_silence": longest_silence(exchange.rows) * self.plant.period,
+            "sent_late": spread(timing.sent_late),
+            "answered_after": spread(timing.answered_after),
+            "stood_still": list(exchange.stood_still),
+            "taken": exchange.taken,
+            "refused": dict(exchange.refused),
+            "ignored": dict(exchange.ignored),
+            "strangers": exchange.strangers,
+            "is_real_time": exchange.is_real_time,
+            "vented": exchange.vented or None,
+            "vented_at": exchange.vented_at,
+            "is_stopped": exchange.is_stopped,
+            "failure": exchange.failure or None,
+            "plant": self.plant.compiled_by,
+            "machine": {name: getattr(self.machine, name) for name in Machine.__slots__},
+        }
+
+    def outcome(self, port: str) -> dict[str, Any]:
+        """Return scenario, port, status, link and metrics as plain data."""
+        return {
+            "scenario": self.result.scenario.name,
+            "port": port,
+            "status": plain(self.result.status),
+            "link": self.document(),
+            "metrics": {name: plain(metric) for name, metric in self.result.metrics.items()},
+        }
+
+    def text(self) -> str:
+        """The run in words."""
+        exchange, timing, machine = self.exchange, self.timing, self.machine
+        others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
+        silence = longest_silence(exchange.rows) * self.plant.period
+        loads = "".join(
+            f", load {load:.2f} {when}"
+            for load, when in ((machine.load_before, "before"), (machine.load_after, "after"))
+            if load is not None
+        )
+        still = exchange.stood_still
+        stood = f"stood still {len(still)} times, {sum(still):.3g} s in all" if still else "never stood still"
+        lines = [
+            f"samples    {len(timing.sent_late)} sent, {len(timing.answered_after)} answered, {timing.missed} missed; "
+            f"longest silence {silence * _PER_THOUSAND:.3g} ms",
+            *(
+                (
+                    f"answers    {described_spread(timing.answered_after)}",
+                    f"sent late  {described_spread(timing.sent_late)}",
+                    f"time       {stood}",
+                )
+                if exchange.is_real_time
+                else ("time       in lock step with the answers",)
+            ),
+            f"dropped    {wire.described_refusals(exchange.refused, others)}",
+            f"machine    {machine.cores} cores{loads}; {machine.system}, Python {machine.python}",
+            f"plant      {self.plant.compiled_by}",
+        ]
+        if exchange.vented:
+            lines.append(f"VENTED     at {exchange.vented_at:.6g} s: {exchange.vented}")
+        return "\n".join([*lines, *([f"port       {exchange.failure}"] if exchange.failure else [])])
+
+    def files(self) -> dict[str, bytes]:
+        """The files beside a result's own, by name."""
+        # The log as a table; an empty cell is something that was not there.
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(LOG_COLUMNS)
+        for row in self.exchange.rows:
+            stamp = "" if row.controller_time is None else repr(row.controller_time / wire.MICROSECONDS)
+            times = ("" if value is None else repr(value) for value in (row.sent_late, row.answered_after))
+            writer.writerow([row.sequence, repr(row.due), *times, repr(row.command), stamp, int(row.is_vented)])
+        found = {
+            "log.csv": buffer.getvalue().encode(),
+            "link.json": f"{json_text(self.document())}\n".encode(),
+        }
+        if self.exchange.is_real_time:
+            figure = render_figure(self.plot(), ("png", "svg"))
+            found |= {f"link.{form}": content for form, content in figure.items()}
+        vented_at = self.exchange.vented_at
+        if vented_at is not None and len(before := self.result.recording.time[self.result.recording.time < vented_at]):
+            # A fit wants the part in which the controller acted.
+            found["until-vented.csv"] = marked_csv_bytes(self.result.recording.between(0.0, float(before[-1])))
+        return found
+
+    def plot_signals(self) -> "Figure":
+        """Figure of the signals of the run; the reason of venting stands below."""
+        exchange, status = self.exchange, self.result.status
+        vented = (
+            ""
+            if exchange.vented_at is None
+            else f"vented (command 2) from {exchange.vented_at:.6g} s on: {exchange.vented}"
+        )
+        remark = vented if status.is_completed else status.message
+        atmosphere = self.plant.scenario.device.supply.atmospheric_pressure
+        return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark, atmosphere)
+
+    def plot(self) -> "Figure":
+        """Histograms of how late samples were sent, and after how long they were answered."""
+        period, load, timing = self.plant.period * _PER_THOUSAND, self.machine.load_after, self.timing
+        beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
+        with house_style():
+            figure, ((late, after),) = figure_of_free_panels((7.2, 3.3), Margins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
+            figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
+            said = (
+                f"Dashed: one sample, {period:g} ms. {timing.missed} of {len(timing.sent_late)} samples missed{beside}"
+            )
+            figure.text(0.017, 0.03, said, va="bottom", fontsize=9)
+            _histogram(late, timing.sent_late, "Samples, after they were due")
+            _histogram(after, timing.answered_after, "Answers, after their sample")
+            late.set_ylabel("Samples")
+            for axes in (late, after):
+                axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
+            return figure
+
+    def save(self, folder: Path, further: dict[str, bytes]) -> None:
+        """Write the result folder with log, figures of the link and what else there is."""
+        self.result.save(folder, {**self.files(), **further})
+
+
+def spread(values: Sequence[float]) -> dict[str, float] | None:
+    """Median, 99th percentile and largest of some times [s]; None where there are none."""
+    if not values:
+        return None
+    return {
+        "median": statistics.median(values),
+        "percentile_99": float(np.percentile(values, 99.0)),
+        "largest": max(values),
+    }
+
+
+def described_spread(values: Sequence[float]) -> str:
+    """Median, 99th percentile and largest of some times, in words."""
+    numbers = spread(values)
+    if numbers is None:
+        return "none"
+    shown = {name: f"{value * _PER_THOUSAND:.3g} ms" for name, value in numbers.items()}
+    return f"median {shown['median']}, 99 % within {shown['percentile_99']}, at most {shown['largest']}"
+
+
+def longest_silence(rows: Sequence[Row]) -> int:
+    """Most samples one after the other that were sent and not answered."""
+    longest = current = 0
+    for row in rows:
+        current = current + 1 if row.answered_after is None and row.sent_late is not None else 0
+        longest = max(longest, current)
+    return longest
+
+
+def _histogram(axes: "Axes", values: Sequence[float], title: str) -> None:
+    """Times in ms on a logarithmic axis; those below 0.01 ms are in its first bin."""
+    axes.set_title(title)
+    axes.set_xlabel("Time (ms)")
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    shown = np.maximum(np.asarray(values) * _PER_THOUSAND, _SHORTEST_SHOWN)
+    edges = np.geomspace(_SHORTEST_SHOWN, max(_LONGEST_SHOWN, 1.01 * shown.max(initial=0.0)), _BINS)
+    axes.hist(shown, edges.tolist(), color=ACTUAL.colour)
+    axes.set_xlim(edges[0], edges[-1])
+    axes.set_ylim(0.5, None)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter("{x:g}")

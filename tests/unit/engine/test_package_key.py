@@ -1,0 +1,34 @@
+"""Keys of texts that need not be composed again: what follows from the files of the package has one."""
+
+import pytest
+
+from ppafo.control.binding import bind
+from ppafo.control.controllers import feedback
+from ppafo.control.walking import assistance
+from ppafo.engine.package_key import package_key
+from ppafo.golden_bits import plain_batch
+
+FOLDERS = ("control", "model", "signals")
+"""Without the engine, of which the tests replace a function to count what is compiled."""
+
+
+@pytest.mark.parametrize("name", ["swing-foot", "proportional", "proportional-regulators", "solenoid-recycling"])
+def test_every_scenario_of_the_package_has_a_key(name: str) -> None:
+    # A law that is bound to walking stands under no name of its own; nor does a shank that a gait leads.
+    assert package_key(plain_batch(name).program, FOLDERS) is not None
+
+
+def test_the_key_of_a_law_tells_what_it_is_bound_to() -> None:
+    frame = assistance.timed_phase
+    laws = [bind(frame, "timed", {"phase_of": part}) for part in (feedback.pid_update, feedback.sliding_update)]
+    other = bind(frame, "timed", {"state_of": feedback.pid_update})
+    keys = [package_key(law, FOLDERS) for law in (*laws, other)]
+    assert None not in keys
+    assert len({key.words for key in keys if key is not None}) == 3
+
+
+def test_a_law_that_is_bound_to_a_function_from_elsewhere_has_no_key() -> None:
+    def elsewhere(value: float) -> float:
+        return value
+
+    assert package_key(bind(assistance.timed_phase, "timed", {"phase_of": elsewhere}), FOLDERS) is None
