@@ -167,7 +167,8 @@ def rates_ideal(valve: IdealSolenoid, state: PairPositions, command: float) -> P
 
 def settle_ideal(valve: IdealSolenoid, state: PairPositions, command: float, time: float) -> PairPositions:
     """Positions [-] that the command requests, taken at once."""
-    return PairPositions(*coil_commands(command))
+    position_a, position_b = coil_commands(command)
+    return PairPositions(position_a, position_b)
 
 
 def instant_timed(valve: TimedSolenoid, state: PairState, command: float) -> Openings:
