@@ -10,6 +10,7 @@ from ppafo.engine.rows import is_number, is_row, leaf_paths, leaves, members, re
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.exports import filled, in_markdown, template
+from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.catalog import target_of
@@ -170,6 +171,10 @@ def integer_form(scenario: Scenario) -> Scenario:
     ScenarioError where that controller has none.
     """
     kind = scenario.controller.kind
+    if scenario.controlled != TORQUE:
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{scenario.controlled}': a fixed-point controller follows a torque alone"
+        )
     if kind in FIXED_LAWS:
         return scenario
     if f"{kind}{FIXED_POINT}" not in FIXED_LAWS:

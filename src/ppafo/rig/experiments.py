@@ -22,6 +22,7 @@ from ppafo.documents.json_text import json_text, plain
 from ppafo.engine.run import Run
 from ppafo.errors import DataError, ParameterError, ScenarioError, nearest_name, one_line, reason
 from ppafo.model.catalog import VALVES
+from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.second_virial import real_density
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.model.gas import gas_energy
@@ -285,8 +286,13 @@ def record_vane_leak(request: Request) -> Outcome:
 def rig_run(scenario: Scenario, request: Request, highest_rate: float = math.inf) -> RigRun:
     """Return the run of a scenario on the rig of a request, recorded at most ``highest_rate`` times a second [Hz].
 
-    ScenarioError for a valve that the rig does not have.
+    ScenarioError for a valve that the rig does not have, and for a reference that is no torque.
     """
+    if scenario.controlled != TORQUE:
+        raise ScenarioError(
+            f"{scenario.name}: reference.of = '{scenario.controlled}': the controllers of the simulated test bench "
+            "follow a torque"
+        )
     preset = request.preset
     rate = min(highest_rate, preset.values["sampling.rate"])
     device = real_device(scenario.device, preset)

@@ -363,7 +363,8 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool) -> Loop
         *of_joint,
         *(LEG_PATHS if is_joint and has_leg else ()),
     )
-    return LoopFrames(loop, inner, (*chambers.rows, FlowNumbers, valve.settings, signals), sources, joint)
+    rows = (*chambers.rows, FlowNumbers, valve.settings, signals)
+    return LoopFrames(loop=loop, torque_loop=inner, rows=rows, sources=sources, joint=joint)
 
 
 def loop_terms(

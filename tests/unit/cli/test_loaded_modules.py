@@ -19,10 +19,10 @@ HEAVY = frozenset(
 )
 READING, DRAWING = {"numpy", "pydantic"}, {"matplotlib", "PIL"}
 WRITING = {"h5netcdf", "h5py", "jinja2"}
-MOST_BEFORE_THE_RUN, MOST = 130, 175
+MOST_BEFORE_THE_RUN, MOST = 133, 178
 """Modules of the package that a run of a scenario may load; what has no part in it stays out."""
-MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 116, 18_600
-"""Modules and their lines that a run from Python may load: 116 and 18,584 when this was written."""
+MOST_FROM_PYTHON, MOST_LINES_FROM_PYTHON = 119, 19_400
+"""Modules and their lines that a run from Python may load: 119 and 19,356 when this was written."""
 
 CODE = """
 import json, sys
@@ -63,6 +63,8 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], list
     """What ``ppafo simulate`` loads, with everything made that is kept."""
     words = ["simulate", "torque-task-proportional", "--out", str(tmp_path_factory.mktemp("run") / "result")]
     command = COMMAND.format(words=words)
+    # Keys have the numbers of all modules that are loaded: a run that composes its step keeps its page under another.
+    loaded_by(command)
     loaded_by(command)
     return loaded_by(command)
 

@@ -7,7 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo.analyses.linearise.point import equilibrium
 from ppafo.errors import ScenarioError
+from ppafo.exports.hil.run import plant_of
+from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, REFUSED, run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
@@ -193,3 +196,13 @@ def test_the_pressure_loop_that_ships_settles_on_its_level() -> None:
     metrics = simulate(load_scenario("pressure-loop")).metrics
     assert metrics["rms_pressure_1_error"].value < 0.3 * PSI
     assert metrics["final_pressure_1_error"].value < 0.03 * PSI
+
+
+def test_what_knows_a_torque_alone_says_so() -> None:
+    pressure = load_scenario("pressure-loop", ["run.duration=0.1 s"])
+    with pytest.raises(ScenarioError, match="an equilibrium is found for a torque; take --at"):
+        equilibrium(pressure)
+    with pytest.raises(ScenarioError, match="a controller at the wire is sent a torque"):
+        plant_of(pressure)
+    with pytest.raises(ScenarioError, match="a fixed-point controller follows a torque alone"):
+        firmware(pressure)

@@ -16,6 +16,7 @@ from ppafo.engine.linking import python_place
 from ppafo.engine.rows import numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.controlled import TORQUE
 from ppafo.model.plant import ThermalParameters, chamber_mass, chamber_pressures, chamber_volumes
 from ppafo.model.ports import friction_at_rest
 from ppafo.simulation.plan import plan_run
@@ -108,6 +109,9 @@ def equilibrium(scenario: Scenario) -> Point:
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
     is_open_loop = scenario.controller.kind == OPEN_LOOP
+    if scenario.controlled != TORQUE and not is_open_loop:
+        line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; take --at with a time"
+        raise ScenarioError(f"{scenario.name}: {line}")
     end = np.array([scenario.run.duration])
     wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
     run = without_slew_limit(whole)

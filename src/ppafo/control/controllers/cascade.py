@@ -27,7 +27,7 @@ class CascadeParameters(NamedTuple):
         float, Number("N m s/rad", "torque per rate of the angle error", None, 0.0, 1.0e6, follows=(ANGLE_DAMPING,))
     ]
     angle_integral: Annotated[
-        float, Number("N m/(rad s)", "torque per integral of the angle error; it hunts with friction", 0.0, 0.0, 1.0e6)
+        float, Number("N m/(rad s)", "torque per integral of the angle error; friction makes it cycle", 0.0, 0.0, 1.0e6)
     ]
     rate_filter: Annotated[
         float, Number("s", "time constant of the filter on the angle's rate", None, 0.0, 10.0, follows=(RATE_FILTER,))
