@@ -307,7 +307,9 @@ def _of_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> _Table:
             if bad.size:
                 raise DataError(f"channels.{name}.column: sample {bad[0] + 1} is {values[bad[0]]}, not a finite number")
     count = next(iter(lengths.values()))
-    return _Table(count, numbers, clock, dates, range(1, count + 1), "sample", "measured")
+    return _Table(
+        size=count, numbers=numbers, clock=clock, dates=dates, rows=range(1, count + 1), noun="sample", kind="measured"
+    )
 
 
 def _variable(key: str, wanted: int | str, file: MatlabFile) -> str:
@@ -376,7 +378,10 @@ def _of_text(content: bytes, columns: ColumnMap, map_name: str) -> _Table:
         if dates is not None:
             dates.append(row[date_place])
     kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
-    return _Table(len(found), {name: np.array(numbers[name]) for name in numbers}, clock, dates, found, "line", kind)
+    return _Table(
+        size=len(found), numbers={name: np.array(numbers[name]) for name in numbers}, clock=clock, dates=dates,
+        rows=found, noun="line", kind=kind,
+    )  # fmt: skip
 
 
 def _of_word(cell: str, words: Mapping[str, float]) -> float | None:
