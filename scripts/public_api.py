@@ -58,6 +58,13 @@ def members(kind: type) -> Iterator[str]:
                 yield ast.unparse(node)
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
                 yield signature(node)
+            if isinstance(node, ast.Assign) and not ast.unparse(node.targets[0]).startswith("_"):
+                # A method that several results share is a function of a module.
+                name = ast.unparse(node.targets[0])
+                shared = declaration(vars(owner)[name])
+                assert isinstance(shared, ast.FunctionDef)
+                shared.name = name
+                yield signature(shared)
 
 
 def lines_of(name: str, value: Any) -> Iterator[str]:

@@ -61,7 +61,8 @@ class ProfileKind:
     A quantity with unit ``""`` takes the unit of what is prescribed; those among ``differences`` are differences of two
     values of it, as an amplitude is. A profile that ``is_monotone`` only rises, only
     falls or rests, so that both ends of a stretch of time have its extremes. One that ``is_smooth`` has no corners, at
-    which a foot on a shank that moves so would be struck.
+    which a foot on a shank that moves so would be struck. ``until_jump(parameters, time)`` is the time [s], above 0,
+    until the second derivative of a smooth one jumps; None where it never does.
     """
 
     name: str
@@ -73,6 +74,7 @@ class ProfileKind:
     differences: tuple[str, ...] = ()
     is_monotone: bool = False
     is_smooth: bool = False
+    until_jump: Callable[..., float] | None = None
 
 
 class PythonController(Protocol):

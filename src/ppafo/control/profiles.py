@@ -272,6 +272,12 @@ def smooth_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
     return profile.level + value, rate, 2.0 * bend + 6.0 * here * twist
 
 
+def until_knot(profile: Tabulated, time: float) -> float:
+    """Time [s] from one at 0 or later to the next knot, where the second derivative of the cubic curves jumps."""
+    place = time - profile.period * float(int(time / profile.period))
+    return stretch_at(profile, place).end.time - place
+
+
 def smooth_bounds(profile: Tabulated) -> tuple[float, float]:
     """The lowest and the highest value [N m or rad] of the cubic curves, which may go beyond their knots."""
     lowest, highest = table_bounds(profile)
@@ -333,4 +339,5 @@ SMOOTH = ProfileKind(
     bounds=smooth_bounds,
     differences=_VALUES,
     is_smooth=True,
+    until_jump=until_knot,
 )

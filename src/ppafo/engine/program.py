@@ -194,6 +194,9 @@ class FaultPhases(Protocol):
 class FootPhases(Protocol):
     """A foot on a prescribed shank, which an unconstrained vane carries."""
 
+    def until_jump(self, parts: "Program", lane: "Lane", time: float) -> float:
+        """Time [s] from one [s] until the acceleration of the shank jumps."""
+
     def torque(self, parts: "Program", lane: "Lane", time: float, angle: float) -> float:
         """Torque on the vane [N m] at a time [s] and an angle [rad]."""
 
@@ -264,6 +267,11 @@ class Program:
             **({"load": kind_at("ppafo.model.leg:FootLoad"), "shank": shank.parameters} if shank is not None else {}),
             **{effect.name: effect.parameters for effect in self.effects},
         }
+
+    @property
+    def shank_jumps(self) -> bool:
+        """True where the acceleration of the shank of that foot jumps at known times."""
+        return self.shank is not None and self.shank.until_jump is not None
 
     @property
     def shank_rests(self) -> bool:

@@ -137,6 +137,6 @@ def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSP
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:
     """Return a difference of two values of a metric or channel, and its unit, as people are shown them."""
     quantity = metric_quantity(si_unit)
-    return display_difference(value, quantity), display_unit(quantity).replace("psi_g", "psi") or si_unit.removeprefix(
-        "-"
-    )
+    # A difference of pressures is not gauge, one of temperatures counts in kelvin.
+    unit = {"psi_g": "psi", "degC": "K"}.get(display_unit(quantity), display_unit(quantity))
+    return display_difference(value, quantity), unit or si_unit.removeprefix("-")

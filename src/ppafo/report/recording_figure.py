@@ -41,13 +41,10 @@ _LONGEST_SHOWN, _LONGEST_REMARK = 60, 500
 _END_OF_WALK = 5.0
 """Of a walk the last seconds are drawn, some strides: a minute of them is a black bar."""
 
+_ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
+_COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")
 PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]], ...] = (
-    (
-        Kind("Ankle angle", "rad", "angle"),
-        10.0,
-        (),
-        {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)},
-    ),
+    (_ANGLE, 10.0, (), {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)}),
     (
         Kind("Pressure", "Pa_a", "pressure"),
         5.0,
@@ -71,7 +68,7 @@ PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]]
         (),
         {"torque": ("actuator", ACTUAL), "reference": ("reference", REFERENCE)},
     ),
-    (Kind("Valve command (-1 to 1; 2 vents both chambers)"), 2.0, (-1.0, 1.0), {"command": ("", ACTUAL)}),
+    (_COMMAND, 2.0, (-1.0, 1.0), {"command": ("", ACTUAL)}),
     (
         Kind("Gas since the start", "kg", "gas mass"),
         0.01,
@@ -99,13 +96,20 @@ def recording_figure(
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
+    An ankle that a simulation holds at one angle is in the title instead, unless there is nothing else to draw.
     ``remark`` stands below the panels, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
-    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn, ``joint`` what it
-    turns.
+    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn, ``joint`` what it turns.
     """
     panels = []
+    title = title or recording.label
+    held = _held_angle(recording)
+    if held is not None:
+        title = f"{title}, {joint.name} at {_ANGLE.text(held)}"
     for kind, span, always_shown, lines in PANELS:
         shown = {name: line for name, line in lines.items() if name in recording}
+        if kind is _ANGLE and held is not None:
+            continue
+        vents = kind is _COMMAND and bool(shown) and float(recording["command"].max()) > 1.0
         # The axis of pressures counts from the standard atmosphere.
         shift = STANDARD_ATMOSPHERE - atmosphere if kind.quantity == "pressure" else 0.0
         marks = []
@@ -118,12 +122,23 @@ def recording_figure(
         if marks:
             ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
             then = partial(_set_limits, ends, span, always_shown)
-            named = replace(kind, words=joint.said(kind.words))
+            own = _COMMAND_THAT_VENTS if vents else kind
+            named = replace(own, words=joint.said(own.words))
             panels.append(Panel(TIME, named, marks, then=then, shares_x=True))
     if not panels:
         drawn = ", ".join(channel for *_, lines in PANELS for channel in lines)
         raise DataError(f"{recording.label}: has nothing to draw; a figure shows {drawn}")
-    return draw_panels(panels, 1, _SIZE, title or recording.label, remark, recording.kind)
+    return draw_panels(panels, 1, _SIZE, title, remark, recording.kind)
+
+
+def _held_angle(recording: Recording) -> float | None:
+    """Return the angle [rad] of a simulated ankle that never moves beside what else is drawn, None of any other."""
+    others = [name for _, _, _, lines in PANELS for name in lines if name != "angle" and name in recording]
+    follows = "reference_angle" in recording
+    if recording.kind != "simulated" or "angle" not in recording or not others or follows:
+        return None
+    angle = recording["angle"]
+    return float(angle[0]) if angle.size > 1 and bool((angle == angle[0]).all()) else None
 
 
 def _set_limits(

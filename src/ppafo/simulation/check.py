@@ -26,8 +26,8 @@ SHORTER = 4
 """How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
 MARGIN = 1.5
 """Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
-LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE = 2.0e-4, 1.0e-3
-"""Errors over the ranges of angle and pressures that a run keeps to unless it is sensitive."""
+LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
+"""Errors over the ranges of angle and pressures, and over the gas's temperature, that a run keeps to by default."""
 
 MOVE = 1.0e-7
 """How far a start or a measurement is moved, as a fraction of its range."""
@@ -41,28 +41,41 @@ DRAWS = 4
 """Draws of what moves the measurements of sensors without noise."""
 ALLOWED_PARTING = 1.0e-2
 """Largest difference of two runs over time that counts as none, as a fraction of the range."""
-_COURSES = {"angle over time": ("angle",), "pressures over time": ("pressure_1", "pressure_2")}
+_TEMPERATURES = "temperatures over time"
+_COURSES = {
+    "angle over time": ("angle",),
+    "pressures over time": ("pressure_1", "pressure_2"),
+    _TEMPERATURES: ("temperature_1", "temperature_2"),
+}
 
 
 @dataclass(frozen=True, slots=True)
 class ErrorEstimate:
     """Estimated error of a run from its time stepping: largest over time of the angle [rad] and of a pressure [Pa].
 
-    ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number.
+    ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number; ``largest`` the
+    name of the one whose error is largest over its value or the range of its quantity, empty without metrics, and
+    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other.
     """
 
     angle: float
     pressure: float
     metrics: Mapping[str, float]
+    temperature: float | None = None
+    largest: str = ""
+    share: float = 0.0
 
     @property
     def sentence(self) -> str:
-        """The errors of angle and pressures in the units that people are shown."""
+        """The errors of angle, pressures, temperatures and metrics in the units that people are shown."""
         from ppafo.report.display_units import metric_change
 
-        shown = (metric_change(self.angle, "rad"), metric_change(self.pressure, "Pa"))
-        angle, pressure = (f"{value:.1e} {unit}" for value, unit in shown)
-        return f"Estimated error of the steps: at most {angle} and {pressure}."
+        errors = {"rad": self.angle, "Pa": self.pressure, "K": self.temperature}
+        shown = [metric_change(error, unit) for unit, error in errors.items() if error is not None]
+        texts = [f"{value:.1e} {unit}" for value, unit in shown]
+        over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
+        of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
+        return f"Estimated error of the steps: at most {over_time} over time{of_metrics}."
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +110,7 @@ class NumberCheck:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check:
-    """What of a run is determined: its metrics, and its angle and pressures over time.
+    """What of a run is determined: its metrics, and its angle, pressures and temperatures over time.
 
     ``error`` is the estimated error of the run from its steps, of which the one with finer steps has a sixteenth.
     ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
@@ -214,14 +227,43 @@ def finer(run: Run) -> Run:
 
 def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
     """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
+    courses = [_COURSES[name] for name in _courses_of(result)]
     if not fine.status.is_completed:
-        return ErrorEstimate(math.inf, math.inf, dict.fromkeys(result.metrics, math.inf))
-    angle, pressure = (
-        MARGIN * float(np.max(_largest_differences(fine.recording, result.recording, names)))
-        for names in _COURSES.values()
-    )
-    changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
-    return ErrorEstimate(angle, pressure, {name: MARGIN * change for name, change in changes.items()})
+        found, errors = [math.inf for _ in courses], dict.fromkeys(result.metrics, math.inf)
+    else:
+        largest = [np.max(_largest_differences(fine.recording, result.recording, names)) for names in courses]
+        found = [MARGIN * float(difference) for difference in largest]
+        changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
+        errors = {name: MARGIN * change for name, change in changes.items()}
+    angle, pressure = found[:2]
+    temperature = found[2] if len(found) > 2 else None
+    shares = _shares(result, errors)
+    worst = max(shares, key=lambda name: shares[name], default="")
+    return ErrorEstimate(angle, pressure, errors, temperature, worst, shares.get(worst, 0.0))
+
+
+def _courses_of(result: Ran) -> list[str]:
+    """What of a run is compared over time: temperatures where they are recorded."""
+    return [name for name, channels in _COURSES.items() if all(channel in result.recording for channel in channels)]
+
+
+def _shares(result: Ran, errors: Mapping[str, float]) -> dict[str, float]:
+    """Errors of metrics over their values or the ranges of their quantities [-]; those that have either."""
+    pressures = _pressure_range(result)
+    scales = {
+        name: max(abs(metric.value), _metric_range(result, name, metric.unit, pressures))
+        for name, metric in result.metrics.items()
+        if math.isfinite(metric.value)
+    }
+    return {name: errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
+
+
+def _pressure_range(result: Ran) -> float:
+    """Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one."""
+    supply = result.scenario.device.supply
+    outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
+    values = np.concatenate([result.recording["pressure_1"], result.recording["pressure_2"], outside])
+    return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
 def checked(result: Ran, run: Run, again: Again) -> Check:
@@ -238,18 +280,14 @@ def checked(result: Ran, run: Run, again: Again) -> Check:
                 f"{scenario.name}: {type(controller).__name__} gives a different run each time, so nothing can be "
                 f"checked; its reset() must forget everything, and its random numbers need a fixed seed"
             )
-    # Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one.
-    supply = scenario.device.supply
-    outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
-    values = np.concatenate([recording["pressure_1"], recording["pressure_2"], outside])
-    pressures = float(np.ptp(values)) or supply.atmospheric_pressure
-    starts = [_start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
+    pressures = _pressure_range(result)
+    starts = [start_moved(run, move, apart) for apart in (1.0, -1.0) for move in (MOVE, -MOVE)]
     repeats = [(FINER, finer(run)), *((MOVED_START, moved) for moved in starts)]
     if not run.program.ideal_sensors:
         repeats += [(MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures)]
     results = again([repeat for _, repeat in repeats])
     found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-    courses = tuple(_course(name, found, result, pressures) for name in _COURSES)
+    courses = tuple(_course(name, found, result, pressures) for name in _courses_of(result))
     partings = [repeated.status.time for repeated in results if repeated.status.time is not None]
     for course in courses:
         for repeated in results:
@@ -262,11 +300,11 @@ def checked(result: Ran, run: Run, again: Again) -> Check:
         error=estimated_error(result, results[0]),
         parts_at=min(partings, default=None),
         failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
-        atmosphere=supply.atmospheric_pressure,
+        atmosphere=scenario.device.supply.atmospheric_pressure,
     )
 
 
-def _start_moved(run: Run, move: float, apart: float) -> Run:
+def start_moved(run: Run, move: float, apart: float) -> Run:
     """The run from a little more gas in both chambers, and where the vane is free from a little further on.
 
     With ``apart`` -1 chamber 2 has a little less instead: a torque that is exactly the wanted one then is so no more.
@@ -376,12 +414,14 @@ def _largest_differences(one: Recording, other: Recording, channels: Iterable[st
 
 
 def _course(name: str, repeats: list[tuple[str, Ran]], result: Ran, pressures: float) -> NumberCheck:
-    actuator = result.scenario.device.actuator
-    is_angle = name == "angle over time"
-    span, unit = (actuator.angle_max - actuator.angle_min, "rad") if is_angle else (pressures, "Pa")
+    device = result.scenario.device
+    span, unit, promised = {
+        "angle over time": (device.actuator.angle_max - device.actuator.angle_min, "rad", LARGEST_OF_ANGLE),
+        "pressures over time": (pressures, "Pa", LARGEST_OF_PRESSURE),
+        _TEMPERATURES: (device.gas.temperature, "K", LARGEST_OF_TEMPERATURE),
+    }[name]
     changes = _largest(
         (repeat, float(np.max(_largest_differences(repeated.recording, result.recording, _COURSES[name]))))
         for repeat, repeated in repeats
     )
-    allowed_error = (LARGEST_OF_ANGLE if is_angle else LARGEST_OF_PRESSURE) * span / MARGIN
-    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, allowed_error)
+    return NumberCheck(name, unit, span, ALLOWED_PARTING * span, changes, promised * span / MARGIN)

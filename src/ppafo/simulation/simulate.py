@@ -14,13 +14,12 @@ from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
+from ppafo.simulation import at_hand
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
     from matplotlib.figure import Figure
 
     from ppafo.metrics.metric import Metric
@@ -162,39 +161,11 @@ class Result:
             "scenario": scenario_document(self.scenario),
         }
 
-    def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
-        """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
-
-        DataError for a channel that is not there, UnitError for a unit that does not fit it.
-        """
-        if isinstance(channel, str):
-            return self.recording[channel]
-        name, unit = channel
-        return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
-
-    def _ipython_key_completions_(self) -> list[str]:
-        """Return the channels, which a notebook completes between brackets."""
-        return list(self.recording.names)
-
-    def _repr_html_(self) -> str:
-        """Return metrics and figure, which a notebook shows."""
-        from ppafo.report.notebook import result_html
-
-        return result_html(str(self).partition("\n")[0], self.metrics, self.scenario.device, self.plot())
-
-    def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
-        """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
-
-        Channels are in SI but for those with another unit in ``units``, ``{"pressure_1": "psi_g"}``.
-        """
-        from ppafo.storage import dataset_of
-
-        atmosphere = self.scenario.device.supply.atmospheric_pressure
-        return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
-
-    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
-        """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
-        return self.dataset(units).to_dataframe()
+    __getitem__ = at_hand.channel_values
+    _ipython_key_completions_ = at_hand.channel_names
+    _repr_html_ = at_hand.html
+    dataset = at_hand.dataset
+    to_dataframe = at_hand.dataframe
 
     def save(self, folder: str | Path, attachments: Mapping[str, bytes] | None = None) -> Path:
         """Write ``recording.nc``, ``recording.csv``, ``run.json`` and any attachments (contents by file name).

@@ -16,8 +16,9 @@ from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
+from ppafo.simulation import at_hand
 from ppafo.simulation.oscillation import Oscillation, oscillation_of
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import opensim_recording, write_opensim
@@ -46,8 +47,6 @@ from ppafo.walking.strides import (
 from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
 
 if TYPE_CHECKING:
-    import pandas  # type: ignore[import-untyped]
-    import xarray
     from matplotlib.figure import Figure
 
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
@@ -228,36 +227,11 @@ class WalkResult:
 
         return shown(walk_figure({self.scenario.name: self}))
 
-    def __getitem__(self, channel: str | tuple[str, str]) -> Floats:
-        """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
-
-        DataError for a channel that is not there, UnitError for a unit that does not fit it.
-        """
-        if isinstance(channel, str):
-            return self.recording[channel]
-        name, unit = channel
-        return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
-
-    def _ipython_key_completions_(self) -> list[str]:
-        """Return the channels, which a notebook completes between brackets."""
-        return list(self.recording.names)
-
-    def _repr_html_(self) -> str:
-        """Return metrics and figure, which a notebook shows."""
-        from ppafo.report.notebook import result_html
-
-        return result_html(str(self).partition("\n")[0], self.metrics, self.scenario.device, self.plot())
-
-    def dataset(self, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
-        """Return the recording as an xarray Dataset; ``units`` are other units than those of SI by channel."""
-        from ppafo.storage import dataset_of
-
-        atmosphere = self.scenario.device.supply.atmospheric_pressure
-        return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
-
-    def to_dataframe(self, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
-        """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
-        return self.dataset(units).to_dataframe()
+    __getitem__ = at_hand.channel_values
+    _ipython_key_completions_ = at_hand.channel_names
+    _repr_html_ = at_hand.html
+    dataset = at_hand.dataset
+    to_dataframe = at_hand.dataframe
 
     def save_opensim(self, path: str | Path) -> Path:
         """Write the recording as a ``.sto`` file in OpenSim's names, zero and signs, right leg; returns the path."""

@@ -42,7 +42,19 @@ def test_there_is_a_panel_for_each_quantity_that_was_recorded_and_no_other() -> 
     assert titles(recording_figure(recording(torque=1.0, angle=1.0))) == ["Ankle angle (deg)", "Actuator torque (N m)"]
     whole = recording_figure(recording(**dict.fromkeys(CHANNELS, 1.0)))
     assert titles(whole)[-1] == "Gas since the start (g)"
-    assert len(whole.axes) == 5
+    assert len(whole.axes) == 6
+
+
+def test_an_ankle_that_a_simulation_holds_is_in_the_title_and_no_flat_panel() -> None:
+    figure = recording_figure(recording("simulated", torque=1.0, angle=np.pi / 2.0), "task")
+    assert titles(figure) == ["Actuator torque (N m)"]
+    assert "task, ankle at 90 deg" in texts(figure)
+    assert titles(recording_figure(recording("simulated", angle=1.0))) == ["Ankle angle (deg)"]
+
+
+@pytest.mark.parametrize(("command", "words"), [(1.0, "(-1 to 1)"), (2.0, "(-1 to 1; 2 vents both chambers)")])
+def test_a_command_that_vents_is_explained_where_it_is_given(command: float, words: str) -> None:
+    assert titles(recording_figure(recording(command=command))) == [f"Valve command {words}"]
 
 
 def test_angles_are_drawn_in_degrees_and_gas_in_grams() -> None:
@@ -96,7 +108,7 @@ def test_one_sample_can_be_drawn() -> None:
 
 
 def test_a_recording_with_nothing_to_draw_is_refused() -> None:
-    with pytest.raises(DataError, match="task: has nothing to draw; a figure shows angle, pressure_1"):
+    with pytest.raises(DataError, match="task: has nothing to draw; a figure shows angle, reference_angle, pressure_1"):
         recording_figure(recording(mass_1=1.0))
 
 

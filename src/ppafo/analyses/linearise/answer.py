@@ -256,14 +256,14 @@ def frequency_panels(model: LinearModel) -> list[Panel]:
     return [
         Panel(
             _FREQUENCY,
-            Kind("torque per command", "N m"),
+            Kind("Torque per command", "N m"),
             [Mark("line", frequencies, np.abs(response))],
             then=lambda axes: axes.set(xscale="log", yscale="log"),
             shares_x=True,
         ),
         Panel(
             _FREQUENCY,
-            Kind("phase", "deg"),
+            Kind("Phase", "deg"),
             [
                 Mark("line", frequencies, phase, label="plant"),
                 Mark("line", frequencies, phase - 360.0 * frequencies * late, (), delayed, VERMILION, _DASHED),
@@ -289,14 +289,14 @@ def steps_panels(model: LinearModel) -> list[Panel]:
     dots = {"linestyle": "", "marker": "o", "markersize": 4}
     return [
         Panel(
-            replace(TIME, words="time after the step"),
-            Kind("change of torque per command", "N m"),
+            replace(TIME, words="Time after the step"),
+            Kind("Change of torque per command", "N m"),
             [*over_time, linear],
             legend="inside",
         ),
         Panel(
-            Kind("largest change of torque in a step", "N m"),
-            Kind("runs less linear model", "N m"),
+            Kind("Largest change of torque in a step", "N m"),
+            Kind("Runs less linear model", "N m"),
             [
                 Mark("line", steps.sizes, steps.errors, label="largest difference", style=dots),
                 Mark("line", steps.sizes, square, (), "square of the amplitude", GREY, _DASHED),
@@ -307,7 +307,7 @@ def steps_panels(model: LinearModel) -> list[Panel]:
     ]
 
 
-_FREQUENCY = Kind("frequency", "Hz")
+_FREQUENCY = Kind("Frequency", "Hz")
 _DASHED = {"linestyle": "--"}
 _FREQUENCY_CAPTION = (
     "The torque for a small sine of the command; dashed: with the dead time, the age of the measurements and half a "

@@ -83,6 +83,25 @@ def transport(thermal: ThermalParameters, flow: float, root_from: float, root_to
     return Transport(mass_flow_ratio(root), enthalpy_flow_ratio(root, thermal.heat_capacity_ratio))
 
 
+ALLOWED_OF_TEMPERATURE = 2.5e-4
+"""Error of one step over the reference temperature; with it a run keeps to 2e-3 of it."""
+NEARLY_EQUAL = 1.0e-4
+"""Difference of two pressures over one of them below which gas may turn within a step."""
+
+
+def steeper_transport(
+    thermal: ThermalParameters, flow: float, turns: float, root_from: float, root_to: float
+) -> Transport:
+    """As ``transport``; where a flow [kg/s] is below the one at which it may turn, of the side that carries more.
+
+    Cold gas that leaves a settled chamber would turn into warm gas that enters, more of it than the matrix knows: a
+    matrix that is too steep damps that, one that is too flat makes it grow from step to step.
+    """
+    steeper = max(root_from, root_to)
+    is_settled = abs(flow) < turns
+    return transport(thermal, flow, steeper if is_settled else root_from, steeper if is_settled else root_to)
+
+
 def wall_rate(thermal: ThermalParameters, volume: float, content: float, mass: float) -> float:
     """Content [kg/s] that the wall of a chamber gives to its gas."""
     return thermal.wall_exchange * volume * (1.0 - content / mass)
@@ -143,15 +162,21 @@ def flow_slopes(
     in_1: PortFlowSlopes,
     in_2: PortFlowSlopes,
     leak: LeakSlopes,
+    near_1: float,
+    near_2: float,
 ) -> FlowSlopes:
-    """How all flows respond to both contents; weights are gamma h times pressure over content [Pa s/kg]."""
+    """How all flows respond to both contents; weights are gamma h times pressure over content [Pa s/kg].
+
+    ``near_1`` and ``near_2`` [Pa] are differences of pressure below which a flow may turn.
+    """
     leak_carries = transport(thermal, leak.flow, root_1, root_2)
     source_1 = transport(thermal, in_1.from_source, 1.0, root_1)
     source_2 = transport(thermal, in_2.from_source, 1.0, root_2)
-    vent_1 = transport(thermal, in_1.total - in_1.from_source, 1.0, root_1)
-    vent_2 = transport(thermal, in_2.total - in_2.from_source, 1.0, root_2)
     vent_slope_1 = in_1.total_slope - in_1.source_slope
     vent_slope_2 = in_2.total_slope - in_2.source_slope
+    turns_1, turns_2 = abs(vent_slope_1) * near_1, abs(vent_slope_2) * near_2
+    vent_1 = steeper_transport(thermal, in_1.total - in_1.from_source, turns_1, 1.0, root_1)
+    vent_2 = steeper_transport(thermal, in_2.total - in_2.from_source, turns_2, 1.0, root_2)
     by_1 = leak.by_1 * weight_1
     by_2 = leak.by_2 * weight_2
     return FlowSlopes(
@@ -362,7 +387,9 @@ def begin_thermal_stage(
     weight = GAMMA * step
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
-    slopes = flow_slopes(thermal, root_1, root_2, weight * per_content_1, weight * per_content_2, in_1, in_2, leak)
+    near_1, near_2 = NEARLY_EQUAL * per_content_1 * state.mass_1, NEARLY_EQUAL * per_content_2 * state.mass_2
+    weight_1, weight_2 = weight * per_content_1, weight * per_content_2
+    slopes = flow_slopes(thermal, root_1, root_2, weight_1, weight_2, in_1, in_2, leak, near_1, near_2)
     matrix = thermal_matrix(thermal, state, masses, volume_1, volume_2, growth, weight, slopes)
     # A growing volume lowers the pressure as a loss of content at this rate would.
     drift = flow_response(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
@@ -431,9 +458,21 @@ def thermal_change(
 
 
 def thermal_error(plant: PlantParameters, begun: ThermalGas, second: ThermalFlows, step: float) -> float:
-    """Estimated error of both pressures at the end of a step [s] over what is allowed [-], as ``gas_error``."""
+    """Estimated error of pressures and temperatures after a step [s] over what is allowed [-], as ``gas_error``.
+
+    A chamber that gas flushes within a step has a pressure that is settled and a temperature that is not.
+    """
     added = solve_thermal_stage(begun.matrix, combine_flows(begun.first, 1.0, second, 1.0))
-    return 0.5 * over_allowed(plant, begun, added.content_1, added.content_2, step)
+    return 0.5 * max(over_allowed(plant, begun, added.content_1, added.content_2, step), warming(begun, added, step))
+
+
+def warming(begun: ThermalGas, added: ThermalFlows, step: float) -> float:
+    """Errors of contents and masses [kg/s] over a step [s], as the larger of both temperatures' over the allowed."""
+    # The temperature over the reference is content over mass: what a little of both changes it by.
+    mass_1, mass_2 = begun.end_masses.mass_1, begun.end_masses.mass_2
+    warmer_1 = (added.content_1 - begun.end.mass_1 / mass_1 * added.mass_1) / mass_1
+    warmer_2 = (added.content_2 - begun.end.mass_2 / mass_2 * added.mass_2) / mass_2
+    return max(abs(warmer_1), abs(warmer_2)) * step / ALLOWED_OF_TEMPERATURE
 
 
 def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: float, step: float) -> float:

@@ -1,6 +1,7 @@
 """A foot on a prescribed shank in a step, without ground: the torque that it adds to an unconstrained vane."""
 
 from ppafo.engine.program import Program
+from ppafo.engine.scheme.motion import SAME_INSTANT
 from ppafo.engine.step.lane import Lane
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.leg import ShankNow, torque_on_foot, torque_on_resting_foot
@@ -15,6 +16,14 @@ def shank(parts: Program, lane: Lane, time: float) -> ShankNow:
         return now
     angle, rate, acceleration = parts.shank.value(lane.shank, time)
     return ShankNow(angle=angle, rate=rate, acceleration=acceleration, knee_forward=0.0, knee_up=0.0)
+
+
+def until_jump(parts: Program, lane: Lane, time: float) -> float:
+    """Time [s] from one [s] until the acceleration of the shank jumps; a jump that is due has happened."""
+    assert parts.shank is not None, "a foot has a shank"
+    assert parts.shank.until_jump is not None, "the shank jumps"
+    behind: float = parts.shank.until_jump(lane.shank, time + SAME_INSTANT)
+    return behind + SAME_INSTANT
 
 
 def torque(parts: Program, lane: Lane, time: float, angle: float) -> float:

@@ -80,6 +80,8 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
         settled = parts.valve.settle(lane.valve, lane.valve_state, command, time)
         jump = parts.valve.next_event(lane.valve, settled, command, time)
         until = motion.until_jump(jump - time, until)
+    if parts.foot is not None and parts.shank_jumps:
+        until = motion.until_jump(parts.foot.until_jump(parts, lane, time), until)
     # A failed run takes its steps whole, so that it ends without holding up its block.
     hurries = lane.result.failure_time <= time
     if parts.is_adaptive:
@@ -87,7 +89,8 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
     else:
         until = remaining if hurries else until
     if parts.is_adaptive and parts.angle is None:
-        added = torque_of_leg(parts, lane, time, lane.state.angle)
+        beginning = time + motion.SAME_INSTANT if parts.shank_jumps else time
+        added = torque_of_leg(parts, lane, beginning, lane.state.angle)
         lane.begun, until = motion.begin_part(lane.plant, lane.state, added, until)
     lane.length = until
     lane.remaining = remaining
@@ -218,7 +221,10 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
     """Where the vane comes if it slides on or stays at rest."""
     length = length_of(parts, lane)
     parts.gas.add(parts, lane)
-    added = torque_of_leg(parts, lane, time_of(parts, lane, now) + length, lane.begun.next_angle)
+    end = time_of(parts, lane, now) + length
+    # Just before a jump that ends the part, as the next one begins just behind it.
+    ending = end - motion.SAME_INSTANT if parts.shank_jumps else end
+    added = torque_of_leg(parts, lane, ending, lane.begun.next_angle)
     lane.slid, lane.moved = motion.slide_part(lane.plant, lane.fed, lane.begun, added, length)
 
 
@@ -290,7 +296,11 @@ def end_motion(parts: Program, lane: Lane) -> None:
 
 def error_of(parts: Program, lane: Lane, now: Now) -> float:
     """The largest error of a part over what is allowed [-]: of motion, gas, and states of effects."""
-    missed = max(lane.moved.error if parts.angle is None else 0.0, lane.gas_error)
+    moved = lane.moved.error if parts.angle is None else 0.0
+    if parts.shank_jumps:
+        # From knot to knot the acceleration runs one way, and the errors of parts add up.
+        moved = 2.0 * moved
+    missed = max(moved, lane.gas_error)
     if parts.stated_with_errors:
         missed = max(missed, stated.error(parts, lane, command_of(parts, lane, now), length_of(parts, lane)))
     return missed

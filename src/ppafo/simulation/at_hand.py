@@ -1,0 +1,73 @@
+"""What every result with a recording has at hand: channels in any unit, tables, and what a notebook shows of it."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol
+
+from ppafo.engine.lanes import Floats
+from ppafo.signals.recording import Recording
+from ppafo.simulation.scenario import Scenario, scenario_document
+
+if TYPE_CHECKING:
+    import pandas  # type: ignore[import-untyped]
+    import xarray
+    from matplotlib.figure import Figure
+
+    from ppafo.metrics.metric import Metric
+
+
+class Recorded(Protocol):
+    """A result with a recording."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+
+    @property
+    def recording(self) -> Recording:
+        """Its channels."""
+
+    @property
+    def metrics(self) -> "Mapping[str, Metric]":
+        """Its metrics by name."""
+
+    def plot(self) -> "Figure":
+        """Return its figure."""
+
+
+def channel_values(self: Recorded, channel: str | tuple[str, str]) -> Floats:
+    """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
+
+    DataError for a channel that is not there, UnitError for a unit that does not fit it.
+    """
+    if isinstance(channel, str):
+        return self.recording[channel]
+    name, unit = channel
+    return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
+
+
+def channel_names(self: Recorded) -> list[str]:
+    """Return the channels, which a notebook completes between brackets."""
+    return list(self.recording.names)
+
+
+def html(self: Recorded) -> str:
+    """Return metrics and figure, which a notebook shows."""
+    from ppafo.report.notebook import result_html
+
+    return result_html(str(self).partition("\n")[0], self.metrics, self.scenario.device, self.plot())
+
+
+def dataset(self: Recorded, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
+    """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
+
+    Channels are in SI but for those with another unit in ``units``, ``{"pressure_1": "psi_g"}``.
+    """
+    from ppafo.storage import dataset_of
+
+    atmosphere = self.scenario.device.supply.atmospheric_pressure
+    return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
+
+
+def dataframe(self: Recorded, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+    """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
+    return dataset(self, units).to_dataframe()
