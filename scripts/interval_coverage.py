@@ -59,7 +59,7 @@ NOISE = {"angle": math.radians(0.05), "pressure_1": 400.0, "pressure_2": 400.0}
 PRESETS = {"ideal": "ideal-laboratory", "default": "paper-bench"}
 DEPARTURES = {
     "stribeck": ("effects.stribeck.velocity=0.3 rad/s",),
-    "dead volume": ("actuator.dead_volume_1=35 cm^3", "actuator.dead_volume_2=35 cm^3"),
+    "dead volume": ("actuator.dead_volume_1=70 cm^3", "actuator.dead_volume_2=70 cm^3"),
     "displacement per radian": ("actuator.displacement_per_radian=28 cm^3/rad",),
     "leak that opens": ("effects.leak_opening.pressure=150 kPa_d",),
     "slew limit": ("valve.slew_limit=40 1/s",),

@@ -5,7 +5,8 @@
 
 FOLDER has recordings ``SEAL_Nbar.csv`` of a cylinder that is driven to and fro at N bar, and ``chamber-NAME.csv`` of
 closed chambers, in the forms of the example ``measured-cylinder``, which is taken where none is named. Friction over
-pressure is fitted with one pressure left out and predicted there; the pressure in a closed chamber is fitted to the
+pressure is fitted with one pressure left out and predicted there, and whether it is a straight line is what
+`ppafo identify cylinder.toml` says; the pressure in a closed chamber is fitted to the
 first half of its recording and predicted for the second.
 """
 
@@ -24,7 +25,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from ppafo.errors import PpafoError
+from ppafo.identification.problem import Setting, load_problem, run_procedure
+from ppafo.identification.source import source_of
+from ppafo.identification.tolerances import tolerances_of
 from ppafo.model.orifice import isentropic_flow_function
+from ppafo.parameters.loading import load_parameter_set
 from ppafo.report.style import BLACK, COLOURS, GREY, house_style
 from ppafo.storage.foreign import load_column_map, read_foreign
 from ppafo.units import to_si
@@ -121,6 +126,7 @@ class Seal:
     line: tuple[float, float]
     errors: tuple[float, float]
     left_out: tuple[LeftOut, ...]
+    is_line: bool
 
     @property
     def bend(self) -> float:
@@ -130,15 +136,22 @@ class Seal:
 
     @property
     def verdict(self) -> str:
-        """Whether a straight line explains the friction over pressure."""
-        missed = [one for one in self.left_out if not one.is_predicted]
-        if not missed:
-            return "a straight line predicts each pressure that was left out"
-        worst = max(missed, key=lambda one: abs(one.measured - one.line))
+        """Whether a straight line explains the friction over pressure, as `ppafo identify` says it."""
+        if self.is_line:
+            return "identify: a straight line"
+        worst = max(self.left_out, key=lambda one: abs(one.measured - one.line) / one.band)
         return (
-            f"NO STRAIGHT LINE: bends {'up' if self.bend > 0.0 else 'down'}wards; misses {worst.bar:g} bar by "
-            f"{abs(worst.measured - worst.line):.2f} N, {abs(worst.measured - worst.line) / worst.measured:.0%}"
+            f"identify: NO STRAIGHT LINE; bends {'up' if self.bend > 0.0 else 'down'}wards; misses {worst.bar:g} bar "
+            f"by {abs(worst.measured - worst.line):.2f} N, {abs(worst.measured - worst.line) / worst.measured:.0%}"
         )
+
+
+def is_line(files: list[Path]) -> bool:
+    """Return whether `ppafo identify cylinder.toml` finds friction linear in pressure in these recordings."""
+    problem = load_problem(EXAMPLE / "cylinder.toml")
+    sources = tuple(source_of(file, read_foreign(file, problem.columns["rig"])) for file in files)
+    setting = Setting(load_parameter_set(problem.device.set), "", "cylinder.toml", tolerances_of(problem.bench, ""))
+    return all(one.is_identified for one in run_procedure(sources, problem.procedure[0], setting).estimates)
 
 
 def area_of(readings: list[Reading]) -> float:
@@ -170,29 +183,31 @@ def without(readings: list[Reading], index: int) -> LeftOut:
     return LeftOut(one.bar, one.friction(area)[0], line, band, constant)
 
 
-def seal_of(name: str, readings: list[Reading]) -> Seal:
-    """Return what the readings of a seal say."""
+def seal_of(name: str, files: list[tuple[float, Path]]) -> Seal:
+    """Return what the recordings of a seal say, each with its pressure [bar]."""
+    readings = [read(file, bar) for bar, file in files]
     area = area_of(readings)
     numbers, covariance, _ = line_through(readings, area)
     line, errors = numbers.tolist(), np.sqrt(np.diag(covariance)).tolist()
     friction = tuple(one.friction(area) for one in readings)
     left_out = tuple(without(readings, index) for index in range(len(readings)))
-    return Seal(name, tuple(readings), area, friction, (line[0], line[1]), (errors[0], errors[1]), left_out)
+    straight = is_line([file for _, file in files])
+    return Seal(name, tuple(readings), area, friction, (line[0], line[1]), (errors[0], errors[1]), left_out, straight)
 
 
 def seals_in(folder: Path) -> list[Seal]:
     """Return every seal with recordings at four pressures or more in a folder."""
-    found: dict[str, list[Reading]] = {}
+    found: dict[str, list[tuple[float, Path]]] = {}
     for file in sorted(folder.glob("*_*bar.csv")):
         parts = re.fullmatch(r"(.+)_([0-9.]+)bar", file.stem)
         if parts is not None:
-            found.setdefault(parts[1], []).append(read(file, float(parts[2])))
-    few = [name for name, readings in found.items() if len(readings) < 4]
+            found.setdefault(parts[1], []).append((float(parts[2]), file))
+    few = [name for name, files in found.items() if len(files) < 4]
     if few:
         raise PpafoError(
             f"{folder}: {few[0]} has recordings at {len(found[few[0]])} pressures; four or more are needed"
         )
-    return [seal_of(name, sorted(readings, key=lambda one: one.bar)) for name, readings in found.items()]
+    return [seal_of(name, sorted(files)) for name, files in found.items()]
 
 
 LAWS = ("orifice", "laminar", "both")

@@ -38,27 +38,29 @@ def cylinder(raw_files: Path) -> Identification:
     return identify(raw_files / "cylinder-problem.toml").found
 
 
-def test_the_known_area_lies_inside_the_interval_and_within_a_quarter_percent(cylinder: Identification) -> None:
+def test_the_known_area_lies_inside_the_interval_and_within_three_tenths_of_a_percent(cylinder: Identification) -> None:
     area = cylinder.results[0]["static_torque.area"]
     assert area.low <= KNOWN_AREA <= area.high
-    assert abs(area.value / KNOWN_AREA - 1.0) < 0.0025
+    assert abs(area.value / KNOWN_AREA - 1.0) < 0.003
     assert area.half_width < 0.01 * area.value
 
 
 def test_friction_of_the_cylinder_grows_with_pressure(cylinder: Identification) -> None:
     growth = cylinder.results[0]["static_torque.friction_per_pressure"]
     assert growth.low > 2.0e-6
-    assert growth.value == pytest.approx(5.07e-6, rel=0.02)
+    assert growth.value == pytest.approx(5.30e-6, rel=0.02)
 
 
-def test_recordings_that_do_not_agree_hold_for_this_model_only_and_nothing_of_newtons_is_written(
-    cylinder: Identification,
+def test_recordings_agree_where_their_zeros_may_differ_and_nothing_of_newtons_is_written(
+    cylinder: Identification, raw_files: Path
 ) -> None:
-    result = cylinder.results[0]
+    assert {item.verdict for item in cylinder.results[0].estimates} == {"identified"}
+    assert cylinder.new_set.written == cylinder.new_set.fitted == (), "a set has no place for newtons"
+    text = blocks("toml")[0].replace('each_recording = ["zero"]', "")
+    (raw_files / "one-zero.toml").write_text(text, encoding="utf-8")
+    result = identify(raw_files / "one-zero.toml").found.results[0]
     assert {item.verdict for item in result.estimates} == {"holds for this model only"}
     assert "fitted alone, " in result.conflict
-    assert cylinder.new_set.written == ()
-    assert cylinder.new_set.fitted == (), "a set has no place for newtons"
 
 
 def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_motion(raw_files: Path) -> None:
@@ -68,9 +70,9 @@ def test_with_its_lever_arm_the_friction_of_a_sliding_cylinder_is_friction_in_mo
     (raw_files / "lever.toml").write_text(text, encoding="utf-8")
     found = identify(raw_files / "lever.toml").found
     growth = "effects.seal_friction.dynamic_per_pressure"
-    assert set(found.new_set.fitted) == {"actuator.torque_constant", "friction.dynamic_torque", growth}
-    assert found.results[0]["friction.dynamic_torque"].value == pytest.approx(0.022 * 4.23, rel=0.01)
-    assert found.new_set.parameter_set.numbers["friction.static_torque"].origin != "fitted"
+    assert set(found.new_set.written) == {"actuator.torque_constant", "friction.dynamic_torque", growth}
+    assert found.results[0]["friction.dynamic_torque"].value == pytest.approx(0.022 * 4.14, rel=0.01)
+    assert found.new_set.parameter_set.numbers["friction.static_torque"].origin != "identified"
 
 
 def test_a_wrong_sign_of_the_direction_is_found_in_the_real_data(raw_files: Path) -> None:
@@ -92,7 +94,7 @@ def test_a_chamber_whose_gas_comes_to_rest_gets_no_area(raw_files: Path, name: s
 
 def test_the_page_shows_what_the_command_prints(raw_files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (raw_files / "problem.toml").write_text(blocks("toml")[0], encoding="utf-8")
-    assert main(["identify", str(raw_files / "problem.toml")]) == 1
+    assert main(["identify", str(raw_files / "problem.toml")]) == 0
     assert_shows(blocks("text")[0], capsys.readouterr().out)
 
 
@@ -102,6 +104,6 @@ def test_the_command_of_the_page_leaves_what_the_page_says(raw_files: Path, monk
         if line.startswith("cd "):
             monkeypatch.chdir(line.removeprefix("cd "))
         else:
-            assert main(line.split()[1:]) == (1 if " identify " in line else 0)
+            assert main(line.split()[1:]) == 0
     made = {path.name for path in Path("identified").iterdir()}
     assert {"cylinder.toml", "identify.json", "identify.txt", "static-torque.png"} <= made

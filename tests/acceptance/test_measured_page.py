@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -39,12 +40,23 @@ def test_the_known_area_is_found(seals: dict[str, measured.Seal]) -> None:
     assert seals["O-ring257"].area == pytest.approx(KNOWN_AREA, rel=0.0025)
 
 
-def test_a_pressure_is_predicted_or_the_line_is_said_not_to_hold(seals: dict[str, measured.Seal]) -> None:
-    for seal in seals.values():
-        inside = all(one.is_predicted for one in seal.left_out)
-        assert seal.verdict.startswith("a straight line predicts" if inside else "NO STRAIGHT LINE"), seal.name
+def test_page_and_identify_give_one_answer_on_friction_over_pressure(
+    seals: dict[str, measured.Seal], tmp_path: Path
+) -> None:
+    assert {name: seal.verdict.startswith("identify: a straight line") for name, seal in seals.items()} == {
+        "KDN": True, "NAPN": False, "O-ring257": True, "PK": False,
+    }  # fmt: skip
     assert "downwards" in seals["NAPN"].verdict
     assert "upwards" in seals["PK"].verdict
+    text = (measured.EXAMPLE / "cylinder.toml").read_text(encoding="utf-8")
+    for name, seal in seals.items():
+        for file in measured.EXAMPLE.glob(f"{name}_*.csv"):
+            shutil.copy(file, tmp_path)
+        (tmp_path / "problem.toml").write_text(text.replace('"O-ring257_', f'"{name}_'), encoding="utf-8")
+        result = identify(tmp_path / "problem.toml").found.results[0]
+        assert {one.is_identified for one in result.estimates} == {seal.is_line}, name
+        # Where a line holds, each pressure is in the band that the others predict.
+        assert seal.is_line == all(one.is_predicted for one in seal.left_out), name
 
 
 def test_what_is_left_out_is_not_seen_by_the_fit(seals: dict[str, measured.Seal]) -> None:
@@ -67,9 +79,9 @@ def test_a_tight_line_of_friction_is_predicted_and_a_bent_one_is_not(tmp_path: P
             rows = [time * 1e3, 0 * time, 0 * time, 0 * time, position, bar + 0 * time, force]
             np.savetxt(tmp_path / f"{name}_{bar}bar.csv", np.column_stack(rows), fmt="%.3f", delimiter="\t")
     found = {seal.name: seal for seal in measured.seals_in(tmp_path)}
-    assert found["straight"].verdict.startswith("a straight line predicts")
+    assert found["straight"].verdict == "identify: a straight line"
     assert found["straight"].line == pytest.approx((2.0, 0.5e-5), rel=1e-3)
-    assert "NO STRAIGHT LINE: bends upwards" in found["bent"].verdict
+    assert "NO STRAIGHT LINE; bends upwards" in found["bent"].verdict
 
 
 def test_a_folder_without_recordings_is_one_line(
@@ -90,7 +102,7 @@ def test_the_recordings_are_those_of_the_source_file() -> None:
 
 def test_a_first_fit_of_a_real_device_finds_the_known_area() -> None:
     area = identify(measured.EXAMPLE / "cylinder.toml").found.results[0]["static_torque.area"]
-    assert area.value == pytest.approx(KNOWN_AREA, rel=0.0025)
+    assert area.value == pytest.approx(KNOWN_AREA, rel=0.003)
     assert area.low <= KNOWN_AREA <= area.high
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares, lsq_linear
 from scipy.signal import lfilter
+from scipy.stats import chi2, qmc
 from scipy.stats import f as fisher
-from scipy.stats import qmc
 from scipy.stats import t as student
 
 from ppafo.errors import IdentificationError
@@ -34,7 +34,7 @@ class Free:
     """A number that the fit moves: start, bounds and typical size ``scale``, SI units.
 
     ``deviation`` is the standard deviation of its prior about its start; infinite for a number that is sought, finite
-    for a tolerance.
+    for a tolerance. Tolerances of one ``family``, such as friction in each recording, are tested together.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Free:
     high: float
     scale: float
     deviation: float = math.inf
+    family: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,8 @@ class Block:
     """Rows of the residuals that are one channel of one recording or a part of it, in the order of time.
 
     ``floor`` is the error of the engine, or of the resolution [SI], below which no residual says anything: one for all
-    rows, or each row's. ``groups`` are further groups, such as a branch, whose numbers are compared with the numbers of
+    rows, or each row's. ``shared`` is an error [SI] by row that all rows of the recording have at once, as one normal
+    deviate times it. ``groups`` are further groups, such as a branch, whose numbers are compared with the numbers of
     all.
     """
 
@@ -58,6 +60,7 @@ class Block:
     channel: str
     rows: slice
     floor: float | Floats = 0.0
+    shared: Floats | None = None
     groups: tuple[str, ...] = ()
 
 
@@ -153,6 +156,9 @@ Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recording
 
 _LEFT_OUT = 0.01
 """Largest fraction of the samples that are left out because an event, such as an impact, passes them."""
+
+_OF_ANY_SIZE = 1.0e8
+"""Standard deviation of an error of which nothing is known, over the noise [-]."""
 
 _LEVERAGE = 0.1
 """Share of a combination of numbers that one sample decides alone from which it is left out."""
@@ -272,26 +278,28 @@ class _Work:
             self._last = key, self.at(point[:, None])[:, 0]
         return self._last[1]
 
-    def jacobian(self, point: Floats, weight: Floats) -> Floats:
-        """Return the derivative of the residuals [SI] by scaled numbers, central differences of one batch.
+    def jacobian(self, point: Floats, weight: Floats, *, is_central: bool = True) -> Floats:
+        """Return the derivative of the residuals [SI] by scaled numbers, differences of one batch.
 
-        ``weight`` [1/SI] by row sets the lengths of the differences of the next one.
+        ``weight`` [1/SI] by row sets the lengths of the differences of the next one. Differences to one side take half
+        the runs, and say well enough where to search.
         """
         above, below = np.minimum(point + self.step, self.high), np.maximum(point - self.step, self.low)
-        moved = np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
-        values = self.at(point[:, None] + moved)
+        sides = [above, below] if is_central else [np.where(above - point >= point - below, above, below)]
+        values = self.at(np.concatenate([point[:, None] + np.diag(side - point) for side in sides], axis=1))
         centre, count = self.one(point), len(point)
         slopes = np.empty((len(centre), count))
         for place in range(count):
-            (last, up), (first, down) = (
-                (values[:, at], end) if np.isfinite(values[:, at]).all() else (centre, float(point[place]))
-                for at, end in ((place, float(above[place])), (count + place, float(below[place])))
-            )
+            tried = [(float(side[place]), values[:, place + number * count]) for number, side in enumerate(sides)]
+            ran = [(end, own) for end, own in tried if np.isfinite(own).all()]
+            if not is_central and not ran:
+                return self.jacobian(point, weight)
+            (up, last), (down, first) = [*ran, (float(point[place]), centre)][:2]
             # Neither side runs: at a bound, or where a device is none.
-            if not up > down:
-                number = self.numbers[place]
+            if up == down:
+                free = self.numbers[place]
                 raise IdentificationError(
-                    f"{number.name}: no run succeeds near {point[place] * number.scale:.6g}; give other bounds or "
+                    f"{free.name}: no run succeeds near {point[place] * free.scale:.6g}; give other bounds or "
                     "another start"
                 )
             slopes[:, place] = (last - first) / (up - down)
@@ -308,6 +316,16 @@ class _Work:
     def channels(self) -> tuple[str, ...]:
         """The channels, each once."""
         return tuple(dict.fromkeys(one.channel for one in self.blocks))
+
+    def shared(self) -> Floats:
+        """Return the errors [SI] that rows of a recording share, a column for each recording that has some."""
+        names = dict.fromkeys(one.recording for one in self.blocks if one.shared is not None)
+        columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
+        for place, name in enumerate(names):
+            for one in self.blocks:
+                if one.recording == name and one.shared is not None:
+                    columns[one.rows, place] = one.shared
+        return columns
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
         """Return the noise [SI] of each row, and by channel, pooled over its recordings; no less than the floor.
@@ -343,7 +361,9 @@ def _search(work: _Work, start: Floats) -> Floats:
             return np.concatenate([work.one(x) * weight, (x - work.mean) * work.prior])
 
         def slopes(x: Floats, weight: Floats = weight) -> Floats:
-            return np.concatenate([work.jacobian(x, weight) * weight[:, None], np.diag(work.prior)])
+            return np.concatenate(
+                [work.jacobian(x, weight, is_central=not work.is_motion) * weight[:, None], np.diag(work.prior)]
+            )
 
         # The first pass is robust: a number can lose its gradient at a bound while the clock is still wrong.
         result = least_squares(
@@ -434,11 +454,12 @@ def whiten(values: Floats, noise: Noise) -> Floats:
 class _Linear(NamedTuple):
     """Residuals and Jacobian whitened [-] side by side, root of the covariance of scaled numbers, noise by channel.
 
-    ``without`` are orthonormal columns [-] of the samples that are left out.
+    ``shared`` are columns [-] of what rows have in common: errors of all samples of a recording, and samples that are
+    left out. Rows less ``shared`` times their products with it have errors that are independent.
     """
 
     rows: Floats
-    without: Floats
+    shared: Floats
     root: Floats
     noise: Floats
     sensors: dict[str, Noise]
@@ -452,23 +473,28 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
     """
     step, hidden = np.zeros(len(point)), np.zeros((len(left), 0))
     limits = work.low - point - 1.0e-300, work.high - point + 1.0e-300
-    # A sample with a number of its own says nothing: so it is left out of any noise.
+    # A sample with a number of its own, of no known size, says nothing: so it is left out of any noise.
     own_numbers = np.zeros((len(left), len(work.left_out)))
-    own_numbers[work.left_out, np.arange(len(work.left_out))] = 1.0
+    own_numbers[work.left_out, np.arange(len(work.left_out))] = _OF_ANY_SIZE
+    common = work.shared()
     for _ in range(_ROUNDS):
         series = np.column_stack([left + slopes @ step, hidden])
         series[work.left_out] = 0.0
         noise, sizes = work.deviations(series)
-        known, rows = {}, np.column_stack([np.column_stack([left, slopes]) / noise[:, None], own_numbers])
+        known, scaled = {}, np.column_stack([left, slopes, common]) / noise[:, None]
+        rows = np.column_stack([scaled, own_numbers])
         for channel in work.channels:
             own = work.rows_of(channel)
             kind = noise_of([series[one] / noise[one, None] for one in own], work.memory, work.is_motion)
             known[channel] = replace(kind, deviation=sizes[channel])
             for one in own:
                 rows[one] = whiten(rows[one], kind)
-        without = np.linalg.qr(rows[:, 1 + len(point) :])[0]
+        # With D = U S V' the covariance is 1 + D D', and 1 - U (1 - 1 / sqrt(1 + S^2)) U' makes it 1.
+        axes, triangle = np.linalg.qr(rows[:, 1 + len(point) :])
+        turned, spread, _ = np.linalg.svd(triangle)
+        shared = axes @ (turned * np.sqrt(1.0 - 1.0 / np.hypot(1.0, spread)))
         rows = rows[:, : 1 + len(point)]
-        rows = rows - without @ (without.T @ rows)
+        rows = rows - shared @ (shared.T @ rows)
         root, _ = _root_of_inverse(rows[:, 1:].T @ rows[:, 1:] + np.diag(np.square(work.prior)))
         hidden = slopes @ root
         before = step
@@ -481,7 +507,7 @@ def _linear(work: _Work, point: Floats, left: Floats, slopes: Floats) -> tuple[_
         step = np.asarray(solved.x)
         if np.abs((step - before) @ np.linalg.pinv(root)).max() < 0.01 and series.shape[1] > 1:
             break
-    return _Linear(rows=rows, without=without, root=root, noise=noise, sensors=known), step
+    return _Linear(rows=rows, shared=shared, root=root, noise=noise, sensors=known), step
 
 
 def _root_of_inverse(curvature: Floats) -> tuple[Floats, Mask]:
@@ -565,7 +591,7 @@ def _cost(work: _Work, left: Floats, point: Floats, linear: _Linear) -> float:
     scaled = (left / linear.noise)[:, None]
     kinds = {channel: replace(one, deviation=1.0) for channel, one in linear.sensors.items()}
     errors = np.concatenate([whiten(scaled[one.rows], kinds[one.channel]) for one in work.blocks])
-    errors = errors - linear.without @ (linear.without.T @ errors)
+    errors = errors - linear.shared @ (linear.shared.T @ errors)
     return float(np.square(errors).sum()) + float(np.square((point - work.mean) * work.prior).sum())
 
 
@@ -629,7 +655,34 @@ def _conflict(work: _Work, rows: Floats, point: Floats, free: Mask, freedom: flo
         p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
         if p < _SIGNIFICANCE and (found is None or p < found.p):
             found = Conflict(group=STATED, number=str(names[place]), standard_errors=ratio, p=p)
+    families = np.array([one.family for one in work.numbers])[free]
+    for family in dict.fromkeys(families[prior > 0.0].tolist()):
+        members = np.flatnonzero((families == family) & (prior > 0.0))
+        if family and len(members) > 1 and found is None:
+            found = _of_family(
+                names[members],
+                shift[members] * np.sqrt(prior[members]),
+                root[members] * np.sqrt(prior[members])[:, None],
+            )
     return found
+
+
+def _of_family(names: NDArray[np.str_], moved: Floats, root: Floats) -> Conflict | None:
+    """Return the tolerance of a family that parts most where all of it are beyond their limits, one by one or together.
+
+    ``moved`` are tolerances, ``root`` a root of their covariance, both over their standard deviations [-]. Where two
+    numbers are sought of them, two directions are free.
+    """
+    known, axes = np.linalg.eigh(np.eye(len(names)) - root @ root.T)
+    tested = known > _PARTING
+    count = int(tested.sum())
+    if not count:
+        return None
+    # What is stated is known, and no estimate: so this is chi-square, not F.
+    p = float(chi2.sf(float(np.sum(np.square(axes.T @ moved)[tested] / known[tested])), count))
+    ratios = np.abs(moved) / np.sqrt(np.maximum(1.0 - np.square(root).sum(axis=1), _PARTING))
+    most = int(np.argmax(ratios))
+    return Conflict(STATED, str(names[most]), float(ratios[most]), p) if p < _SIGNIFICANCE else None
 
 
 def _unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:

@@ -275,12 +275,13 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
         if any(str(error).startswith(source.name) for source in sources):
             raise
         raise IdentificationError(f"{setting.place}: {error}") from error
-    anew = setting.tolerances.each_recording
-    if not anew or len(sources) == 1:
+    acting = ("zero",) if problem.kind == "static-torque" else ()
+    idle = [f"'{name}'" for name in setting.tolerances.each_recording if name not in acting]
+    if not idle or len(sources) == 1:
         return found
     said = (
-        f"bench.each_recording = {list(anew)} acts in a [trajectory] only: here zeros and gains are common to all "
-        f"{len(sources)} recordings; give each mounting of the sensors its own [[procedure]]"
+        f"bench.each_recording: {' and '.join(idle)} acts in a [trajectory], and 'zero' in static-torque; here it is "
+        f"common to all {len(sources)} recordings: give each mounting of the sensors its own [[procedure]]"
     )
     return replace(found, remarks=(*found.remarks, said))
 

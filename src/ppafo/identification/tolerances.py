@@ -85,6 +85,10 @@ class BenchSection(StrictTable):
     zero_of_flow: Annotated[Text | None, Field(description="zero of the flow meter, of its largest reading; 5 %")] = (
         None
     )
+    friction: Annotated[
+        Text | None,
+        Field(description="of friction, from one recording to another; 5 % where a procedure has several"),
+    ] = None
     held: Annotated[
         Text | None, Field(description="of a number without an uncertainty of its own; default: 1 to 50 % by kind")
     ] = None
@@ -108,6 +112,7 @@ class Tolerances:
     gas_law: float | None = None
     stribeck_velocity: float = 0.5
     zero_of_flow: float = 0.05
+    friction: float = 0.05
     held: float | None = None
     each_recording: tuple[Sensed, ...] = ()
 
@@ -158,6 +163,7 @@ _UNITS = {
     "gas_law": "1",
     "stribeck_velocity": "rad/s",
     "zero_of_flow": "1",
+    "friction": "1",
     "held": "1",
 }
 

@@ -20,6 +20,8 @@ from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory import Experiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters import apply_overrides, build_device
+from ppafo.parameters.audit import audit
+from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.report.finding import files_of, text_of
 from ppafo.running import simulate
@@ -98,6 +100,17 @@ def test_values_are_counted_as_those_of_the_set_beside_others_that_are_identifie
     assert f"new set 'twin': {count} values of the set identified: " in text_of(finding_of(outcome))
 
 
+def test_an_identified_set_is_audited_without_what_was_reported_of_the_set_that_it_came_from(solved: Solve) -> None:
+    before = load_parameter_set("ppafo2011")
+    assert any(path.startswith("reported.") for path in before.numbers)
+    found = solved(FLOW).new_set.parameter_set
+    assert not any(path.startswith("reported.") for path in found.numbers)
+    ids = {one.id for one in audit(found)}
+    assert {"flow-of-proportional", "idle-acceptance"} & ids == set()
+    assert "open-flow-of-proportional" in ids
+    assert not any(one.path.startswith("reported.") for one in changes(found, before))
+
+
 def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -> None:
     outcome = solved(ALL)
     text = parameter_set_toml(outcome.new_set.parameter_set)
@@ -169,7 +182,9 @@ def test_the_citation_of_a_problem_is_that_of_the_new_set(solved: Solve) -> None
 
 def test_values_that_no_procedure_touched_stay_as_they_were(solved: Solve) -> None:
     new, old = solved(STATIC).new_set.parameter_set, load_parameter_set("ppafo2011")
-    changed = {path for path in old.numbers if new.numbers[path] != old.numbers[path]}
+    changed = {
+        path for path in old.numbers if not path.startswith("reported.") and new.numbers[path] != old.numbers[path]
+    }
     assert changed == {"actuator.torque_constant", "friction.static_torque"}
 
 

@@ -19,6 +19,7 @@ from ppafo.identification.source import Source, Use, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
+from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve
 from ppafo.parameters.parameter_set import (
@@ -124,6 +125,7 @@ def _source(
 
 
 _FILES_IN_TITLE = 4
+_REPORTED = "reported."
 
 
 def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
@@ -138,6 +140,16 @@ def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
         f"{changes} from {found.kind} recordings: {', '.join(files)}; the fitted are true for this model only, the "
         f"others from '{old.name}'."
     )
+    if new.written or new.fitted:
+        # Of a device that was measured, what others report of another one says nothing.
+        is_of_report = {
+            one.id for one in audit(found.before) if any(value.path.startswith(_REPORTED) for value in one.values)
+        }
+        old = replace(
+            old,
+            numbers={path: entry for path, entry in old.numbers.items() if not path.startswith(_REPORTED)},
+            accepted={name: why for name, why in old.accepted.items() if name not in is_of_report},
+        )
     return replace(
         old,
         file=f"{problem.name}.toml",

@@ -23,19 +23,22 @@ _WIDEST = 12.0
 """Limits by which a tolerance may be off at most in the search."""
 
 
-def tolerance(name: str, deviation: float, start: float = 0.0) -> tuple[Free, ...]:
-    """Return a number known to a standard deviation about its start [SI]; nothing where it is known exactly."""
+def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[Free, ...]:
+    """Return a number known to a standard deviation about its start [SI]; nothing where it is known exactly.
+
+    Those of one ``family`` are tested together.
+    """
     if not deviation > 0.0:
         return ()
     # The scale of the search is the limit, so that a step of one scale is a likely one.
     limit = math.sqrt(3.0) * deviation
     width = _WIDEST * limit
-    return (Free(name, start, start - width, start + width, limit, deviation),)
+    return (Free(name, start, start - width, start + width, limit, deviation, family),)
 
 
-def within(name: str, limit: float) -> tuple[Free, ...]:
-    """Return an error of the bench, known within a limit on either side of 0 [SI]."""
-    return tolerance(name, deviation_of_limit(limit))
+def within(name: str, limit: float, family: str = "") -> tuple[Free, ...]:
+    """Return an error of the bench, known within a limit on either side of 0 [SI]; see ``tolerance``."""
+    return tolerance(name, deviation_of_limit(limit), family=family)
 
 
 def sought(name: str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0) -> Free:
@@ -82,7 +85,7 @@ def solve(
     for (recording, sensor, *groups), rank in ranks.items():
         rows = slice(int(ends[rank]), int(ends[rank + 1]))
         floor = np.maximum(least, rounding_of(measured[order][rows], resolutions[sensor]))
-        blocks.append(Block(recording, sensor, rows, floor, tuple(groups)))
+        blocks.append(Block(recording, sensor, rows, floor, groups=tuple(groups)))
 
     def at(point: Floats) -> Values:
         return defaultdict(float, zip(names, point.tolist(), strict=True))

@@ -6,7 +6,8 @@ While the pressure rises, friction keeps part of the torque from the scale; whil
 
 T is what the scale shows [N m], dP the pressure difference [Pa], K the torque constant [m^3], T_0 the zero of the scale
 [N m], T_s the friction without pressure [N m], g its growth with pressure [m^3] (effect ``seal_friction``). Zero and
-gain of the pressure sensor and the gain of the scale are tolerances. Where a position or an angle moves with the
+gain of the pressure sensor and the gain of the scale are tolerances, and so is the friction of each of several
+recordings: seals do not grip alike from one to another. Where a position or an angle moves with the
 direction, and not the pressure, the actuator slid, and T_s is its friction in motion. A ``force`` [N] in place of the
 torque gives an area [m^2] and forces, for which a set has no place.
 """
@@ -73,20 +74,26 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     names, tolerances = readings.names, chosen.tolerances
     pressure, torque, branch = readings.pressure, readings.torque, readings.branch
     slope, zero, friction, size = _straight_line(readings, ", ".join(source.name for source in sources))
+    files = [source.name for source in sources]
+    frictions = [f"friction of {file}" for file in files] if len(files) > 1 else []
+    is_anew = "zero" in tolerances.each_recording and len(files) > 1
+    zeros = [f"zero of the pressure sensor of {file}" for file in files] if is_anew else ["zero of the pressure sensor"]
     load, span = names.load, float(np.abs(pressure).max())
     numbers = (
         sought(names.slope_path, slope),
         sought(names.friction_path, friction, scale=size),
         sought(names.growth_path, 0.0, scale=size / span),
         sought(names.zero_path, zero, scale=size),
-        *within("zero of the pressure sensor", tolerances.zero_of_pressure),
+        *(one for name in zeros for one in within(name, tolerances.zero_of_pressure)),
         *within("gain of the pressure sensor", tolerances.gain_of("pressure")),
         *within(f"gain of the {load} sensor", tolerances.gain_of(load)),
+        *(one for name in frictions for one in within(name, tolerances.friction, "friction")),
     )
 
     def law(at: Values) -> Floats:
-        true = (pressure - at["zero of the pressure sensor"]) / (1.0 + at["gain of the pressure sensor"])
+        true = (pressure - _of_files(at, zeros, readings.files)) / (1.0 + at["gain of the pressure sensor"])
         held = branch * (at[names.friction_path] + at[names.growth_path] * np.abs(true))
+        held = held * (1.0 + _of_files(at, frictions, readings.files))
         shown = (1.0 + at[f"gain of the {load} sensor"]) * (at[names.slope_path] * true - held)
         return np.asarray(readings.weight * (shown + at[names.zero_path]))
 
@@ -121,6 +128,12 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         with_residuals(f"Static {load}", *axes, marks, pressure, left),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
+
+
+def _of_files(at: Values, names: list[str], files: Labels) -> Floats:
+    """Return a tolerance for each reading: that of its file, or the only one there is; 0 for none."""
+    values = np.array([at[name] for name in names] or [0.0])
+    return np.asarray(values[files] if len(names) > 1 else values)
 
 
 def _straight_line(readings: "Sweeps", names: str) -> tuple[float, float, float, float]:
@@ -178,7 +191,7 @@ class Sweeps:
     """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1).
 
     ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less. ``recordings``
-    are labels of the repetition or, of many repetitions, the recording.
+    are labels of the repetition or, of many repetitions, the recording; ``files`` are the places of their sources.
     """
 
     pressure: Floats
@@ -186,6 +199,7 @@ class Sweeps:
     branch: Floats
     weight: Floats
     recordings: list[str]
+    files: Labels
     repetitions: int
     names: Names
 
@@ -291,7 +305,7 @@ def _one_a_stroke(
     if repetitions > _MOST_REPETITIONS:
         labels = [label for label, is_used in zip(recordings_of(sources), used.tolist(), strict=True) if is_used]
     recordings = [labels[one] for one in first.tolist()]
-    return Sweeps(pressure, torque, direction[first], weight, recordings, repetitions, names)
+    return Sweeps(pressure, torque, direction[first], weight, recordings, files[first], repetitions, names)
 
 
 def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:

@@ -11,6 +11,7 @@ from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as estimate
 from ppafo.identification.trajectory.problem import (
+    ZERO_OF,
     Number,
     TrajectoryProblem,
     broken_rule,
@@ -142,7 +143,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         report,
         is_motion=True,
     )
-    conflict = conflict_in_words(fitted, "the model lacks something")
+    conflict = conflict_in_words(fitted, "the model lacks something") or _wandering(fitted, numbers)
     sought = [row for row, number in enumerate(numbers) if not number.is_tolerance]
     estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in sought)
     tolerated = [row for row, number in enumerate(numbers) if number.is_tolerance]
@@ -217,6 +218,26 @@ def _in_its_unit(number: Number, value: float, error: float) -> tuple[float, flo
     if not number.is_logarithm:
         return value, error
     return math.exp(value), math.exp(value) * error
+
+
+def _wandering(found: Fit, numbers: tuple[Number, ...]) -> str:
+    """Return which channel leaves noise that wanders by more than its zero may be off; empty where none does.
+
+    A sensor whose zero is known within a limit does not leave it from sample to sample: what does is the model's.
+    """
+    for item in numbers:
+        noise = found.sensors.get(item.path.removeprefix(ZERO_OF)) if item.path.startswith(ZERO_OF) else None
+        limit = math.sqrt(3.0) * item.free.deviation
+        if noise is not None and math.isfinite(limit):
+            wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
+            if wander > limit:
+                shown, unit = in_shown_unit(wander, item.unit.removesuffix("_d"))
+                most, _ = in_shown_unit(limit, item.unit.removesuffix("_d"))
+                return (
+                    f"what is left of {item.path.removeprefix(ZERO_OF)} wanders by {shown:.2g} {unit}, and its zero by "
+                    f"{most:.2g} {unit} at most; the model lacks something"
+                )
+    return ""
 
 
 _OWN_SHARE = 0.2

@@ -232,12 +232,12 @@ def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Nu
 def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], point: Floats) -> tuple[Block, ...]:
     """Return the place of each channel of each recording among the residuals.
 
-    Its floor is the given noise, the error of the engine, which half as long steps with a quarter of the error show, or
-    what the converter of the sensor rounds.
+    Its floor is the given noise, the size of the error of the engine, or what the converter of the sensor rounds. The
+    error of the engine is no noise: all samples of a recording share it.
     """
     blocks, first = [], 0
     coarse = signals_of(experiments, numbers, point[:, None])
-    # What half as long steps change is about the error of the engine.
+    # The error is about in proportion to what is allowed, so that half as long steps show most of it.
     halved = []
     for one in experiments:
         scenario = replace(one.scenario, run=replace(one.scenario.run, step=0.5 * one.run.step))
@@ -246,11 +246,12 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
     fine = signals_of(halved, numbers, point[:, None])
     for prepared, before, after in zip(experiments, coarse, fine, strict=True):
         for channel in prepared.channels:
-            error = float(np.sqrt(np.mean(np.square(after[channel.name] - before[channel.name]))))
+            error = (after[channel.name][:, 0] - before[channel.name][:, 0]) / (1.0 - _FINER)
+            error = error if np.isfinite(error).all() else np.zeros_like(error)
             rounded = rounding_of(channel.values, resolution_of(channel.values))
-            floor = np.maximum(max(channel.floor, error if math.isfinite(error) else 0.0), rounded)
+            floor = np.maximum(max(channel.floor, float(np.sqrt(np.mean(np.square(error))))), rounded)
             last = first + len(channel.values)
-            blocks.append(Block(prepared.label, channel.name, slice(first, last), floor))
+            blocks.append(Block(prepared.label, channel.name, slice(first, last), floor, error))
             first = last
     return tuple(blocks)
 

