@@ -11,6 +11,7 @@ from tests.convergence.tasks import TASKS, task
 SEED, DRAWS = 1, 8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("family", TASKS)
 def test_determined_tasks_keep_to_the_promised_errors(family: str) -> None:
     cases = {number: kept(scenario_from_dict(task(family, SEED, number))) for number in range(DRAWS)}
@@ -19,6 +20,7 @@ def test_determined_tasks_keep_to_the_promised_errors(family: str) -> None:
     assert {number: case for number, case in determined.items() if not case.worst <= 1.0} == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("family", "number"), [("smooth shanks", 56), ("small warm chambers", 39)])
 def test_tasks_that_a_pressure_alone_did_not_control_keep_to_them(family: str, number: int) -> None:
     case = kept(scenario_from_dict(task(family, SEED, number)))
