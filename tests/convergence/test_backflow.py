@@ -20,6 +20,12 @@ PUMPED = 1.0e-4
 """Gas [kg] that a swinging vane pushes back into a relieving supply at least."""
 SWING = {"level": 1.3, "amplitude": 0.6, "frequency": 2.0, "phase": 0.0}
 SPOOL = ("valve.spool_frequency=60 Hz",)
+# A vane that displaces much for its dead volumes squeezes them far above the supply.
+SQUEEZED = (
+    "actuator.displacement_per_radian=23.5 cm^3/rad",
+    "actuator.dead_volume_1=26.5 cm^3",
+    "actuator.dead_volume_2=26.5 cm^3",
+)
 
 
 def supplied_gas(run: Run) -> np.ndarray:
@@ -38,7 +44,7 @@ def supplied_gas(run: Run) -> np.ndarray:
 
 def swung(name: str, is_relieving: bool, command: float, overrides: tuple[str, ...] = ()) -> Scenario:
     """A vane swung against an open valve: the chamber that is fed is squeezed above its supply twice a second."""
-    scenario = load_scenario(name, (f"supply.relieving={str(is_relieving).lower()}", *overrides))
+    scenario = load_scenario(name, (f"supply.relieving={str(is_relieving).lower()}", *SQUEEZED, *overrides))
     open_loop = dataclasses.replace(scenario.controller, kind="constant", settings={"command": command})
     return dataclasses.replace(
         scenario,
@@ -76,7 +82,7 @@ def test_a_squeezed_chamber_gives_gas_back_to_a_relieving_supply_only(
 def test_a_vane_that_is_pushed_back_is_held_by_the_gas_that_cannot_leave(is_relieving: bool) -> None:
     pushed = ("motion.kind=free", "motion.external_torque=12 N m", "motion.angle=100 deg")
     filled = ("initial.pressure_1=supply", "initial.pressure_2=atmosphere")
-    overrides = (*pushed, *filled, f"supply.relieving={str(is_relieving).lower()}")
+    overrides = (*pushed, *filled, *SQUEEZED, f"supply.relieving={str(is_relieving).lower()}")
     run = plan_run(load_scenario("step-response", overrides))
     gas = supplied_gas(run)
     angle = plant_states(run, run_batch(batch_of(run)))[-1, 0]

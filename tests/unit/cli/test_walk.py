@@ -67,7 +67,8 @@ def test_a_walk_prints_its_table_and_where_the_files_are(tmp_path: Path, capsys:
     assert main(["walk", "proportional", *SHORT, "--out", str(tmp_path / "walk")]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "proportional: completed, 4 strides of falisse2019-subject1"
-    assert lines[2].split() == ["with", "without", "healthy"]
+    assert lines[1].startswith("gains: torque_gain ")
+    assert lines[3].split() == ["with", "without", "healthy"]
     work = next(line for line in lines if line.startswith("Positive work on the wearer in push-off (J)")).split()
     assert float(work[-3]) > 0.5
     assert float(work[-2]) == 0.0
@@ -223,7 +224,8 @@ def test_strides_with_help_and_vented_ones_stand_apart(tmp_path: Path, capsys: p
     assert helped["gas"]["value"] > 5.0e-4
     assert vented["gas"]["value"] < 1.0e-4
     assert vented["lowest_toes"]["value"] == pytest.approx(bare["lowest_toes"]["value"], abs=1.0e-3)
-    assert helped["lowest_toes"]["value"] > 0.0
+    # With help the toes of this walk pass within a centimetre of the ground; without they would drag by eight.
+    assert helped["lowest_toes"]["value"] > vented["lowest_toes"]["value"] + 0.05
     counts = [helped[name]["value"] for name in ("helped_strides", "vented_strides", "strides")]
     assert counts == [3.0, 7.0, 10.0]
     strides = (tmp_path / "walk" / "strides.csv").read_text().splitlines()
