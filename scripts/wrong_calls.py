@@ -173,6 +173,7 @@ def functions(recording: Path) -> dict[str, Function]:
             tasks="content",
             baseline="name",
             draws="count",
+            check="flag",
         ),
         "compare_walks": _function(
             {"scenario": WALK}, "minutes", scenario="object", minutes="positive", progress="function"

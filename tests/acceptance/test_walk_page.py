@@ -73,7 +73,7 @@ def test_the_walk_file_of_the_page_loses_its_help_as_the_page_says(
     assert main(["walk", str(path), "--minutes", "0.2", "--out", str(tmp_path / "out")]) == 1
     printed = capsys.readouterr().out
     assert said in printed
-    assert "less help" in printed.splitlines()[2]
+    assert "less help" in printed.splitlines()[3]
 
 
 def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> None:

@@ -138,7 +138,7 @@ def test_joined_chambers_follow_an_independent_integration() -> None:
 
 
 def test_isothermal_chambers_meet_where_both_share_their_gas_and_lose_none() -> None:
-    course = stepped("actuator.leak.area=1e-9 mm^2", "actuator.dead_volume_1=54.5 cm^3")
+    course = stepped("actuator.leak.area=1e-9 mm^2", "actuator.dead_volume_1=64 cm^3")
     volume_1 = VOLUME_1 + 28e-6
     begin, end = (int(np.searchsorted(course.time, moment - 1e-9)) for moment in (PUSHED, PUSHED + JOINED))
     shared = course.pressure_1[begin] * volume_1 + course.pressure_2[begin] * VOLUME_2

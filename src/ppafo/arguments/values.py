@@ -1,6 +1,7 @@
 """What a parameter takes of a call in Python, by the annotation that makes it an argument of a command as well."""
 
 import builtins
+import inspect
 import os
 import reprlib
 import sys
@@ -40,9 +41,13 @@ class _Names(dict[str, Any]):
 
 
 def annotations_of(function: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return the annotation of each parameter by name; a class that the module does not load is a ``NotLoaded``."""
+    """Return the annotation of each parameter by name; a class that the module does not load is a ``NotLoaded``.
+
+    A parameter without an annotation has that of ``inspect``, as a function of somebody else may.
+    """
     names = _Names(vars(sys.modules[function.__module__]))
-    return typing.get_type_hints(function, localns=names, include_extras=True)
+    written = {name: parameter.annotation for name, parameter in inspect.signature(function).parameters.items()}
+    return written | typing.get_type_hints(function, localns=names, include_extras=True)
 
 
 class Taken(NamedTuple):

@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from ppafo.arguments import Folder, Gait, Mass, Minutes, Overrides, Word, times
 from ppafo.cli import output
@@ -15,7 +15,8 @@ _RECORDINGS = (".csv", ".nc")
 
 
 Side = Literal["right", "left"]
-Strikes = Annotated["tuple[float, ...]", Word("T1,T2,...", times)]
+# One text has all times, so that for the command line this is no option that is repeated.
+Strikes = Annotated[Any, Word("T1,T2,...", times)]
 
 
 def export_opensim(

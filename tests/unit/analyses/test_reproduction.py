@@ -23,7 +23,7 @@ from ppafo.analyses.reproduce.solve import EXPERIMENTS, ORDER, reproduce_paper
 from ppafo.analyses.reproduce.torque_task import phased_runs, readings_of_u, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
-from ppafo.simulation.simulate import Result, Status, simulate
+from ppafo.simulation.simulate import Measuring, Result, Status, simulate
 
 
 def printed_with(**values: float) -> Reported:
@@ -218,7 +218,8 @@ def test_a_task_without_a_ramp_has_nothing_to_oscillate_on() -> None:
 def test_a_restless_hold_is_not_called_quiet(reproduction: Reproduction) -> None:
     metrics = dict(reproduction.solenoid.metrics)
     metrics["oscillations_hold"] = dataclasses.replace(metrics["oscillations_hold"], value=7.0)
-    restless = dataclasses.replace(reproduction.solenoid, metrics=metrics)
+    measured = reproduction.solenoid.measured()._replace(metrics=metrics)
+    restless = dataclasses.replace(reproduction.solenoid, measured=Measuring(measured))
     told = {item.id: item for item in torque_task_observations(restless, reproduction.proportional)}
     assert told["solenoid_quiet_on_hold"].holds is False
     assert told["solenoid_quiet_on_hold"].evidence == "7 torque reversals on the hold"

@@ -327,6 +327,8 @@ def test_a_map_comes_in_two_parts_and_is_run_again_only_where_that_can_change_it
 def test_a_map_over_the_atmosphere_is_the_same_when_it_is_turned(chromium: Any, file: Path) -> None:
     page = opened(chromium, file, viewport={"width": 1400, "height": 1000})
     page.locator("summary", has_text="Map of two settings").click()
+    # The first map to its end, which would else be taken for the one that is asked for.
+    page.wait_for_selector("canvas.map[data-milliseconds]")
     told = []
     for pair in (
         ("supply.atmospheric_pressure", "supply.pressure"),

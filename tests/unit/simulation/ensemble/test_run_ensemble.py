@@ -48,6 +48,27 @@ CASES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("step-response", ()),
     ("swing-foot", ()),
     ("torque-task-moving-ankle", ("run.duration=1.9 s", *WARM)),
+    ("pressure-loop", ("run.duration=1 s",)),
+    ("pressure-loop", ("run.duration=1 s", "reference.of=pressure_2")),
+    (
+        "pressure-loop",
+        (
+            "run.duration=1 s",
+            "reference.of=pressure_difference",
+            "reference.start_level=0 psi_d",
+            "reference.level=20 psi_d",
+        ),
+    ),
+    (
+        "cylinder-servo",
+        (
+            "run.duration=1 s",
+            "reference.kind=ramp_hold",
+            "reference.start_level=90 deg",
+            "reference.level=100 deg",
+            "reference.ramp_time=0.3 s",
+        ),
+    ),
     ("step-response", ("controller.kind=pid", "reference.kind=ramp_hold", "reference.level=2 N m", "run.duration=1 s")),
 )
 """Scenarios of every kind of valve, motion, controller and reference, held or not."""
