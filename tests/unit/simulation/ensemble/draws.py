@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.model.controlled import ANGLE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation.numbers import chosen_path, declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
@@ -60,8 +61,11 @@ OTHER_FORMS = (
 def drawn_columns(scenario: Scenario, generator: np.random.Generator, runs: int) -> dict[str, Floats]:
     """Columns of a random half of all numbers that can vary; gauge pressures stay what they are, in pascals."""
     declared = declared_numbers(scenario)
-    paths = [path for path in declared if path not in ("run.step", "controller.period")]
+    paths = [path for path in declared if path not in ("run.step", "controller.period") and has(scenario, path)]
     chosen = {path for path in paths if generator.random() < 0.5}
+    if scenario.controlled == ANGLE:
+        # A stop that moves inside the wanted angle is refused.
+        chosen -= {"actuator.angle_min", "actuator.angle_max"}
     for pair in OTHER_FORMS:
         chosen -= set(pair)
         if generator.random() < 0.3:
@@ -69,6 +73,15 @@ def drawn_columns(scenario: Scenario, generator: np.random.Generator, runs: int)
             chosen -= {f"{section}.area", f"{section}.discharge_coefficient"}
             chosen |= set(pair)
     return {path: column(scenario, path, declared[path], generator, runs) for path in paths if path in chosen}
+
+
+def has(scenario: Scenario, path: str) -> bool:
+    """Tell whether a scenario has a number, or values are chosen for it: a valve by ISO 6358 has no area."""
+    try:
+        number_at(scenario, chosen_path(path, scenario))
+    except AttributeError:
+        return path in CHOICES
+    return True
 
 
 def column(scenario: Scenario, path: str, quantity: Quantity, generator: np.random.Generator, runs: int) -> Floats:
