@@ -32,7 +32,7 @@ class _Names(dict[str, Any]):
     """The names of an annotation: those of its module, of Python, and classes that are not loaded."""
 
     def __contains__(self, name: object) -> bool:
-        """Return True: a name that nobody knows is a class that is not loaded."""
+        """Return True: an unknown name stands for a class that is not loaded."""
         return True
 
     def __missing__(self, name: str) -> Any:

@@ -156,7 +156,7 @@ def _known_source(program: Program) -> tuple[MadeFrom, str]:
 @lru_cache(maxsize=64)
 def write_source(program: Program, lanes: int = 0) -> tuple[MadeFrom, str]:
     """What a program is made from, and its source for some lanes, 0 for as many as fit."""
-    from ppafo.engine.loop_text import write_lanes  # a text that is kept needs nobody who writes one
+    from ppafo.engine.loop_text import write_lanes  # a kept program needs no writer
 
     collector = SourceCollector(INLINE)
     source = write_lanes(program, collector, lanes)

@@ -57,7 +57,7 @@ class Measured(NamedTuple):
 
 
 class Measuring:
-    """What is measured of a run, made when it is first asked for: many runs are never looked at."""
+    """Recording, metrics and end of a run, computed on first use: of many runs they are never read."""
 
     __slots__ = ("_measured",)
 
