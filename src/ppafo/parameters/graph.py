@@ -5,7 +5,7 @@ and units, episodes of agents. So a setting means the same at all of them.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -39,12 +39,15 @@ class Term:
     """A function of other numbers, floats or arrays (runs,), which is one of floats that can be translated to C.
 
     The first sources fill ``rows``, NamedTuple classes that declare their numbers, one after the other, and are given
-    to it as these; the sources after them one by one.
+    to it as these; the sources after them one by one. ``orifice`` is the section of the orifice, if
+    any, whose form decides what is followed, and ``in_other_form`` the term of its other form.
     """
 
     sources: tuple[str, ...]
     function: Callable[..., Any] = itself
     rows: tuple[type, ...] = ()
+    orifice: str = ""
+    in_other_form: "Term | None" = None
 
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
@@ -117,27 +120,53 @@ def gauge_link(path: str, value: float, unit: str) -> tuple[Follows, ...]:
     return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 
 
-def acting(graph: Graph, given: Collection[str]) -> dict[str, Follows]:
-    """Return the links by which numbers change where those at some paths are given, in the order to resolve them."""
+def acting(graph: Graph, given: Collection[str], turned: Collection[str] = ()) -> dict[str, Follows]:
+    """Return the links by which numbers change where those at some paths are given, in the order to resolve them.
+
+    Those at the paths of ``turned`` follow by other terms than before, whatever is given.
+    """
     found: dict[str, Follows] = {}
     for path, links in graph.items():
         if path in given:
             continue
         for link in links:
             if link.sources[0] in given or (
-                not link.when_set and any(source in given or source in found for source in link.sources)
+                not link.when_set
+                and (path in turned or any(source in given or source in found for source in link.sources))
             ):
                 found[path] = link
                 break
     return found
 
 
-def resolved(graph: Graph, given: Mapping[str, Any], present: Callable[[str], Any]) -> dict[str, Any]:
-    """Return all numbers that are given, and all that follow them; what stays is looked up at ``present``."""
+def resolved(
+    graph: Graph, given: Mapping[str, Any], present: Callable[[str], Any], orifices: Collection[str] = ()
+) -> dict[str, Any]:
+    """Return all numbers that are given, and all that follow them; what stays is looked up at ``present``.
+
+    Some orifices, by their sections, take the form that they have not.
+    """
     found = dict(given)
-    for path, link in acting(graph, given).items():
+    links = in_other_forms(graph, orifices)
+    turned = [path for path in graph if links[path] != graph[path]]
+    for path, link in acting(links, given, turned).items():
         found[path] = link.number(lambda source: found[source] if source in found else present(source))
     return found
+
+
+def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
+    """Return the links as they are where some orifices, by their sections, take the form that they have not."""
+    if not orifices:
+        return graph
+
+    def turned(term: Term) -> Term:
+        other = term.in_other_form if term.orifice in orifices else None
+        return term if other is None else replace(other, in_other_form=replace(term, in_other_form=None))
+
+    return {
+        path: tuple(replace(link, terms=tuple(map(turned, link.terms))) for link in links)
+        for path, links in graph.items()
+    }
 
 
 def left(graph: Graph, given: Collection[str]) -> dict[str, tuple[Follows, ...]]:

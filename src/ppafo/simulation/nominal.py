@@ -1,6 +1,7 @@
 """What a law with a model, and the observer of the chambers, believe of a device: which of its numbers they follow."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
@@ -12,7 +13,7 @@ from ppafo.model.declaration import NOMINAL
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.model.valves.proportional import spool_lag
-from ppafo.parameters.device import VANE, Device, Orifice, SonicOrifice
+from ppafo.parameters.device import VANE, Device, SonicOrifice
 from ppafo.parameters.graph import Term
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
@@ -34,6 +35,8 @@ _SAME = {
     "angle_min": "actuator.angle_min",
     "angle_max": "actuator.angle_max",
 }
+VALVE, LEAK = "valve", "actuator.leak"
+"""Sections of the orifices."""
 LEAST_SHARE = 0.05
 """Part of a chamber's volume in the middle of its range that is dead volume at least."""
 _PAIRS = ("solenoid", "solenoid_recycling")
@@ -128,16 +131,17 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
     valve, kind = device.valve, VALVES[device.valve.kind]
     names = tuple(item.name for item in kind.quantities)
     is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
-    is_sonic = isinstance(valve.orifice, SonicOrifice)
-    flow = Term((*_MASS, _SONIC[0]), flow_of_sonic) if is_sonic else Term((*_GAS, *_AREA), flow_of_area)
-    leak = device.actuator.leak
     found = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
     found |= {
         "gas_product": Term(_MASS, product_of),
-        "valve_conductance": _conductance(valve.orifice, "valve"),
-        "leak_conductance": _conductance(leak, "actuator.leak"),
-        "flow": flow if is_known else Term(_ANY, no),
-        "critical_ratio": Term(_SONIC[1:]) if is_sonic else Term(_GAS[1:2], critical_pressure_ratio),
+        "valve_conductance": _conductance(device, VALVE),
+        "leak_conductance": _conductance(device, LEAK),
+        "flow": in_its_form(
+            device, VALVE, Term((*_GAS, *_AREA), flow_of_area), Term((*_MASS, _SONIC[0]), flow_of_sonic)
+        )
+        if is_known
+        else Term(_ANY, no),
+        "critical_ratio": in_its_form(device, VALVE, Term(_GAS[1:2], critical_pressure_ratio), Term(_SONIC[1:])),
         # Not a number that varies: the source is there because a term needs one.
         "relieving": Term(_ANY, yes if device.supply.relieving else no),
         "pair": Term(_ANY, yes if is_pair else no),
@@ -163,11 +167,23 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
     return {NOMINAL[name]: term for name, term in found.items()}
 
 
-def _conductance(orifice: Orifice | SonicOrifice, section: str) -> Term:
-    """Return what the conductance [kg/(s Pa)] of an orifice follows, in the form that it has."""
+def _conductance(device: Device, section: str) -> Term:
+    """Return what the conductance [kg/(s Pa)] of an orifice follows."""
+    return in_its_form(
+        device,
+        section,
+        Term((*_GAS, f"{section}.area", f"{section}.discharge_coefficient"), conductance_of_area),
+        Term((*_MASS, f"{section}.sonic_conductance"), conductance_of_sonic),
+    )
+
+
+def in_its_form(device: Device, section: str, of_area: Term, of_sonic: Term) -> Term:
+    """Return the term of the form that the orifice of a section has, beside the one of its other form."""
+    orifice = device.valve.orifice if section == VALVE else device.actuator.leak
+    of_area, of_sonic = replace(of_area, orifice=section), replace(of_sonic, orifice=section)
     if isinstance(orifice, SonicOrifice):
-        return Term((*_MASS, f"{section}.sonic_conductance"), conductance_of_sonic)
-    return Term((*_GAS, f"{section}.area", f"{section}.discharge_coefficient"), conductance_of_area)
+        return replace(of_sonic, in_other_form=of_area)
+    return replace(of_area, in_other_form=of_sonic)
 
 
 def _chamber_terms(device: Device) -> dict[str, Term]:

@@ -13,7 +13,7 @@ from ppafo.model.declaration import Quantity, held_in
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
-from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, left, resolved
+from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation.clock import Clock, read_clock
@@ -82,13 +82,13 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     # All links that are left are the scenario's own, for what is replaced follows nothing any more.
     if replaced:
         device = replace(scenario.device, links={})
-        scenario = replace(scenario, device=device, links=left(scenario.graph, replaced))
-    for section, attributes in _ORIFICES.items():
+        links = left(in_other_forms(scenario.graph, _changing_form(scenario, replaced)), replaced)
+        scenario = replace(scenario, device=device, links=links)
+    for section in _changing_form(scenario, moved):
         form = other_form(scenario.device, section)
-        if any(f"{section}.{name}" in moved for name in form):
-            in_form = {name: moved.pop(f"{section}.{name}") for name in form}
-            kind = SonicOrifice if "sonic_conductance" in form else Orifice
-            scenario = _replace_number(scenario, attributes, kind(**in_form))
+        in_form = {name: moved.pop(f"{section}.{name}") for name in form}
+        kind = SonicOrifice if "sonic_conductance" in form else Orifice
+        scenario = _replace_number(scenario, _ORIFICES[section], kind(**in_form))
     for path, number in moved.items():
         scenario = _replace_number(scenario, _attributes(path, scenario), number)
     return scenario
@@ -102,7 +102,12 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
     links = links_that_hold(scenario)
     # What follows the sample period follows a rate that is given for it.
     period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
-    moved = resolved(links, {**replaced, **period}, lambda path: _number(scenario, _attributes(path, scenario)))
+    moved = resolved(
+        links,
+        {**replaced, **period},
+        lambda path: _number(scenario, _attributes(path, scenario)),
+        _changing_form(scenario, replaced),
+    )
     return {path: number for path, number in moved.items() if path not in period}
 
 
@@ -133,6 +138,15 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     """Return the names of the form in which an orifice (``valve`` or ``actuator.leak``) is not given."""
     orifice = device.valve.orifice if section == "valve" else device.actuator.leak
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
+
+
+def _changing_form(scenario: Scenario, given: Collection[str]) -> list[str]:
+    """Return the sections of the orifices that take the form in which they are not."""
+    return [
+        section
+        for section in _ORIFICES
+        if any(f"{section}.{name}" in given for name in other_form(scenario.device, section))
+    ]
 
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:

@@ -18,11 +18,11 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Number
-from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
-from ppafo.simulation.nominal import flow_of_area, flow_of_sonic
+from ppafo.simulation.nominal import VALVE, flow_of_area, flow_of_sonic, in_its_form
 
 PERIOD_PATH = "controller.period"
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
@@ -329,10 +329,13 @@ class LoopFrames(NamedTuple):
     joint: dict[str, Callable[..., Any]]
 
 
-def _frames(device: Device, walks: bool, controlled: str, has_leg: bool) -> LoopFrames:
-    """Return the loops of a device, in a walk or with what is controlled, on a joint with a leg's foot or without."""
+def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: bool) -> LoopFrames:
+    """Return the loops of a device, in a walk or with what is controlled, on a joint with a leg's foot or without.
+
+    With the valve's orifice as a sonic conductance or as an area.
+    """
     valve = VALVES[device.valve.kind]
-    chambers, sonic = chambers_of(device), isinstance(device.valve.orifice, SonicOrifice)
+    chambers = chambers_of(device)
     names = {item.name for item in valve.quantities}
     timed = {"follow_time": valve.lag or valve.choose(valve_settings(device.valve)).command_delay}
     is_joint = controlled == ANGLE
@@ -374,19 +377,23 @@ def loop_terms(
 
     ``controlled`` says what the law controls; with a leg the foot of it turns about the joint, too.
     """
-    frames = _frames(device, walks, controlled, has_leg)
-    # A law of the angle alone has the torque loop inside it.
-    own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
+    of_area, of_sonic = (_frames(device, walks, controlled, has_leg, sonic) for sonic in (False, True))
     names = {item.name for item in VALVES[device.valve.kind].quantities}
 
-    def term(frame: Callable[..., float], by: Callable[..., float], *settings: str) -> Term:
-        inner = {"loop_of": own_loop, "rule": by}
+    def in_form(
+        frames: LoopFrames, frame: Callable[..., float], by: Callable[..., float], settings: tuple[str, ...]
+    ) -> Term:
+        # A law of the angle alone has the torque loop inside it.
+        own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
+        inner = {**frames.joint, "rule_of_joint": by} if frame is gain_of_joint else {"loop_of": own_loop, "rule": by}
         return Term((*frames.sources, *settings), bind(frame, f"{by.__name__}_of_device", inner), frames.rows)
+
+    def term(frame: Callable[..., float], by: Callable[..., float], *settings: str) -> Term:
+        return in_its_form(device, VALVE, in_form(of_area, frame, by, settings), in_form(of_sonic, frame, by, settings))
 
     found = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
     for name, of_joint in _OF_JOINT.items() if TORQUE not in law.controls else ():
-        bound = bind(gain_of_joint, f"{of_joint.__name__}_of_device", {**frames.joint, "rule_of_joint": of_joint})
-        found[name] = Term((*frames.sources, "controller.error_limit"), bound, frames.rows)
+        found[name] = term(gain_of_joint, of_joint, "controller.error_limit")
     opening = opening_beyond_band if "dead_band" in names else gain_of_loop_and_setting
     found[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
     # An integral, and what is learnt, go with the proportional gain, also where that one is given.

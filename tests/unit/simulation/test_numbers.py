@@ -77,3 +77,18 @@ def test_links_are_no_part_of_the_document_of_a_scenario() -> None:
     document = scenario_document(load_scenario("step-response"))
     assert "links" not in document
     assert "links" not in document["device"]
+
+
+LINEARISED = ("controller.kind=feedback_linearisation", "reference.kind=constant", "reference.level=2 N m")
+
+
+@pytest.mark.parametrize(("name", "overrides"), [("swing-foot-angle", ()), ("step-response", LINEARISED)])
+def test_gains_follow_a_valve_whose_size_is_given_in_the_other_form(name: str, overrides: tuple[str, ...]) -> None:
+    scenario = load_scenario(name, overrides)
+    moved = with_numbers(scenario, {"valve.sonic_conductance": 1.5e-8, "valve.critical_ratio": 0.3})
+    sonic = ("valve.sonic_conductance=1.5e-8 m^3/(s Pa)", "valve.critical_ratio=0.3")
+    assert moved.controller == load_scenario(name, over(overrides, sonic)).controller
+    assert moved.controller != scenario.controller
+    back = with_numbers(moved, {"valve.area": 2e-5, "valve.discharge_coefficient": 0.4})
+    area = ("valve.area=2e-5 m^2", "valve.discharge_coefficient=0.4")
+    assert back.controller == load_scenario(name, over(overrides, area)).controller

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo
+from ppafo.metrics import METRICS
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
@@ -174,3 +176,10 @@ def test_a_stride_has_help_only_if_every_sample_of_it_has() -> None:
     assert helped.tolist() == [True, False, True]
     assert np.flatnonzero(samples_of(helped, starts, 40)).tolist() == [*range(3, 10), *range(20, 30)]
     assert helped_strides(level, starts[:1]).size == 0
+
+
+def test_a_metric_of_a_module_is_one_of_a_walk_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    # In the catalogue it stands by the place of its object.
+    monkeypatch.setitem(METRICS._kinds, "my_module:KIND", replace(METRICS["largest_pressure"], name="own"))
+    metrics = ppafo.simulate(load_walk("proportional", ["run.duration=8 s"])).metrics
+    assert metrics["own"].value == metrics["largest_pressure"].value

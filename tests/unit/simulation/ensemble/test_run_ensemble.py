@@ -81,7 +81,10 @@ def quiet_columns(draws: ModuleType, base: Scenario, generator: np.random.Genera
     return {
         path: draws.column(base, path, quantity, generator, RUNS)
         for path, quantity in declared.items()
-        if path not in fixed and path not in draws.CHOICES and path.rpartition(".")[0] not in ("sensors", "actuator")
+        if draws.has(base, path)
+        and path not in fixed
+        and path not in draws.CHOICES
+        and path.rpartition(".")[0] not in ("sensors", "actuator")
     }
 
 
