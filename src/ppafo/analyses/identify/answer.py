@@ -27,6 +27,7 @@ from ppafo.report.residuals import Course, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
+from ppafo.units.shown import in_units
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +127,7 @@ _FAR, _SHOWN = 2.0, 0.05
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
 
+@in_units(lambda identification: identification.before.shown)
 def finding_of(identification: Identification) -> Finding[Identification]:
     """Return what was identified in words and tables; passed where recordings agree and the set makes a device."""
     name, new_set, before = identification.name, identification.new_set, identification.before

@@ -19,6 +19,7 @@ from ppafo.report.residuals import Course, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
+from ppafo.units.shown import in_units
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import (
     RecordingAgreement,
@@ -146,6 +147,7 @@ _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
+@in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation in words, tables and panels; it has passed where every error is within its limit."""
     count = len(validation.recordings)
@@ -248,8 +250,9 @@ def in_words(one: Cause) -> str:
         return one.in_words
     ((value, unit),) = one.numbers.values()
     # An atmosphere in gauge pressure says nothing.
-    absolute, quantity = unit == "Pa_a", quantity_of_unit(unit)
-    shown = f"{1e-3 * value:.4g} kPa" if absolute else Kind("", "" if unit == "-" else unit, quantity).text(value)
+    absolute = unit == "Pa_a"
+    quantity = "pressure change" if absolute else quantity_of_unit(unit)
+    shown = Kind("", "" if unit == "-" else unit, quantity).text(value)
     return f"{one.in_words} ({shown})"
 
 
