@@ -22,7 +22,7 @@ def in_shown_unit(number: float, unit: str) -> tuple[float, str]:
         return number, unit
     si_unit, usual = _SHOWN_IN[unit]
     shown = shown_unit(si_unit, usual)
-    return from_si(number, shown, si_unit), shown.removesuffix("_d")
+    return from_si(float(number), shown, si_unit), shown.removesuffix("_d")
 
 
 def with_error(value: float, error: float) -> str:
