@@ -125,7 +125,7 @@ class ParameterSet:
     flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
     joint: Joint = ANKLE
-    shown: Mapping[str, str] = field(default_factory=dict)
+    shown: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         """Return name, title, how many values there are, and the valves; ``ppafo sets show`` lists every value."""
