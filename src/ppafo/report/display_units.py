@@ -126,6 +126,14 @@ def metric_quantity(si_unit: str) -> str:
     return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
 
 
+def gauge_shift(atmosphere: float) -> float:
+    """Return what [Pa] is taken from pressures of a figure whose gauge ones count from ``atmosphere`` [Pa absolute].
+
+    Axes count from the standard atmosphere; nothing is taken where absolute pressures are shown.
+    """
+    return atmosphere - STANDARD_ATMOSPHERE if display_unit("pressure").endswith("_g") else 0.0
+
+
 def metric_words(name: str) -> str:
     """Return the name of a metric in words: ``RMS error``."""
     words = name.replace("_", " ").replace("rms", "RMS")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, one_line
 from ppafo.parameters.joint import ANKLE, Joint
-from ppafo.report.display_units import display_difference
+from ppafo.report.display_units import display_difference, gauge_shift
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
@@ -114,9 +114,7 @@ def recording_figure(
         if kind is _ANGLE and held is not None:
             continue
         vents = kind is _COMMAND and bool(shown) and float(recording["command"].max()) > 1.0
-        # The axis of gauge pressures counts from the standard atmosphere.
-        is_gauge = kind.quantity == "pressure" and kind.shown_unit.endswith("_g")
-        shift = STANDARD_ATMOSPHERE - atmosphere if is_gauge else 0.0
+        shift = -gauge_shift(atmosphere) if kind.quantity == "pressure" else 0.0
         marks = []
         for channel, (name, line) in shown.items():
             look = look_of_valve(valve) if line is ACTUAL else line

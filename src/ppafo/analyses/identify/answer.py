@@ -20,6 +20,7 @@ from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
+from ppafo.report.display_units import gauge_shift
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -115,8 +116,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
             model=model[name],
             names=(_KIND_WORDS[measurement.kind], "model"),
             colour=look.colour,
-            # A pressure is shown as gauge of the standard atmosphere.
-            above=0.0 if is_angle else atmosphere - STANDARD_ATMOSPHERE,
+            above=0.0 if is_angle else gauge_shift(atmosphere),
         )
         panels += course_panels(course, "circles", "" if panels else "above")
     return panels

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.parameters.device import Device
-from ppafo.report.display_units import display_value, quantity_of_unit
+from ppafo.report.display_units import display_value, gauge_shift, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -127,19 +126,18 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     course = Course(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind("Residual (measured - model)", "", shown.quantity),
+        change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
         times=scale * measured.time,
         samples=given,
         # The measurement is late by the delay, so the model is read that much earlier.
         model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
         names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
         colour=_LOOKS.get(name, ACTUAL).colour,
-        above=atmosphere - STANDARD_ATMOSPHERE if is_chamber else 0.0,
+        above=gauge_shift(atmosphere) if is_chamber else 0.0,
     )
     # Where the residual is far from the limit of its RMS value, that would only press it flat.
     is_near = float(np.abs(course.model - given).max()) >= _NEAR_LIMIT * limit
-    title = f"{shown.title}: RMS {100 * channel.fraction:.2g} %"
-    return course_panels(course, "dots", "figure" if is_first else "", title, (-limit, limit) if is_near else ())
+    return course_panels(course, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
 
 
 _MILLISECONDS = 1.0e3
