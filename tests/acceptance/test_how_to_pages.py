@@ -308,7 +308,9 @@ def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(t
     )
     (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
     within = ["actuator.angle_max=110 deg", "supply.pressure=65 kPa_g"]
-    actuator = ppafo.load_device(tmp_path / "mine.toml", overrides=within).actuator
+    device = ppafo.load_device(tmp_path / "mine.toml", overrides=within)
+    actuator = device.actuator
+    assert (device.joint.name, device.joint.positive) == ("elbow", "extension")
     same = ppafo.load_device(MEASURED / "measured-bladder.toml").actuator
     assert actuator.kind == "table"
     assert actuator.settings == same.settings
