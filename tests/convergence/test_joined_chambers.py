@@ -25,9 +25,8 @@ from ppafo.model.valves import solenoid_recycling
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters, valve_settings
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.plan import plan_run
+from ppafo.simulation.plan import plan_run, state_at_start
 from ppafo.simulation.scenario import ProfileChoice
-from ppafo.walking.preparation import vented_state
 from tests.reference.reference_slopes import joined_thermal_rates, thermal_gas_rates
 from tests.reference.reference_solver import compare_with_reference
 
@@ -62,7 +61,7 @@ def stepped(*overrides: str) -> Course:
     )
     plant = plant_parameters(device)
     valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.RecyclingState()
-    state = vented_state(plant, math.radians(75.0), 0.0)
+    state = state_at_start(plant, math.radians(75.0), 0.0, ROOM, ROOM)
     held = held_chambers(plant, state.angle)
     rows = []
     for number in range(round(0.6 / STEP) + 1):
@@ -72,7 +71,7 @@ def stepped(*overrides: str) -> Course:
         shown, coils = solenoid_recycling.advance(valve, coils, command, time, STEP)
         ports = solenoid_recycling.connect(plant, shown)
         joined = plant_with_joined_chambers(plant, solenoid_recycling.joined_opening(shown))
-        flowing = sloped_flows(joined, *held_pressures(held, state), *ports, single_port_flow_slopes)
+        flowing = sloped_flows(joined, *held_pressures(plant, held, state), *ports, single_port_flow_slopes)
         begun = begin_still_gas(state, held, flowing, STEP)
         passing = stage_flows(joined, begun.end_1, begun.end_2, *ports, single_port_flow)
         second = second_still_stage(begun, passing)

@@ -35,6 +35,10 @@ def link_program(program: Program, collector: Linked) -> None:
     """
     own = links_of(program.actuator)
     collector.links.update(own)
+    if program.leg is not None:
+        of_walk = program.leg.links(program)
+        collector.links.update(of_walk)
+        collector.effects.update({function: program.leg.ASKED[function] for function in of_walk.values()})
     if program.controlled != TORQUE:
         followed = CONTROLLED[program.controlled]
         collector.links[controlled] = followed.value

@@ -128,6 +128,13 @@ class LegPhases(Protocol):
     def ENDED(self) -> Rows:  # noqa: N802
         """What phases hand on of where the foot would be, and where it ends."""
 
+    @property
+    def ASKED(self) -> Mapping[Any, tuple[str, ...]]:  # noqa: N802
+        """Groups of rows that what stands in ``links`` takes before its own arguments."""
+
+    def links(self, parts: "Program") -> Mapping[Any, Any]:
+        """What stands for functions of the controller."""
+
     def parameters(self, parts: "Program") -> Rows:
         """Groups of its parameters."""
 

@@ -112,6 +112,14 @@ def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float
     return torque_constant * (pressure_1 - pressure_2)
 
 
+def joint_torque(plant: PlantParameters, _angle: float, pressure_1: float, pressure_2: float) -> float:
+    """Torque of the actuator [N m] at an angle [rad] and two absolute pressures [Pa]. Equation (2).
+
+    A vane's is the same at every angle; a program with an actuator of another kind calls that kind's own here.
+    """
+    return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+
+
 def gravity_torque(angle: Number, largest_torque: float) -> Number:
     """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
 
@@ -161,7 +169,7 @@ def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at
 
 def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
     """Torque on the vane before friction and damping [N m], positive in plantarflexion. Equations (1), (2)."""
-    actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    actuator = joint_torque(plant, angle, pressure_1, pressure_2)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return net_driving_torque(actuator, gravity, plant.external_torque)
 

@@ -6,7 +6,7 @@ A vane is taken with the foot at a right angle, or 0.2 rad inside a stop where t
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.control.binding import bind
-from ppafo.model.actuators.kind import Range
+from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.actuators.vane import VaneSettings
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.declaration import Number, quantities_of
@@ -129,10 +129,25 @@ def shaped_in_the_middle(settings: Any, stops: Range, around: Surroundings) -> M
     )
 
 
+def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
+    """Growth of chamber 1 of a vane [m^3/rad]."""
+    return settings.displacement_per_radian
+
+
+def shaped_growth(settings: Any, stops: Range, around: Surroundings) -> float:
+    """Mean growth of chamber 1 of another kind [m^3/rad] between the stops, at the pressure of its supply."""
+    gauge = around.supply_pressure - around.atmospheric_pressure
+    return mean_growth(shape_of(settings, stops), stops, gauge, both_chambers)
+
+
 class ChambersOf(NamedTuple):
-    """The function of an actuator that gives its ``MeanChambers``, what it takes by path, and in which rows."""
+    """The functions of an actuator that give its ``MeanChambers`` and the mean growth of chamber 1 [m^3/rad].
+
+    Both take the same: by path, and in which rows.
+    """
 
     function: Any
+    growth: Any
     sources: tuple[str, ...]
     rows: tuple[type, ...]
 
@@ -150,7 +165,7 @@ def chambers_of(device: Device) -> ChambersOf:
         for item in quantities_of(row)
     )
     if actuator.kind == VANE:
-        return ChambersOf(vane_at_right_angle, sources, rows)
+        return ChambersOf(function=vane_at_right_angle, growth=vane_growth, sources=sources, rows=rows)
     components = {
         "prepared_shape": kind.model.prepare,
         "both_chambers": kind.model.chambers,
@@ -159,4 +174,6 @@ def chambers_of(device: Device) -> ChambersOf:
     }
     prepared = shape_of if actuator.table is None else measured_shape_of
     components["shape_of"] = bind(prepared, f"shape_of_{actuator.kind}", components)
-    return ChambersOf(bind(shaped_in_the_middle, f"middle_of_{actuator.kind}", components), sources, rows)
+    middle = bind(shaped_in_the_middle, f"middle_of_{actuator.kind}", components)
+    growth = bind(shaped_growth, f"growth_of_{actuator.kind}", components)
+    return ChambersOf(function=middle, growth=growth, sources=sources, rows=rows)

@@ -188,16 +188,19 @@ def in_its_form(device: Device, section: str, of_area: Term, of_sonic: Term) -> 
 
 def _chamber_terms(device: Device) -> dict[str, Term]:
     """Return what torque constant, growth and dead volumes follow; of another kind, of a vane like it."""
+    own = {f"chamber_rest_{number}": Term((f"actuator.dead_volume_{number}",)) for number in (1, 2)}
     if device.actuator.kind == VANE:
         names = ("torque_constant", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
-        return {name: Term((f"actuator.{name}",)) for name in names}
+        growth = Term(("actuator.displacement_per_radian",))
+        return {name: Term((f"actuator.{name}",)) for name in names} | own | {"chamber_growth": growth}
     chambers = chambers_of(device)
 
     def term(frame: Callable[..., float]) -> Term:
         mean = {"mean_chambers": chambers.function}
         return Term(chambers.sources, bind(frame, f"{frame.__name__}_of_device", mean), chambers.rows)
 
-    return {
+    return own | {
+        "chamber_growth": Term(chambers.sources, chambers.growth, chambers.rows),
         "torque_constant": term(torque_per_pressure),
         # By virtual work a chamber grows with the angle as its torque does with the pressure.
         "displacement_per_radian": term(torque_per_pressure),

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
-from ppafo.model.plant import chamber_pressures
+from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.walking.events import EVENT_ROW, FRACTION_ROW, PHASE_ROW, REQUEST_ROW, SAFE_ROW, clock_row
 
 Channels = dict[str, tuple[Any, str]]
@@ -17,11 +17,12 @@ Channels = dict[str, tuple[Any, str]]
 def actuator_channels(run: Run, record: Mapping[str, Floats]) -> Channels:
     """Pressures, torques and power, from rows (samples,) by path."""
     angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, record["state.mass_1"], record["state.mass_2"])
+    actuator, masses = run.program.actuator, (record["state.mass_1"], record["state.mass_2"])
+    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, *masses)
     return {
         "pressure_1": (pressure_1, "Pa"),
         "pressure_2": (pressure_2, "Pa"),
-        "torque": (run.plant.torque_constant * np.subtract(pressure_1, pressure_2), "N m"),
+        "torque": (np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2)), "N m"),
         "external_torque": (external, "N m"),
         "device_power": (external * rate, "W"),
     }

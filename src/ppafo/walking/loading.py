@@ -185,8 +185,9 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     reading = Reading(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
-        device.check_vane("a walk")
+    if "gas_model" in document:
+        with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
+            device.check_vane("gas with an energy balance")
     named_sequence = _named_file("task_sequence", request, document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if named_sequence is None else load_task_sequence(named_sequence)

@@ -12,13 +12,15 @@ from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_tim
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
+from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
-from ppafo.model.catalog import VALVES
+from ppafo.model.actuators.kind import Chambers
+from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
-from ppafo.model.gait import gait_at
+from ppafo.model.gait import GaitNow, gait_at
 from ppafo.model.orifice import area_conductance
-from ppafo.model.plant import PlantParameters
+from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
 from ppafo.model.sensors import GaitSensors
 from ppafo.model.valves import vent_valve
@@ -32,6 +34,8 @@ from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import VariedGaits, crowd_of, leg_of_person, person_of, settings_of_person
 from ppafo.walking.preparation import (
+    HIGHEST_ANGLE,
+    LOWEST_ANGLE,
     FaultSettings,
     device_share,
     fault_of,
@@ -98,7 +102,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         components,
         with_leg(bare, leg),
         lambda plant: walk_steps(scenario, plant),
-        lambda plant: vented_state(plant, walk.initial.now.ankle, walk.initial.now.ankle_rate),
+        lambda plant: start_vented(device, plant, walk.initial.now),
         walk,
     )
     return run, (too_many_steps(scenario, run.step, run.step_count),)
@@ -137,7 +141,8 @@ def unrecorded(run: Run, runs: int) -> Batch:
 
 def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
-    lines, volume = scenario.supply_lines, of_each(smallest_chamber, plant)
+    lowest, highest = (vented_chambers(scenario.device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
+    lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
     # Lines may be smaller than any chamber, and then fill first.
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
@@ -151,6 +156,17 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         record_every=whole(counts.record_every),
         needs_parts=False,
     )
+
+
+def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chambers:
+    """Both chambers of a device at an angle [rad] and the pressure of the atmosphere."""
+    room = plant.atmospheric_pressure
+    return filled_chambers(ACTUATORS[device.actuator.kind].model, plant, angle, room, room)
+
+
+def start_vented(device: Device, plant: PlantParameters, now: GaitNow) -> PlantState:
+    """The state in which a walk begins: the ankle where the gait has it, and vented chambers."""
+    return vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate)
 
 
 def of_each(function: Any, *rows: Any) -> Any:

@@ -7,17 +7,19 @@ in C. What a gait comes to (series, events, the fit of the heel) is data.
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from ppafo.engine.scheme.pneumatics import filling_time
 from ppafo.engine.scheme.walking import NO_CLEARANCE, DeviceShare, WalkState, foot_direction
-from ppafo.model.columns import larger, rounded_up, truncated
+from ppafo.model.actuators.kind import Chambers
+from ppafo.model.columns import larger, rounded_up, smaller, truncated
 from ppafo.model.contact import FLAT, HEEL
 from ppafo.model.elementary import exponential
 from ppafo.model.gait import GaitNow
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
-from ppafo.model.plant import PlantParameters, PlantState, chamber_volumes
+from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.sensors import Fault, GaitSensors
-from ppafo.simulation.plan import WHOLE, StepCounts, state_at_start
+from ppafo.simulation.plan import WHOLE, StepCounts, state_with_volumes
 from ppafo.walking.wearer import HeelRocker
 
 LOWEST_ANGLE, HIGHEST_ANGLE = math.radians(60.0), math.radians(115.0)
@@ -64,12 +66,10 @@ def with_leg(plant: PlantParameters, leg: LegParameters) -> PlantParameters:
     )
 
 
-def smallest_chamber(plant: PlantParameters) -> float:
-    """Smallest volume [m^3] of either chamber at the angles of walking."""
+def smallest_chamber(lowest: Chambers, highest: Chambers) -> Any:
+    """Smallest volume [m^3] of either chamber, from those at the lowest and at the highest angle of walking, vented."""
     # Chamber 1 is smallest in dorsiflexion, chamber 2 in plantarflexion.
-    volume_1, _ = chamber_volumes(plant, LOWEST_ANGLE)
-    _, volume_2 = chamber_volumes(plant, HIGHEST_ANGLE)
-    return min(volume_1, volume_2)
+    return smaller(lowest.volume_1, highest.volume_2)
 
 
 def walk_step_counts(
@@ -102,10 +102,10 @@ def walk_step_counts(
     )
 
 
-def vented_state(plant: PlantParameters, angle: float, angular_velocity: float) -> PlantState:
-    """State at an angle [rad] and its rate [rad/s] with both chambers at atmospheric pressure."""
+def vented_state(plant: PlantParameters, filled: Chambers, angle: float, angular_velocity: float) -> PlantState:
+    """State at an angle [rad] and its rate [rad/s] with both chambers there at atmospheric pressure."""
     room = plant.atmospheric_pressure
-    return state_at_start(plant, angle, angular_velocity, room, room)
+    return state_with_volumes(plant, angle, angular_velocity, filled.volume_1, filled.volume_2, room, room)
 
 
 def walk_from_strike(now: GaitNow) -> WalkState:

@@ -35,12 +35,12 @@ from ppafo.model.plant import (
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
+from ppafo.simulation.plan import state_at_start
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.walking import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
-from ppafo.walking.preparation import vented_state
 
 ANGLE = 1.7
 DURATION = 0.06
@@ -81,7 +81,10 @@ def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, Si
 
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
-    state, gas = vented_state(plant, ANGLE, 0.0), lines_at_start(plant, lines)
+    state, gas = (
+        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+        lines_at_start(plant, lines),
+    )
     for _ in range(round(DURATION / step)):
         ports = open_ports(plant_at_line_pressures(plant, lines, gas))
         begun = begin_fed_gas(plant, lines, gas, state, ANGLE, flowing_now(plant, state, ports), step)
@@ -117,7 +120,10 @@ def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
         second = regulator_flow(level, line_2, lines.droop_2, lines.largest_flow_2)
         return [fed_1 - leak, fed_2 + leak, bottle - second - fed_1, second - fed_2, bottle]
 
-    begin, gas = vented_state(plant, ANGLE, 0.0), lines_at_start(plant, lines)
+    begin, gas = (
+        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+        lines_at_start(plant, lines),
+    )
     start = [begin.mass_1, begin.mass_2, gas.mass_1, gas.mass_2, 0.0]
     solution = solve_ivp(rates, (0.0, DURATION), start, method="Radau", rtol=1e-10, atol=1e-15, max_step=1e-4)
     assert solution.success
@@ -154,7 +160,11 @@ def test_a_filling_with_largest_flows_comes_to_that_of_the_solver() -> None:
 @pytest.mark.parametrize("step", [1.0e-3, 1.0e-4])
 def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
     plant = device()
-    made, full, begin = filled(plant, LINES, step), lines_at_start(plant, LINES), vented_state(plant, ANGLE, 0.0)
+    made, full, begin = (
+        filled(plant, LINES, step),
+        lines_at_start(plant, LINES),
+        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+    )
     gained = made.state.mass_1 - begin.mass_1 + made.state.mass_2 - begin.mass_2
     gained += made.lines.mass_1 - full.mass_1 + made.lines.mass_2 - full.mass_2
     assert made.lines.regulated_mass == pytest.approx(gained, rel=1e-12)
@@ -163,7 +173,10 @@ def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
 
 def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> None:
     plant, step = device(), 2.5e-4
-    ports, state = open_ports(plant), vented_state(plant, ANGLE, 0.0)
+    ports, state = (
+        open_ports(plant),
+        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+    )
     for _ in range(round(DURATION / step)):
         held, flowing = held_chambers(plant, ANGLE), flowing_now(plant, state, ports)
         begun = begin_moving_gas(plant, state, held, ANGLE, flowing, step)

@@ -19,7 +19,7 @@ from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
-from ppafo.errors import ScenarioError
+from ppafo.errors import ParameterError, ScenarioError
 from ppafo.exports.c_library import c_library, walk_library
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
@@ -53,12 +53,17 @@ THERMAL = (
 )
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
+ACTUATORS = Path(__file__).parents[2] / "actuators"
+OF_ANOTHER_KIND = ("device.set=cylinder-lever",), (f"device.set={ACTUATORS / 'measured-bladder.toml'}", *SEEN)
+"""A cylinder, whose chambers no pressure widens, and a bladder, with noise."""
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
     ("proportional", ("task_sequence=first-steps",)),
+    *(("proportional", of_kind) for of_kind in OF_ANOTHER_KIND),
 )
-"""Every shipped walk, one with all further features (sensors with faults, thermal gas, slow valve), task sequences."""
+"""Every shipped walk, one with all further features (sensors with faults, thermal gas, slow valve), task sequences,
+other actuators."""
 
 BY_PYTHON = ("proportional-regulators", EVERYTHING)
 """The walk whose lanes Python runs, so that no translator stands on both sides; it takes minutes."""
@@ -127,12 +132,12 @@ def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) ->
 def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]) -> Iterator[tuple[Values, Batch]]:
     """Settings as they are, then drawn ones, each with what Python plans of them."""
     draw = np.random.default_rng(15)
-    kinds = [text for text in overrides if "kind=" in text or text.startswith("task_sequence")]
+    kinds = [text for text in overrides if "kind=" in text or text.startswith(("task_sequence", "device.set"))]
     values = {item.path: item.value for item in settings}
     while True:
         try:
             walked = load_walk(name, [*kinds, *as_overrides(settings, values)])
-        except ScenarioError:
+        except (ScenarioError, ParameterError):
             pass  # settings that contradict each other
         else:
             plan = replace(

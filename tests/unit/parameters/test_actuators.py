@@ -207,7 +207,6 @@ def test_a_run_of_an_ensemble_whose_lever_comes_to_its_dead_centre_is_refused_an
 @pytest.mark.parametrize(
     "command",
     [
-        ["walk", "proportional", "--set", "device.set=cylinder-lever"],
         ["linearise", str(EXAMPLE / "torque-task-cylinder.toml")],
         ["rig", "simulate", "step-response", "--device", "cylinder-lever", "--out", "out"],
     ],

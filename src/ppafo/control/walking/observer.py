@@ -68,8 +68,16 @@ class NominalDevice(NamedTuple):
     nominal_lines: SupplyLines
 
 
+_CHAMBERS = {
+    "displacement_per_radian": "chamber_growth",
+    "dead_volume_1": "chamber_rest_1",
+    "dead_volume_2": "chamber_rest_2",
+}
+"""Of the chambers the observer believes more than a law does, which knows a vane of their mean size only."""
+
+
 def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
-    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (NOMINAL[name],)
+    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (NOMINAL[_CHAMBERS.get(name, name)],)
     return Quantity(
         f"nominal_{name}", unit, f"{summary}; the device's unless given", 0.0, lowest, maximum, follows=follows
     )
@@ -91,7 +99,7 @@ NOMINAL_QUANTITIES = (
     _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8),
     _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8),
     _nominal("relieving", "", "1 where the supplies take gas back", 1.0),
-    _nominal("displacement_per_radian", "m^3/rad", "growth of chamber 1 with the angle", 1.0),
+    _nominal("displacement_per_radian", "m^3/rad", "mean growth of chamber 1 with the angle", 1.0),
     _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0),
     _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
     _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
@@ -370,6 +378,22 @@ def volumes(nominal: NominalDevice, angle: float) -> tuple[float, float]:
     )
 
 
+def believed_volumes(nominal: NominalDevice, angle: float, pressure_1: float, pressure_2: float) -> tuple[float, float]:
+    """Volumes of both chambers [m^3] at a measured angle [rad] and two readings [Pa], which widen no vane.
+
+    A program with an actuator of another kind calls that kind's own chambers here.
+    """
+    return volumes(nominal, angle)
+
+
+def mean_volumes(nominal: NominalDevice, pressure_1: float, pressure_2: float) -> tuple[float, float]:
+    """Gas content per pressure [m^3] of both chambers in the middle of the range, at two readings [Pa].
+
+    For another kind as ``believed_volumes``: of a chamber that gives, its volume and what it gives.
+    """
+    return volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
+
+
 def next_observer(
     nominal: NominalDevice,
     state: Observer,
@@ -403,8 +427,8 @@ def next_observer(
     # The joining time counts from when the coil of chamber 1 lets go.
     joined = nominal.nominal_joining_time if coil_1.position > 0.5 else left
     # The flow is reckoned in the volume before the sample, the reading in the volume after it.
-    before_1, before_2 = volumes(nominal, last_angle)
-    now_1, now_2 = volumes(nominal, angle)
+    before_1, before_2 = believed_volumes(nominal, last_angle, last_1, last_2)
+    now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
     # At the start the lines are at the set pressures of their regulators.
     lines = (
         LineState(
@@ -418,7 +442,7 @@ def next_observer(
     to_1, to_2 = supplied(nominal, lines)
     # No line has more than its regulator gives, whatever it has lost on the way.
     set_1, set_2 = nominal.nominal_supply_pressure, nominal.nominal_dorsiflexion_pressure
-    mean_1, mean_2 = volumes(nominal, 0.5 * (nominal.nominal_angle_min + nominal.nominal_angle_max))
+    mean_1, mean_2 = mean_volumes(nominal, pressure_1, pressure_2)
     # While the chambers are joined, gas passes that no nominal flow describes.
     blind = begins | ((joined > 0.0) & (coil_1.position < 0.5))
     passed_1, taken_1 = passed_chamber(
@@ -540,7 +564,7 @@ def found_cause(
     """The flag of a sample [s] with an angle [rad] and absolute pressures [Pa]; ``NO_FLAG`` where there is none."""
     if nominal.nominal_flow <= 0.0:
         return NO_FLAG
-    now_1, now_2 = volumes(nominal, angle)
+    now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
     fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
     vented_1 = is_vented(nominal, state.coil_1, state.spool, state.command)
     vented_2 = is_vented(nominal, state.coil_2, -state.spool, state.command)

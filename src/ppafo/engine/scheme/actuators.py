@@ -1,8 +1,7 @@
 """An actuator of any kind: what a program calls in place of the vane's functions, and its values from Python.
 
-A program is linked: where its text calls ``chamber_volumes``, ``chamber_pressures`` and the other functions of the
-vane's chambers, it calls its actuator's. ``chambers_at``, ``pressures_at`` and ``torque_at``
-stand for the kind's own.
+A program is linked: where its text calls the vane's ``chambers``, ``chamber_pressures``, ``joint_torque`` and what is
+made of them, it calls its actuator's.
 """
 
 from collections.abc import Callable
@@ -11,81 +10,79 @@ from typing import Any
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.scheme.pneumatics import (
     SHORTEST,
+    HeldChambers,
     MovingGas,
     SlopedFlows,
     StillGas,
     added_flows,
+    held_pressures,
     linearise,
     response,
     solve_stage,
 )
-from ppafo.model.actuators.kind import ActuatorModel, Chambers, ShapedPlant
+from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.model.actuators.vane import chambers
 from ppafo.model.columns import over_runs
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
     chamber_pressures,
     chamber_volumes,
-    driving_torque,
-    gravity_torque,
-    net_driving_torque,
+    joint_torque,
     pressures_per_mass,
 )
-from ppafo.model.sensors import Measurement
+from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
-def chambers_at(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
-    """Both chambers at an angle [rad] and two absolute pressures [Pa], as the kind has them."""
-    raise NotImplementedError
-
-
-def torque_at(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque [N m] at an angle [rad] and two absolute pressures [Pa], as the kind has it."""
-    raise NotImplementedError
-
-
-def pressures_at(plant: ShapedPlant, angle: float, mass_1: float, mass_2: float) -> tuple[float, float]:
-    """Absolute pressures [Pa] at an angle [rad] of two masses [kg], as the kind has them."""
-    raise NotImplementedError
-
-
-def rest_volumes(plant: ShapedPlant, angle: float) -> tuple[float, float]:
+def rest_volumes(plant: PlantParameters, angle: float) -> tuple[float, float]:
     """Volumes of both chambers [m^3] at the pressures of their supplies: what errors of gas are seen against."""
     # At the supplies' pressures, not the present ones: what an error is measured against must not move with it.
-    still = chambers_at(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
+    still = chambers(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
     return still.volume_1, still.volume_2
 
 
-def rest_pressures_per_mass(plant: ShapedPlant, angle: float) -> tuple[float, float]:
+def rest_pressures_per_mass(plant: PlantParameters, angle: float) -> tuple[float, float]:
     """Pressures over masses [Pa/kg] of both chambers at the pressures of their supplies."""
     volume_1, volume_2 = rest_volumes(plant, angle)
     return plant.gas_product / volume_1, plant.gas_product / volume_2
 
 
-def shaped_driving_torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque before friction and damping [N m], positive in plantarflexion. Equation (1)."""
-    actuator = torque_at(plant, angle, pressure_1, pressure_2)
-    return net_driving_torque(actuator, gravity_torque(angle, plant.gravity_torque), plant.external_torque)
+def pressures_held(plant: PlantParameters, held: HeldChambers, state: PlantState) -> tuple[float, float]:
+    """Absolute pressures [Pa] of the gas of a state at the angle that is held, of chambers that may give."""
+    return chamber_pressures(plant, held.angle, state.mass_1, state.mass_2)
 
 
-def seen_with_torque(plant: ShapedPlant, seen: Measurement) -> Measurement:
+def seen_with_torque(plant: PlantParameters, seen: Measurement) -> Measurement:
     """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
-    torque = torque_at(plant, seen.angle, seen.pressure_1, seen.pressure_2)
+    torque = joint_torque(plant, seen.angle, seen.pressure_1, seen.pressure_2)
     return Measurement(angle=seen.angle, pressure_1=seen.pressure_1, pressure_2=seen.pressure_2, torque=torque)
 
 
+def gait_seen_with_torque(plant: PlantParameters, seen: GaitMeasurement) -> GaitMeasurement:
+    """What the sensors of a walk show, with the torque at the angle and pressures shown."""
+    torque = joint_torque(plant, seen.angle, seen.pressure_1, seen.pressure_2)
+    return GaitMeasurement(
+        angle=seen.angle,
+        pressure_1=seen.pressure_1,
+        pressure_2=seen.pressure_2,
+        torque=torque,
+        heel_force=seen.heel_force,
+        toe_force=seen.toe_force,
+    )
+
+
 def begin_shaped_gas(
-    plant: ShapedPlant, state: PlantState, next_angle: float, flowing: SlopedFlows, step: float
+    plant: PlantParameters, state: PlantState, next_angle: float, flowing: SlopedFlows, step: float
 ) -> MovingGas:
     """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``.
 
     Mass answers to pressure as V + p dV/dp: a chamber that gives takes up more gas.
     """
-    pressure_1, pressure_2 = pressures_at(plant, state.angle, state.mass_1, state.mass_2)
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
     # Volumes at both angles at one pressure: the drift is what the angle alone does.
-    here = chambers_at(plant, state.angle, pressure_1, pressure_2)
-    ahead = chambers_at(plant, next_angle, pressure_1, pressure_2)
+    here = chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = chambers(plant, next_angle, pressure_1, pressure_2)
     per_mass_1 = plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1)
     per_mass_2 = plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2)
     linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
@@ -96,7 +93,7 @@ def begin_shaped_gas(
         pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
     )
     first = solve_stage(linear, added_flows(flows, drift))
-    end_1, end_2 = pressures_at(
+    end_1, end_2 = chamber_pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
     return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
@@ -107,13 +104,12 @@ def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
     if actuator is VANE:
         return {}
     return {
-        chambers_at: actuator.chambers,
-        torque_at: actuator.torque,
-        pressures_at: actuator.pressures,
+        chambers: actuator.chambers,
+        joint_torque: actuator.torque,
         chamber_pressures: actuator.pressures,
         chamber_volumes: rest_volumes,
         pressures_per_mass: rest_pressures_per_mass,
-        driving_torque: shaped_driving_torque,
+        held_pressures: pressures_held,
         (PlantParameters, "_replace"): actuator.plant,
     }
 
@@ -137,10 +133,16 @@ def pressures_of(actuator: ActuatorModel, plant: Any, angle: Any, mass_1: Any, m
     return pressure_1, pressure_2
 
 
+def filled_chambers(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> Chambers:
+    """Both chambers at an angle [rad] and two absolute pressures [Pa]."""
+    filled: Chambers = _of_plant(actuator, actuator.chambers, plant, angle, pressure_1, pressure_2)
+    return filled
+
+
 def volumes_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> tuple[Any, Any]:
     """Volumes of both chambers [m^3] at an angle [rad] and two absolute pressures [Pa]."""
-    chambers = _of_plant(actuator, actuator.chambers, plant, angle, pressure_1, pressure_2)
-    return chambers.volume_1, chambers.volume_2
+    filled = filled_chambers(actuator, plant, angle, pressure_1, pressure_2)
+    return filled.volume_1, filled.volume_2
 
 
 def torque_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> Any:

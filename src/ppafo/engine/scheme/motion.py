@@ -15,11 +15,11 @@ from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressur
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
-    actuator_torque,
     chamber_pressures,
     chamber_volumes,
     driving_torque,
     holds_still,
+    joint_torque,
 )
 from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
 
@@ -382,8 +382,8 @@ def begin_free(
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
-    pressure_1, pressure_2 = held_pressures(held, state)
-    torque = actuator_torque(pressure_1, pressure_2, plant.torque_constant) + added_torque
+    pressure_1, pressure_2 = held_pressures(plant, held, state)
+    torque = joint_torque(plant, state.angle, pressure_1, pressure_2) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
     sliding = (torque - way * friction.in_motion - plant.viscous_damping * velocity) / plant.inertia
     acceleration = sliding if way != 0.0 else 0.0
@@ -407,8 +407,8 @@ def end_free(
     velocity = state.angular_velocity
     way = direction_of(velocity)
     predicted = clamp_angle(plant, begun.free_angle)
-    next_1, next_2 = held_pressures(ahead, state)
-    next_torque = actuator_torque(next_1, next_2, plant.torque_constant) + added_torque
+    next_1, next_2 = held_pressures(plant, ahead, state)
+    next_torque = joint_torque(plant, predicted, next_1, next_2) + added_torque
     friction = friction_now(plant, velocity + begun.acceleration * step, next_1, next_2)
     sliding_torque = next_torque - way * friction.in_motion
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
@@ -426,7 +426,7 @@ def depart_free(
     plant: PlantParameters, state: PlantState, ahead: HeldChambers, begun: FreeStep, ended: FreeEnd, step: float
 ) -> tuple[float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane that does not slide through."""
-    pressure_1, pressure_2 = held_pressures(ahead, state)
+    pressure_1, pressure_2 = held_pressures(plant, ahead, state)
     friction = friction_now(plant, 0.0, pressure_1, pressure_2)
     departure = first_event(plant, state, begun.free_angle, begun.acceleration, ended.angular_velocity, step)
     departure_torque = begun.torque + departure.fraction * (ended.torque - begun.torque)

@@ -180,20 +180,24 @@ class StillGas(NamedTuple):
 
 
 class HeldChambers(NamedTuple):
-    """Pressures over masses [Pa/kg] of both chambers at an angle."""
+    """Pressures over masses [Pa/kg] of both chambers at an angle [rad].
+
+    Of chambers that give under pressure these are at rest, and the angle says the rest.
+    """
 
     per_mass_1: float
     per_mass_2: float
+    angle: float
 
 
 def held_chambers(plant: PlantParameters, angle: float) -> HeldChambers:
-    """Both chambers of a vane at an angle [rad]. Equation (3)."""
+    """Both chambers at an angle [rad]. Equation (3)."""
     per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
-    return HeldChambers(per_mass_1, per_mass_2)
+    return HeldChambers(per_mass_1=per_mass_1, per_mass_2=per_mass_2, angle=angle)
 
 
-def held_pressures(held: HeldChambers, state: PlantState) -> tuple[float, float]:
-    """Absolute pressures [Pa] of the gas of a state, as ``chamber_pressures`` has them."""
+def held_pressures(_plant: PlantParameters, held: HeldChambers, state: PlantState) -> tuple[float, float]:
+    """Absolute pressures [Pa] of the gas of a state at the angle that is held, as ``chamber_pressures`` has them."""
     return state.mass_1 * held.per_mass_1, state.mass_2 * held.per_mass_2
 
 

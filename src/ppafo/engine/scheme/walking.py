@@ -22,7 +22,7 @@ from ppafo.model.gait import (
     GaitTiming,
 )
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.plant import PlantParameters, PlantState, actuator_torque
+from ppafo.model.plant import PlantParameters, PlantState, joint_torque
 from ppafo.model.ports import friction_in_motion
 
 
@@ -206,8 +206,8 @@ def external_torque(
     # In the air the foot takes what its own motion needs; on the ground the shank leads, and the device gives what is
     # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
-    pressure_1, pressure_2 = held_pressures(held, state)
-    actuator = actuator_torque(pressure_1, pressure_2, plant.torque_constant)
+    pressure_1, pressure_2 = held_pressures(plant, held, state)
+    actuator = joint_torque(plant, state.angle, pressure_1, pressure_2)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
     moving = way * friction + share.viscous_damping * speed + share.inertia * led.acceleration
@@ -256,8 +256,9 @@ def depart_in_walk(
     departs, slid = ended.motion.departs > 0.5, ended.motion
     there = held_chambers(plant, angle)
     held = HeldChambers(
-        there.per_mass_1 if departs else ahead.per_mass_1,
-        there.per_mass_2 if departs else ahead.per_mass_2,
+        per_mass_1=there.per_mass_1 if departs else ahead.per_mass_1,
+        per_mass_2=there.per_mass_2 if departs else ahead.per_mass_2,
+        angle=there.angle if departs else ahead.angle,
     )
     moved = FreeEnd(
         torque=slid.torque,

@@ -135,7 +135,7 @@ def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
 def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
     """Both pressures [Pa absolute] of the state."""
     if parts.hands_chambers_on:
-        return pneumatics.held_pressures(lane.held, lane.state)
+        return pneumatics.held_pressures(lane.plant, lane.held, lane.state)
     return chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
 
 

@@ -1,10 +1,10 @@
 """What is done at a sample of the controller: sense, decide, and keep what comes late."""
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.actuators import seen_with_torque, torque_at
+from ppafo.engine.scheme.actuators import gait_seen_with_torque, seen_with_torque
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.engine.step.phases import present_pressures
-from ppafo.model.plant import actuator_torque
+from ppafo.model.plant import joint_torque
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import (
     Fault,
@@ -61,18 +61,11 @@ def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
     else:
         angle, pressure_1, pressure_2 = present_signals(parts, lane)
     if parts.ideal_sensors:
-        torque = torque_of(parts, lane, angle, pressure_1, pressure_2)
+        torque = joint_torque(lane.plant, angle, pressure_1, pressure_2)
         return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
     seen = measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant.torque_constant, now.sample)
     # The sensors' torque follows from pressures by a constant, which another actuator does not have.
     return seen_with_torque(lane.plant, seen) if parts.has_shape else seen
-
-
-def torque_of(parts: Program, lane: Lane, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque [N m] of both pressures, at an angle [rad] where the actuator is no vane."""
-    if parts.has_shape:
-        return torque_at(lane.plant, angle, pressure_1, pressure_2)
-    return actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant)
 
 
 def present_signals(parts: Program, lane: Lane) -> tuple[float, float, float]:
@@ -106,7 +99,7 @@ def gait(parts: Program, lane: Lane) -> GaitMeasurement:
         angle=lane.state.angle,
         pressure_1=pressure_1,
         pressure_2=pressure_2,
-        torque=actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant),
+        torque=joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2),
         heel_force=lane.walk.heel_force,
         toe_force=lane.walk.toe_force,
     )
@@ -128,6 +121,12 @@ def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
         now.step * lane.timing.step,
         now.sample,
     )
+    lane.seen = with_torque_of(parts, lane, lane.seen)
+
+
+def with_torque_of(parts: Program, lane: Lane, seen: GaitMeasurement) -> GaitMeasurement:
+    """What the sensors of a walk show, with the torque of an actuator that is no vane."""
+    return gait_seen_with_torque(lane.plant, seen) if parts.has_shape else seen
 
 
 def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
@@ -143,7 +142,7 @@ def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
 def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
     """The readings of a walk, each sensor's as late as its fault says."""
     sensors = lane.gait_sensors
-    return late_measurement(
+    seen = late_measurement(
         lane.signal_history[0, place_of_late(parts, lane, now, sensors.heel_fault)],
         lane.signal_history[1, place_of_late(parts, lane, now, sensors.toe_fault)],
         lane.signal_history[2, place_of_late(parts, lane, now, sensors.angle_fault)],
@@ -151,6 +150,7 @@ def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
         lane.signal_history[4, place_of_late(parts, lane, now, sensors.pressure_2_fault)],
         lane.plant.torque_constant,
     )
+    return with_torque_of(parts, lane, seen)
 
 
 def place_of_late(parts: Program, lane: Lane, now: Now, fault: Fault) -> int:

@@ -1,9 +1,10 @@
 """A leg that walks with the device, in a step: the gait leads its shank, the foot is free or on the ground."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme import walking
+from ppafo.engine.scheme import believed, walking
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.engine.scheme.walking import CarriedFoot, DeviceShare, WalkEnd, WalkState, WalkStep
 from ppafo.engine.step.lane import Lane, Now
@@ -50,6 +51,15 @@ def led(parts: Program) -> Mapping[str, type]:
     if parts.takes_task_sequence:
         return {"next_gait": GaitNow, "marks": Marks}
     return {"place": GaitPlace, "measured": GaitMeasured, "next_gait": GaitNow}
+
+
+ASKED: Mapping[Any, tuple[str, ...]] = believed.ASKED
+"""Groups of rows that what stands in ``links`` takes before its own arguments."""
+
+
+def links(parts: Program) -> Mapping[Any, Any]:
+    """What stands for functions of the controller: its observer believes the chambers of the actuator that walks."""
+    return believed.links_of_observer(parts.actuator)
 
 
 # Before the gas.

@@ -32,6 +32,8 @@ from ppafo.walking.preparation import (
     DISTORTED,
     DISTORTING,
     FROZEN,
+    HIGHEST_ANGLE,
+    LOWEST_ANGLE,
     NEVER,
     device_share,
     distorting_fault,
@@ -166,7 +168,10 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
         yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
 
     # Steps: the smallest volume limits them, and adiabatic gas, which is stiffer by the heat capacity ratio.
-    yield f"volume = {add(smallest_chamber)}(plant)"
+    yield "room = plant.atmospheric_pressure"
+    filled = add(writing.program.actuator.chambers)
+    ends = (f"{filled}(plant, {angle!r}, room, room)" for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
+    yield f"volume = {add(smallest_chamber)}({', '.join(ends)})"
     if configuration.supply_lines is not None:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
@@ -228,4 +233,5 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
         given = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
         yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
-    yield f"state = {add(vented_state)}(plant, walk.now.ankle, walk.now.ankle_rate)"
+    filled = f"{add(writing.program.actuator.chambers)}(plant, walk.now.ankle, room, room)"
+    yield f"state = {add(vented_state)}(plant, {filled}, walk.now.ankle, walk.now.ankle_rate)"

@@ -8,7 +8,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.actuators.kind import ActuatorKind, ActuatorModel, Chambers, Range
 from ppafo.model.declaration import Number
-from ppafo.model.plant import PlantParameters, actuator_torque, chamber_pressures, chamber_volumes
+from ppafo.model.plant import PlantParameters, chamber_pressures, chamber_volumes, joint_torque
 
 
 def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
@@ -17,16 +17,11 @@ def chambers(plant: PlantParameters, angle: float, pressure_1: float, pressure_2
     return Chambers(volume_1=volume_1, volume_2=volume_2, compliance_1=0.0, compliance_2=0.0)
 
 
-def torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque [N m] of two absolute pressures [Pa], the same at every angle. Equation (2)."""
-    return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
-
-
 def prepare(_settings: Any, _stops: Range) -> None:
     """Nothing: the numbers of a vane stand in the plant itself."""
 
 
-MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, torque)
+MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, joint_torque)
 SMALLEST_VOLUME = 1e-18
 """A cube of a micrometre [m^3]: less is a slip, and what is divided by it leaves the range of floats."""
 

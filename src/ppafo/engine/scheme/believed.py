@@ -1,0 +1,49 @@
+"""What the observer of a walk believes of the chambers of an actuator that is no vane: those of its kind.
+
+Its settings say how far they are from the device's: by the dead volumes, and by the mean growth with the angle.
+"""
+
+from typing import Any
+
+from ppafo.control.walking.observer import NominalDevice, believed_volumes, mean_volumes
+from ppafo.engine.scheme.motion import clamp_angle
+from ppafo.model.actuators.kind import ActuatorModel, Chambers
+from ppafo.model.actuators.vane import MODEL as VANE
+from ppafo.model.actuators.vane import chambers
+from ppafo.model.plant import PlantParameters
+
+
+def as_believed(plant: PlantParameters, nominal: NominalDevice, filled: Chambers) -> tuple[float, float]:
+    """Volumes [m^3] of both chambers of the device with the dead volumes and the growth that are believed."""
+    scale = nominal.nominal_displacement_per_radian / plant.displacement_per_radian
+    # A reading that no chamber can have, as of a sensor that failed, must not leave a volume of nothing.
+    return (
+        nominal.nominal_dead_volume_1 + scale * max(filled.volume_1 - plant.dead_volume_1, 0.0),
+        nominal.nominal_dead_volume_2 + scale * max(filled.volume_2 - plant.dead_volume_2, 0.0),
+    )
+
+
+def kind_volumes(
+    plant: PlantParameters, nominal: NominalDevice, angle: float, pressure_1: float, pressure_2: float
+) -> tuple[float, float]:
+    """Volumes of both chambers [m^3] at a measured angle [rad], not beyond the stops, and two readings [Pa]."""
+    return as_believed(plant, nominal, chambers(plant, clamp_angle(plant, angle), pressure_1, pressure_2))
+
+
+def kind_mean_volumes(
+    plant: PlantParameters, nominal: NominalDevice, pressure_1: float, pressure_2: float
+) -> tuple[float, float]:
+    """Gas content per pressure [m^3] of both chambers in the middle of the range, at two readings [Pa]."""
+    middle = chambers(plant, 0.5 * (plant.angle_min + plant.angle_max), pressure_1, pressure_2)
+    volume_1, volume_2 = as_believed(plant, nominal, middle)
+    # What an error of a pressure is in content: p V changes by V, and by what the chamber gives.
+    return volume_1 + pressure_1 * middle.compliance_1, volume_2 + pressure_2 * middle.compliance_2
+
+
+def links_of_observer(actuator: ActuatorModel) -> dict[Any, Any]:
+    """What an observer calls in place of its own functions; nothing for the vane."""
+    return {} if actuator is VANE else {believed_volumes: kind_volumes, mean_volumes: kind_mean_volumes}
+
+
+ASKED = {kind_volumes: ("plant",), kind_mean_volumes: ("plant",)}
+"""Rows of a program that these ask for beside the arguments of what they stand for."""

@@ -1,0 +1,149 @@
+"""Any actuator walks: a cylinder with a lever, soft ones that were measured, and a vane that another package wrote."""
+
+from collections.abc import Iterator
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
+from ppafo.engine.run import batch_of
+from ppafo.model.catalog import ACTUATORS
+from ppafo.walking import load_walk, walk
+from ppafo.walking.motion import with_duration
+from ppafo.walking.planning import plan_walk
+from ppafo.walking.walk import WalkResult
+from tests.actuators import vane_of_others
+
+EXAMPLES = Path(__file__).parents[2] / "actuators"
+CYLINDER = "device.set=cylinder-lever"
+BLADDER = f"device.set={EXAMPLES / 'measured-bladder.toml'}"
+NOISY = ("sensors.pressure_noise=0.1 psi_d", "sensors.angle_noise=0.2 deg", "sensors.pressure_bandwidth=100 Hz")
+MINUTES = 0.25
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _with_the_kind_of_another_package() -> Iterator[None]:
+    ACTUATORS["vane_of_others"] = vane_of_others.KIND
+    yield
+    del ACTUATORS["vane_of_others"]
+
+
+def soft(folder: Path, chambers: int = 2) -> str:
+    """A set with a soft actuator of one or two chambers as strong as the vane of the paper; how an override names it.
+
+    Its chambers grow by half from vented to full, most of it at low pressure, as cloth does until it is taut.
+    """
+    angles, gauges = np.linspace(20.0, 110.0, 4), (0.0, 40.0, 400.0)
+    lines = ["angle [deg],pressure [kPa_g],volume_1 [mL]" + ",volume_2 [mL]" * (chambers - 1)]
+    for angle in angles:
+        turn = np.radians(angle - 20.0)
+        for gauge, more in zip(gauges, (0.0, 0.3, 0.5), strict=True):
+            first = float((30.0 + 40.0 * turn) * (1.0 + more))
+            second = float((30.0 + 20.0 * (np.radians(90.0) - turn)) * (1.0 + more))
+            lines.append(f"{angle},{gauge},{first!r}" + f",{second!r}" * (chambers - 1))
+    (folder / "soft.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    text = (EXAMPLES / "measured-bladder.toml").read_text(encoding="utf-8")
+    text = text.replace("measured-bladder.csv", "soft.csv").replace("measured-bladder", "soft")
+    text = text.replace("value = 166.8", "value = 300.0")
+    (folder / "soft.toml").write_text(text, encoding="utf-8")
+    return f"device.set={folder / 'soft.toml'}"
+
+
+def written_by_others(folder: Path) -> str:
+    """The set of the paper with the vane of another package."""
+    text = (resources.files("ppafo.parameters") / "sets" / "ppafo2011.toml").read_text(encoding="utf-8")
+    text = text.replace("[actuator.torque_constant]", '[actuator]\nkind = "vane_of_others"\n\n[actuator.displacement]')
+    text = text.replace('unit = "m^3"', 'unit = "m^3/rad"', 1).replace('key = "ppafo-2011/k_actuator"\n', "")
+    (folder / "others.toml").write_text(text, encoding="utf-8")
+    return f"device.set={folder / 'others.toml'}"
+
+
+def stays_help(result: WalkResult) -> None:
+    """A device begins with vented chambers, has gas of a possible pressure, and helps without an event."""
+    supply = result.scenario.device.supply
+    pressures = np.array([result.recording["pressure_1"], result.recording["pressure_2"]])
+    assert result.status.is_completed
+    assert pressures[:, 0] == pytest.approx([supply.atmospheric_pressure] * 2)
+    assert pressures.min() > 0.4 * supply.atmospheric_pressure
+    assert result.events == ()
+    assert result.helped[-1]
+
+
+def test_the_vane_of_another_package_walks_as_the_built_in_one(tmp_path: Path) -> None:
+    # Gains of a vane follow it at a right angle, those of another kind in the middle of its range.
+    given = ("controller.torque_gain=4 1/(N m)", "controller.torque_integral_gain=300 1/(N m s)", *NOISY)
+    ours = walk(load_walk("proportional", given), minutes=MINUTES)
+    theirs = walk(load_walk("proportional", [written_by_others(tmp_path), *given]), minutes=MINUTES)
+    assert theirs.scenario.device.actuator.kind == "vane_of_others"
+    for name, channel in ours.recording.channels.items():
+        largest = float(np.max(np.abs(channel.values)))
+        assert theirs.recording[name] == pytest.approx(channel.values, abs=1.0e-12 * largest), name
+
+
+@pytest.mark.parametrize("walked", ["proportional", "proportional-regulators"])
+@pytest.mark.parametrize("chambers", [1, 2])
+def test_a_soft_actuator_helps_a_walk_and_nothing_stops_it(walked: str, chambers: int, tmp_path: Path) -> None:
+    result = walk(load_walk(walked, [soft(tmp_path, chambers), "supply.pressure=50 psi_g", *NOISY]), minutes=MINUTES)
+    stays_help(result)
+    assert result.metrics["net_push_off_work"].value > 0.5
+    assert 0.02 < result.metrics["gas"].value / 1.0e-3 < 3.0
+
+
+@pytest.mark.parametrize(
+    ("walked", "actuator"),
+    [("proportional", CYLINDER), ("proportional-regulators", CYLINDER), ("proportional", BLADDER)],
+    ids=["cylinder", "cylinder-lines", "bladder"],
+)
+def test_a_cylinder_and_a_bladder_walk_and_nothing_stops_them(walked: str, actuator: str) -> None:
+    stays_help(walk(load_walk(walked, [actuator, *NOISY]), minutes=MINUTES))
+
+
+def test_a_cylinder_brings_the_ankle_near_to_the_healthy_one() -> None:
+    result = walk(load_walk("proportional", [CYLINDER]), minutes=MINUTES)
+    assert result.metrics["net_push_off_work"].value == pytest.approx(1.47, abs=0.05)
+    assert result.metrics["gas"].value == pytest.approx(0.16e-3, rel=0.1)
+    recording, device = result.recording, result.scenario.device
+    actuator = ACTUATORS[device.actuator.kind].model
+    plant = plan_walk(result.scenario).plant
+    for sample in range(0, recording.time.size, 97):
+        values = (float(recording[name][sample]) for name in ("angle", "pressure_1", "pressure_2"))
+        assert recording["torque"][sample] == pytest.approx(actuator.torque(plant, *values), abs=1e-9)
+
+
+@pytest.mark.parametrize("actuator", [CYLINDER, BLADDER], ids=["cylinder", "bladder"])
+def test_compiled_and_in_python_a_walk_has_the_same_bits(actuator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = batch_of(plan_walk(with_duration(load_walk("proportional", [actuator, *NOISY]), 1.4)))
+    compiled = run_batch(batch)
+    monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
+    assert run_batch(batch).states.tobytes() == compiled.states.tobytes()
+
+
+@pytest.mark.parametrize(
+    ("fault", "named"),
+    [
+        (("valve_2", "stuck"), {"valve_open", "valve_shut"}),
+        (("bottle", "empty"), {"supply_low", "supply_lost"}),
+        (("hose_1", "off"), {"supply_lost"}),
+    ],
+    ids=lambda word: "-".join(word) if isinstance(word, tuple) else "",
+)
+def test_the_observer_names_what_fails_of_a_cylinder(fault: tuple[str, str], named: set[str]) -> None:
+    part, kind = fault
+    given = [CYLINDER, f"faults.{part}.kind={kind}", f"faults.{part}.time=4.3 s"]
+    (event, *_) = walk(load_walk("proportional", given), minutes=MINUTES).events
+    assert event.time > 4.3
+    assert event.fault_flag is not None
+    assert event.fault_flag.name in named
+
+
+def test_the_observer_believes_what_is_said_of_the_chambers(tmp_path: Path) -> None:
+    own = load_walk("proportional", [soft(tmp_path)])
+    settings, device = own.controller.settings, own.device.actuator
+    assert settings["nominal_dead_volume_1"] == device.dead_volume_1
+    assert settings["nominal_displacement_per_radian"] == pytest.approx(device.displacement_per_radian, rel=1e-12)
+    larger = [soft(tmp_path), "controller.nominal_displacement_per_radian=150 cm^3/rad"]
+    (event, *_) = walk(load_walk("proportional", larger), minutes=MINUTES).events
+    assert event.time < 1.0, "chambers three times as large"
