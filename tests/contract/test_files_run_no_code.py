@@ -10,9 +10,11 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import pytest
 
 import ppafo
+import ppafo.gym
 from ppafo import plugins
 from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS
@@ -233,6 +235,15 @@ def test_the_remedy_of_the_message_works(folder: Path) -> None:
     with pytest.raises(PpafoError, match=r"plugins=\['evil.py'\]"):
         ppafo.load_scenario("given.toml")
     assert ppafo.load_scenario("given.toml", plugins=["evil.py"]).controller.kind == "evil:KIND"
+    assert is_run()
+
+
+def test_an_environment_takes_plugins_as_every_door_does(folder: Path) -> None:
+    (folder / "given.toml").write_text(WITHOUT_GAINS, encoding="utf-8")
+    with pytest.raises(PpafoError, match=r"plugins=\['evil.py'\]"):
+        gymnasium.make("ppafo/TorqueTask-v0", scenario="given.toml", randomise=False)
+    env = gymnasium.make("ppafo/TorqueTask-v0", scenario="given.toml", randomise=False, plugins=["evil.py"])
+    assert env.reset(seed=1)[0].shape == env.observation_space.shape
     assert is_run()
 
 

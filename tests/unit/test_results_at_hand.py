@@ -1,8 +1,11 @@
 """Results handed on: pickled, copied, in the units that are asked for, and in a notebook."""
 
 import copy
+import inspect
 import pickle
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import gymnasium
@@ -11,12 +14,52 @@ import pytest
 
 import ppafo
 import ppafo.gym
+from ppafo.cli.new import new
 from ppafo.errors import DataError, UnitError
+from ppafo.report.finding import Finding
 
 TASK = "torque-task-proportional"
+STUDY = "torque-task-uncertainty"
+
+
+def _sized() -> Any:
+    problem = ppafo.load_design("torque-task")
+    search = problem.search.model_copy(update={"screening": 64, "population": 16, "generations": 1})
+    return ppafo.design(replace(problem, search=search))
+
+
+def _identified(folder: Path) -> Any:
+    new("example", "measured-cylinder", out=folder / "cylinder")
+    return ppafo.identify(folder / "cylinder" / "cylinder.toml")
+
+
+def _tuned() -> Any:
+    problem = ppafo.load_tuning("pid-gains")
+    effort = problem.effort.model_copy(update={"generations": 1, "starts": 1})
+    return ppafo.tune(replace(problem, effort=effort))
+
+
 MADE: dict[str, Callable[[], Any]] = {
     "simulate": lambda: ppafo.simulate(TASK),
+    "simulate_many": lambda: ppafo.simulate_many([TASK, "torque-task-solenoid"]),
     "walk": lambda: ppafo.walk("solenoid", minutes=0.1),
+    "compare_walks": lambda: ppafo.compare_walks("solenoid", minutes=0.1),
+    "walk_population": lambda: ppafo.walk_population("solenoid", minutes=0.1, wearers=2),
+    "endurance_of_walk": lambda: ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1)),
+    "evaluate": lambda: ppafo.evaluate(ppafo.simulate(TASK).recording),
+    "audit": lambda: ppafo.audit("ppafo2011"),
+    "design": _sized,
+    "tune": _tuned,
+    "apply_overrides": lambda: ppafo.apply_overrides(ppafo.load_parameter_set("ppafo2011"), {"valve.area": 3.0e-6}),
+    "load_catalogue": ppafo.load_catalogue,
+    "load_design": lambda: ppafo.load_design("torque-task"),
+    "load_device": lambda: ppafo.load_device("ppafo2011"),
+    "load_gait": lambda: ppafo.load_gait(ppafo.list_gaits()[0]),
+    "load_parameter_set": lambda: ppafo.load_parameter_set("cylinder-lever"),
+    "load_scenario": lambda: ppafo.load_scenario("step-response"),
+    "load_study": lambda: ppafo.load_study(STUDY),
+    "load_tuning": lambda: ppafo.load_tuning("pid-gains"),
+    "load_walk": lambda: ppafo.load_walk("solenoid"),
     "parts": ppafo.parts,
     "bottle": lambda: ppafo.bottle(gas_per_stride="0.3 g"),
     "compare": lambda: ppafo.compare([TASK, "torque-task-solenoid"]),
@@ -30,6 +73,23 @@ MADE: dict[str, Callable[[], Any]] = {
         "torque-task-uncertainty", configuration="solenoid", samples=64, metrics="rms_error"
     ),
 }
+IN_A_FOLDER: dict[str, Callable[[Path], Any]] = {
+    "identify": _identified,
+    "load_study_results": lambda folder: ppafo.load_study_results(
+        Path(ppafo.sweep(STUDY, draws=4, out=folder / "study").found.place.address)
+    ),
+    "read_recording": lambda folder: ppafo.read_recording(ppafo.simulate(TASK).save(folder / "run")),
+    "read_result": lambda folder: ppafo.read_result(ppafo.simulate(TASK).save(folder / "run")),
+    "validate": lambda folder: ppafo.validate(
+        "ppafo2011",
+        [ppafo.simulate("step-response").save(folder / "bench")],
+        motion="leg",
+        overrides=["supply.pressure=55 psi_g"],
+    ),
+    "reproduce": lambda _: ppafo.reproduce(),
+}
+PLAIN = {"workbench", "scenario_from_dict", *(name for name in dir(ppafo) if name.startswith("list_"))}
+"""Functions whose results are bytes or names, and one that has the result of another."""
 COPIES: dict[str, Callable[[Any], Any]] = {
     "pickled": lambda result: pickle.loads(pickle.dumps(result)),
     "copied": copy.copy,
@@ -37,14 +97,34 @@ COPIES: dict[str, Callable[[Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize("name", MADE)
-def test_a_result_can_be_pickled_and_copied_and_still_prints_and_draws_itself(name: str) -> None:
-    result = MADE[name]()
+@pytest.mark.parametrize("name", [*MADE, *IN_A_FOLDER])
+def test_a_result_can_be_pickled_and_copied_and_still_prints_and_draws_itself(name: str, tmp_path: Path) -> None:
+    result = MADE[name]() if name in MADE else IN_A_FOLDER[name](tmp_path)
     for make in COPIES.values():
         other = make(result)
+        assert type(other) is type(result)
         assert str(other) == str(result)
-        if getattr(other, "figures", None) != {}:
+        if hasattr(other, "plot") and getattr(other, "figures", None) != {}:
             assert other.plot().axes
+        if isinstance(other, Finding):
+            assert other.to_dict() == result.to_dict()
+
+
+def test_every_public_function_has_its_result_tried() -> None:
+    public = {name for name in dir(ppafo) if inspect.isfunction(getattr(ppafo, name)) and not name.startswith("_")}
+    assert public == {*MADE, *IN_A_FOLDER, *PLAIN}
+
+
+def test_a_copy_of_a_vector_of_environments_goes_on_by_itself() -> None:
+    envs = gymnasium.make_vec("ppafo/TorqueTask-v0", num_envs=3, vectorization_mode="vector_entry_point")
+    envs.reset(seed=1)
+    action = np.full((3, 1), 0.3, dtype=np.float32)
+    envs.step(action)
+    others = [copy.deepcopy(envs), pickle.loads(pickle.dumps(envs))]
+    planned = [[other.step(action)[0] for _ in range(3)] for other in others]
+    done = [envs.step(action)[0] for _ in range(3)]
+    for foreseen in planned:
+        np.testing.assert_array_equal(foreseen, done)
 
 
 @pytest.mark.parametrize("name", ["ppafo/TorqueTask-v0", "ppafo/StepAngle-v0"])

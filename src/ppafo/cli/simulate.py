@@ -8,10 +8,12 @@ from ppafo.arguments import Folder, Overrides, Scenario
 from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
 from ppafo.documents.json_text import json_text
+from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
     from ppafo.simulation.check import Check, ErrorEstimate
+    from ppafo.simulation.scenario import Scenario as Configured
     from ppafo.simulation.simulate import Result
 
 DEFAULT_FOLDER = Path("out")
@@ -38,6 +40,11 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
     # Before the run, which a folder that is refused must not cost.
     with output.blame_out_option():
         check_result_folder(folder)
+    return _run(chosen, folder, check)
+
+
+@in_units(lambda scenario, *_: scenario.device.shown)
+def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     from ppafo.running import gains, oscillation
     from ppafo.simulation.simulate import simulate
 

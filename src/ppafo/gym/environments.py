@@ -30,6 +30,7 @@ from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
+from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.loading import load_scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import lasting
@@ -95,8 +96,11 @@ class Settings:
     gas_weight: float | None = None
     frame_skip: int = 1
     observations: str = PHYSICAL
+    plugins: Plugins | str | Path = ()
 
     def __post_init__(self) -> None:
+        # Before a scenario is loaded that names what is in them.
+        name_plugins(self.plugins)
         _check_word("actions", self.actions, (CONTINUOUS, ON_OFF))
         _check_word("observations", self.observations, (PHYSICAL, SCALED))
         if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
@@ -245,7 +249,8 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
     wearer and the gait of a walk. ``duration`` of an episode [s]. The reward of a sample is
     -(error_weight error^2 period + gas_weight gas), in N m or rad, s and g. An action is held for ``frame_skip``
     samples, whose rewards are added up. ``observations`` are 'physical', or 'scaled' between -1 and 1. With
-    ``render_mode`` 'rgb_array' an episode can be shown as a picture. ScenarioError or ParameterError for bad input.
+    ``render_mode`` 'rgb_array' an episode can be shown as a picture. ``plugins`` are modules of your own, files or
+    names, whose objects files may name. ScenarioError or ParameterError for bad input.
     """
 
     metadata: dict[str, Any] = {"render_modes": [PICTURE], "render_fps": 25}  # noqa: RUF012 - Gymnasium's own declaration
@@ -358,6 +363,17 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         self._generators: list[np.random.Generator | None] = [None] * num_envs
         self._ended = np.zeros(num_envs, dtype=np.bool_)
         self._last: Observations = np.zeros(self.observation_space.shape, dtype=np.float32)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a pickle keeps: the world as it was made, and the state of its lanes."""
+        return {**vars(self), "_lanes": self._lanes.state()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Go on from a state, on lanes of its own."""
+        self.__dict__.update(state)
+        if isinstance(self._lanes, Mapping):
+            held, self._lanes = self._lanes, self.world.lanes(self.num_envs)
+            self._lanes.resume(held)
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None

@@ -3,9 +3,11 @@
 import math
 
 from ppafo.identification.fit import SMOOTH, STATED, Fit
-from ppafo.units import percentage
+from ppafo.units import from_si, percentage
+from ppafo.units.shown import shown_unit
 
-_SHOWN_IN = {"Pa": ("kPa", 1.0e-3), "rad": ("deg", 180.0 / math.pi)}
+_SHOWN_IN = {"Pa": ("Pa_d", "kPa_d"), "rad": ("rad", "deg"), "N m": ("N m", "N m")}
+"""Unit in SI to the difference that it is shown as, and in which unit where the set does not write another."""
 _SMALLEST, _LARGEST = 1.0e-2, 1.0e5
 """Sizes between which a number is written without a power of ten."""
 _SEVERAL = {"readings", "commands"}
@@ -15,9 +17,12 @@ _SHARE, _MOST_NAMED = 0.05, 3
 
 
 def in_shown_unit(number: float, unit: str) -> tuple[float, str]:
-    """Return a number in an SI unit in the unit that people read: kPa, degrees, or the unit itself."""
-    shown, factor = _SHOWN_IN.get(unit, (unit, 1.0))
-    return factor * number, shown
+    """Return a number in an SI unit in the unit of the set, else in kPa, degrees, or the unit itself."""
+    if unit not in _SHOWN_IN or not math.isfinite(number):
+        return number, unit
+    si_unit, usual = _SHOWN_IN[unit]
+    shown = shown_unit(si_unit, usual)
+    return from_si(float(number), shown, si_unit), shown.removesuffix("_d")
 
 
 def with_error(value: float, error: float) -> str:

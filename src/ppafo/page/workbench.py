@@ -27,6 +27,7 @@ from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
 from ppafo.simulation.overrides import apply_overrides, is_of_device
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 from ppafo.units import conversion, from_si, parse_quantity, to_si
+from ppafo.units.shown import shown_in
 from ppafo.version import __version__
 
 Interval = tuple[float, float]
@@ -171,8 +172,9 @@ def _as_in_files(entry: Mapping[str, Any], item: Scenario) -> dict[str, Any]:
             return {**entry, "minimum": 0.5 * stride, "maximum": 2.0 * stride}
         shortest = SHORTEST_STRIDES * stride
         return {**entry, "minimum": shortest, "maximum": 60.0 * LONGEST_MINUTES, "is_minimum_allowed": True}
-    if entry["group"] == "controller" and entry["display"]["unit"] == "psi_g":
-        return {**entry, "display": {**entry["display"], "unit": "psi_a", "zero": 0.0}}
+    display = entry["display"]
+    if entry["group"] == "controller" and display["unit"].endswith("_g"):
+        return {**entry, "display": {**display, "unit": f"{display['unit'][:-2]}_a", "zero": 0.0}}
     return dict(entry)
 
 
@@ -263,11 +265,11 @@ def _nice(value: float) -> float:
 
 def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
     unit = _LEVEL if entry["unit"] == "Pa" else _bare(entry["unit"])
-    text = entry["description"]
+    text, shown = entry["description"], entry["display"]["unit"]
     return {
         "name": entry["name"],
         "unit": unit,
-        "shown": "psi_a" if entry["name"] in _ABSOLUTE else _bare(entry["display"]["unit"]),
+        "shown": f"{shown[:-2]}_a" if entry["name"] in _ABSOLUTE else _bare(shown),
         "label": text[:1].upper() + text[1:],
     }
 
@@ -401,7 +403,8 @@ def _content(
     programs = []
     for item in simulated:
         name = names.setdefault(packed_once(item.module.wasm), f"module-{len(names) + 1}")
-        programs.append(program_content(item, name, intervals))
+        with shown_in(item.scenario.device.shown):
+            programs.append(program_content(item, name, intervals))
     content = page_content(TITLE, form, _tabs(simulated), programs)
     by_name = {item.scenario.name: item for item in simulated}
     described = {program["name"]: program for program in programs}
@@ -419,7 +422,8 @@ def _content(
         # A question is asked where one of the programs has all the settings that it changes.
         taken = [{one["key"] for one in program["settings"] if one["kept"] != "zero"} for program in shown]
         tab["questions"] = [one for one in tab["questions"] if any(set(one["changes"]) <= keys for keys in taken)]
-        stills.append(still_of(tab, openings, shown))
+        with shown_in(by_name[tab["start"][0]["program"]].scenario.device.shown):
+            stills.append(still_of(tab, openings, shown))
     return content, {name: text for text, name in names.items()}, stills[0]
 
 

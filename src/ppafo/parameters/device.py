@@ -156,6 +156,7 @@ class Device:
 
     ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
     ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
+    ``shown`` are the units, by unit in SI, in which a person is shown its numbers.
     """
 
     name: str
@@ -170,6 +171,7 @@ class Device:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
     joint: Joint = ANKLE
+    shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     def check_vane(self, what: str) -> None:
         """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""

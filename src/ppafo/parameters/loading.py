@@ -4,7 +4,7 @@ import functools
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
 from types import GenericAlias
@@ -35,6 +35,7 @@ from ppafo.parameters.parameter_set import (
     TextEntry,
     apply_overrides,
     chosen_valve,
+    written_units,
 )
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
@@ -270,7 +271,7 @@ def parse_parameter_set(content: bytes, file: str, folder: Path | None = None) -
             raise ParameterError(f"{parameter_set.file}: {path}: there is no valve '{valve}'{hint}")
         with refused_as(ParameterError, f"{parameter_set.file}: {path}.unit", UnitError):
             check_unit(entry.unit, alternatives(declared[path])[0])
-    return parameter_set
+    return replace(parameter_set, shown=written_units(parameter_set.numbers))
 
 
 def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
@@ -30,7 +30,7 @@ from ppafo.parameters.graph import (
 )
 from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
-from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
+from ppafo.units import SI, base_value, format_quantity, from_si, split_number, split_pressure_kind, to_si
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -104,7 +104,8 @@ class ParameterSet:
     ``actuator.leak.area`` or ``valves.solenoid.area``; ``valve_kinds`` gives each valve's kind in the catalogue,
     ``actuator_kind`` the actuator's, ``actuator_file`` the file of one that was measured, and ``actuator_table`` what
     is in it; ``joint`` is what it turns, in words. ``parent`` is the set that this one began as, a name of the package
-    or a path from here; '' without one.
+    or a path from here; '' without one. ``shown`` are the units, by unit in SI, in which its author writes: numbers
+    are shown in them, also with other values.
     """
 
     file: str
@@ -124,6 +125,7 @@ class ParameterSet:
     flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
     joint: Joint = ANKLE
+    shown: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
         """Return name, title, how many values there are, and the valves; ``ppafo sets show`` lists every value."""
@@ -138,6 +140,46 @@ class ParameterSet:
         """Return the declaration of every number that this set may hold, by path."""
         species = self.texts.get(SPECIES_PATH)
         return quantities(self.valve_kinds, self.actuator_kind, "" if species is None else species.value)
+
+
+_SPEAKING = {
+    "Pa_a": (PRESSURE_PATH, SECOND_PRESSURE_PATH),
+    "N m": ("friction.static_torque",),
+    "rad": ("actuator.angle_max", "actuator.angle_min"),
+}
+"""Paths whose unit says how the author of a set writes a quantity, by its unit in SI."""
+
+
+def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
+    """Return the unit in which the author of a set writes pressures, torques, angles, flows, by unit in SI.
+
+    ``numbers`` are the entries of the set by path. What follows is in step: the difference of two levels in ``bar_g``
+    is in ``bar_d``, an angular velocity beside ``deg`` in ``deg/s``. A quantity without a number is left out.
+    """
+    flows = tuple(path for path in numbers if path.startswith("reported.") and path.endswith(".mass_flow"))
+    conductances = tuple(path for path in numbers if path.endswith(".sonic_conductance"))
+    speaking = {**_SPEAKING, "kg/s": flows, "m^3/(s Pa)": conductances}
+    found = {
+        si_unit: unit
+        for si_unit, paths in speaking.items()
+        for unit in [numbers[path].unit for path in reversed(paths) if path in numbers]
+        if _is_of(unit, si_unit)
+    }
+    if "Pa_a" in found:
+        unit, kind = split_pressure_kind(found["Pa_a"])
+        found |= {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
+    if "rad" in found:
+        found["rad/s"] = f"{found['rad']}/s"
+    return found
+
+
+def _is_of(unit: str, si_unit: str) -> bool:
+    """Tell whether a unit can be brought to one in SI; of another the audit tells."""
+    try:
+        to_si(1.0, unit, si_unit)
+    except UnitError:
+        return False
+    return True
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:

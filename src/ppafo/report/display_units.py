@@ -1,4 +1,8 @@
-"""In which unit a person is shown a quantity or a metric: the only table of it. Files and data stay in SI."""
+"""In which unit a person is shown a quantity or a metric: the only table of it. Files and data stay in SI.
+
+Where a parameter set writes pressures, torques, angles or flows in other units, those of the set take the place of the
+table's (``units/shown.py``).
+"""
 
 import math
 from collections.abc import Mapping
@@ -10,6 +14,7 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.metrics import Metric
 from ppafo.units import from_si
+from ppafo.units.shown import shown_unit
 
 Floats = NDArray[np.float64]
 QUANTITIES: MappingProxyType[str, tuple[str, str]] = MappingProxyType(
@@ -44,7 +49,7 @@ QUANTITIES: MappingProxyType[str, tuple[str, str]] = MappingProxyType(
         "conductance": ("m^3/(s Pa)", "L/(s bar)"),
     }
 )
-"""Kind of quantity to its unit in SI and the unit in which people of the field think of it."""
+"""Kind of quantity to its unit in SI and the unit in which it is shown unless a parameter set writes another."""
 _NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
 _OF_UNIT = {si: quantity for quantity, (si, _) in QUANTITIES.items() if quantity not in _NAMED}
 
@@ -61,21 +66,36 @@ def quantity_of_unit(si_unit: str) -> str:
     return _OF_UNIT.get(si_unit, "")
 
 
+def _unit(quantity: str) -> str:
+    """Return the unit in which a quantity is shown: the set's, where it writes one, else the table's."""
+    si_unit, unit = QUANTITIES[quantity]
+    return unit if quantity in _NAMED else shown_unit(si_unit, unit)
+
+
 def display_unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown, as a table writes it; empty for a plain number."""
-    return QUANTITIES[quantity][1].removesuffix("_d") if quantity else ""
+    return _unit(quantity).removesuffix("_d") if quantity else ""
+
+
+def change_unit(quantity: str) -> str:
+    """Return the unit in which a difference of two values is shown; empty for a plain number."""
+    unit = display_unit(quantity)
+    # A difference of pressures is neither gauge nor absolute.
+    return unit[:-2] if quantity == "pressure" and unit.endswith(("_g", "_a")) else unit
 
 
 def axis_unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown, as the label of an axis writes it: with raised exponents."""
     unit = display_unit(quantity)
-    words = {"psi_g": "psig", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
-    return words.get(unit, unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
+    words = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
+    kinds = {"_g": " gauge", "_a": " absolute"}
+    typed = unit if quantity != "pressure" else f"{unit[:-2]}{kinds.get(unit[-2:], unit[-2:])}"
+    return words.get(unit, typed.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
 
 
 def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return a value in SI in the unit in which it is shown; gauge counts from ``atmosphere`` [Pa absolute]."""
-    si, unit = QUANTITIES.get(quantity, ("", ""))
+    si, unit = (QUANTITIES[quantity][0], _unit(quantity)) if quantity in QUANTITIES else ("", "")
     return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si, atmosphere)
 
 
@@ -92,9 +112,9 @@ def display_values(values: Floats, quantity: str) -> Floats:
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
-def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
-    """Return a value in SI as text with the unit in which it is shown."""
-    return f"{display_value(value, quantity):{form}} {display_unit(quantity)}".rstrip()
+def quantity_text(value: float, quantity: str, form: str = ".3g", atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+    """Return a value in SI as text with the unit in which it is shown; gauge counts from ``atmosphere`` [Pa]."""
+    return f"{display_value(value, quantity, atmosphere):{form}} {display_unit(quantity)}".rstrip()
 
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
@@ -104,6 +124,14 @@ _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 def metric_quantity(si_unit: str) -> str:
     """Return the kind of quantity of a metric or channel that has a unit in SI, empty for a plain number."""
     return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
+
+
+def gauge_shift(atmosphere: float) -> float:
+    """Return what [Pa] is taken from pressures of a figure whose gauge ones count from ``atmosphere`` [Pa absolute].
+
+    Axes count from the standard atmosphere; nothing is taken where absolute pressures are shown.
+    """
+    return atmosphere - STANDARD_ATMOSPHERE if display_unit("pressure").endswith("_g") else 0.0
 
 
 def metric_words(name: str) -> str:
@@ -137,6 +165,6 @@ def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSP
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:
     """Return a difference of two values of a metric or channel, and its unit, as people are shown them."""
     quantity = metric_quantity(si_unit)
-    # A difference of pressures is not gauge, one of temperatures counts in kelvin.
-    unit = {"psi_g": "psi", "degC": "K"}.get(display_unit(quantity), display_unit(quantity))
+    # A difference of temperatures counts in kelvin.
+    unit = {"degC": "K"}.get(change_unit(quantity), change_unit(quantity))
     return display_difference(value, quantity), unit or si_unit.removeprefix("-")

@@ -18,6 +18,7 @@ from ppafo.report.panels import Panel, draw_panels
 from ppafo.report.style import render_figure
 from ppafo.report.writing import align_columns, inline_figure, render_page
 from ppafo.signals import RecordingKind
+from ppafo.units.shown import in_units, units_in_force
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -136,6 +137,10 @@ class LivePart:
     remark: str = ""
 
 
+def _units_of(finding: "Finding[Any]", *_: Any, **__: Any) -> Mapping[str, str]:
+    return finding.units
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Finding(Generic[T_co]):
     """What an analysis found: ``found`` are the numbers in SI, which are also its JSON; the rest says and shows them.
@@ -144,7 +149,7 @@ class Finding(Generic[T_co]):
     files and its command, unless ``command`` says another; ``kicker`` says above the title what kind of page this is.
     ``passed`` is false where a check failed. ``kind`` says where the numbers come from. ``files`` are further files by
     name. ``page`` makes a page of its own from the drawn figures. ``live`` makes the part of the page that simulates,
-    None where there can be none.
+    None where there can be none. ``units`` are those in which it is shown, by unit in SI: in force as it was made.
     """
 
     name: str
@@ -159,6 +164,7 @@ class Finding(Generic[T_co]):
     live: Callable[[], LivePart | None] | None = None
     kind: RecordingKind = "simulated"
     page: Callable[[Mapping[str, bytes]], bytes] | None = None
+    units: Mapping[str, str] = field(default_factory=units_in_force)
 
     @property
     def figures(self) -> dict[str, Part]:
@@ -178,11 +184,13 @@ class Finding(Generic[T_co]):
         page = html.escape(files_of(self)[REPORT].decode())
         return f'<iframe srcdoc="{page}" width="100%" height="700" style="border: 0"></iframe>'
 
+    @in_units(_units_of)
     def to_dict(self) -> dict[str, Any]:
         """Return what ``--json`` prints, as plain data in SI."""
         document = getattr(self.found, "json_document", None)
         return dict(plain(self.found) if document is None else document())
 
+    @in_units(_units_of)
     def plot(self, name: str | None = None) -> "matplotlib.figure.Figure":
         """Return a figure of the result, the first unless named; LookupError where it has none of that name."""
         figures = self.figures
@@ -210,6 +218,7 @@ _ORIGINS = {
 }
 
 
+@in_units(_units_of)
 def text_of(finding: Finding[Any]) -> str:
     """Return what is said first and every part that is no mere detail of the page."""
     blocks = ["\n".join(finding.said)]
@@ -234,6 +243,7 @@ def _table_lines(part: Part) -> list[str]:
     return align_columns(rows, part.left + bool(part.marked))
 
 
+@in_units(_units_of)
 def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
     """Return the page of a finding; ``drawn`` has the SVG or GIF content of each of its figures by name."""
     if finding.page is not None:
@@ -261,6 +271,7 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
     return render_page("finding.html.jinja", values).encode()
 
 
+@in_units(_units_of)
 def files_of(finding: Finding[Any]) -> dict[str, bytes]:
     """Return text, JSON, page, figures and further files of a finding by name; figures are drawn here."""
     drawn: dict[str, Mapping[str, bytes]] = {}

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from ppafo.metrics import METRICS
 from ppafo.report.display_units import (
     axis_unit,
+    change_unit,
     display_difference,
     display_unit,
     display_value,
@@ -51,7 +52,7 @@ class Kind:
     @property
     def shown_change_unit(self) -> str:
         """The unit in which a difference of two values is shown."""
-        return "psi" if self.quantity == "pressure" else self.shown_unit
+        return change_unit(self.quantity) if self.quantity else self.shown_unit
 
     @property
     def title(self) -> str:

@@ -1,14 +1,16 @@
 """The figure of a recording: one panel a quantity over a common time, each in the unit that the field uses."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, one_line
+from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.errors import DataError, UnitError, one_line
 from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.report.display_units import display_difference, gauge_shift
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
@@ -25,6 +27,8 @@ from ppafo.report.style import (
 from ppafo.signals import Recording
 from ppafo.storage import StoredResult
 from ppafo.storage.result_folder import RUN_FILE
+from ppafo.units import conversion
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,11 +48,11 @@ _END_OF_WALK = 5.0
 _ANGLE, _COMMAND = Kind("Ankle angle", "rad", "angle"), Kind("Valve command (-1 to 1)")
 _COMMAND_THAT_VENTS = Kind("Valve command (-1 to 1; 2 vents both chambers)")
 PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]], ...] = (
-    (_ANGLE, 10.0, (), {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)}),
+    (_ANGLE, math.radians(10.0), (), {"angle": ("ankle", ACTUAL), "reference_angle": ("reference", REFERENCE)}),
     (
         Kind("Pressure", "Pa_a", "pressure"),
-        5.0,
-        (0.0,),
+        5.0 * PASCALS_PER_PSI,
+        (STANDARD_ATMOSPHERE,),
         {
             "pressure_1": ("chamber 1", CHAMBER_1),
             "pressure_2": ("chamber 2", CHAMBER_2),
@@ -58,7 +62,7 @@ PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]]
     ),
     (
         Kind("Pressure in chamber 1 less chamber 2", "Pa_d", "pressure change"),
-        5.0,
+        5.0 * PASCALS_PER_PSI,
         (),
         {"reference_pressure_difference": ("reference", REFERENCE), "pressure_difference": ("actual", ACTUAL)},
     ),
@@ -71,7 +75,7 @@ PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]]
     (_COMMAND, 2.0, (-1.0, 1.0), {"command": ("", ACTUAL)}),
     (
         Kind("Gas since the start", "kg", "gas mass"),
-        0.01,
+        1.0e-5,
         (),
         {
             "supplied_mass": ("supplied", ACTUAL),
@@ -82,7 +86,7 @@ PANELS: tuple[tuple[Kind, float, tuple[float, ...], dict[str, tuple[str, Look]]]
 )
 """Panels: kind of the numbers, smallest span of the axis, values that it always shows, names and looks by channel.
 
-The smallest span keeps what hardly changes from looking wild. It and the values are in the unit of the axis.
+The smallest span keeps what hardly changes from looking wild. It and the values are in SI.
 """
 
 
@@ -110,8 +114,7 @@ def recording_figure(
         if kind is _ANGLE and held is not None:
             continue
         vents = kind is _COMMAND and bool(shown) and float(recording["command"].max()) > 1.0
-        # The axis of pressures counts from the standard atmosphere.
-        shift = STANDARD_ATMOSPHERE - atmosphere if kind.quantity == "pressure" else 0.0
+        shift = -gauge_shift(atmosphere) if kind.quantity == "pressure" else 0.0
         marks = []
         for channel, (name, line) in shown.items():
             look = look_of_valve(valve) if line is ACTUAL else line
@@ -121,7 +124,8 @@ def recording_figure(
             marks.append(Mark("line", recording.time, recording[channel] + shift, (), label, look.colour, style))
         if marks:
             ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
-            then = partial(_set_limits, ends, span, always_shown)
+            smallest = display_difference(span, kind.quantity)
+            then = partial(_set_limits, ends, smallest, tuple(kind.values(always_shown)))
             own = _COMMAND_THAT_VENTS if vents else kind
             named = replace(own, words=joint.said(own.words))
             panels.append(Panel(TIME, named, marks, then=then, shares_x=True))
@@ -167,7 +171,8 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     atmosphere = stated_atmosphere(file, document, "scenario", "device")
     valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
     joint = stated_joint(file, document, "scenario", "device")
-    return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve, joint)
+    with shown_in(stated_units(file, document)):
+        return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve, joint)
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
@@ -182,7 +187,22 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
     atmosphere = stated_atmosphere(file, document, "configuration", "device")
     shown = recording.between(end - _END_OF_WALK, end)
     valve = str(_under(file, document, "configuration", "device", "valve").get("kind", ""))
-    return recording_figure(shown, recording.label, remark, atmosphere, valve)
+    with shown_in(stated_units(file, document)):
+        return recording_figure(shown, recording.label, remark, atmosphere, valve)
+
+
+def stated_units(file: Path, document: Mapping[str, Any]) -> dict[str, str]:
+    """Return the units in which a file's document says that its numbers are shown, by unit in SI; else none.
+
+    DataError names one that is no unit of that kind.
+    """
+    stated = _under(file, document, "shown")
+    for si_unit, unit in stated.items():
+        try:
+            conversion(str(unit), si_unit)
+        except UnitError as error:
+            raise _other_form(file, f"shown.{one_line(si_unit)[:_LONGEST_SHOWN]}", unit, "a unit for it") from error
+    return {si_unit: str(unit) for si_unit, unit in stated.items()}
 
 
 def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:

@@ -26,6 +26,10 @@ _LOOKS: dict[str, tuple[str, int, dict[str, Any]]] = {
 """Colour, largest number and style of what was measured: a page with every sample would have some megabytes."""
 
 
+_ROUNDING = 1.0e-9
+"""Residual over the range of the samples that is none."""
+
+
 def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:
     """Return readings or samples [SI], some of them where there are very many, in one of the looks."""
     colour, most, style = _LOOKS[look]
@@ -67,7 +71,7 @@ class Course:
     above: float = 0.0
 
 
-def course_panels(one: Course, look: str, legend: str, title: str = "", limits: Sequence[float] = ()) -> list[Panel]:
+def course_panels(one: Course, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
     """Return samples and model over time and, half as tall below them, their residual, with ``limits`` dashed."""
     upper = [
         readings_mark(one.names[0], one.times, one.samples - one.above, look),
@@ -86,11 +90,13 @@ def course_panels(one: Course, look: str, legend: str, title: str = "", limits: 
     def set_both(axes: "Axes") -> None:
         # The lower one too: axes that are joined later take the limits of the one below them.
         set_time(axes)
-        largest = max(map(abs, axes.dataLim.intervaly)) * 1.1 or 1.0
+        largest = max(map(abs, axes.dataLim.intervaly)) * 1.1
+        # What is left by rounding alone is none.
+        largest = largest if largest > _ROUNDING * float(one.change.values(np.ptp(one.samples))) else 1.0
         axes.set_ylim(-largest, largest)
         axes.locator_params(axis="y", nbins=3)
 
     return [
-        Panel(one.time, one.level, upper, title, legend=legend, then=set_time, shares_x=True),
+        Panel(one.time, one.level, upper, legend=legend, then=set_time, shares_x=True),
         Panel(one.time, one.change, lower, then=set_both, tall=0.5, shares_x=True),
     ]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Protocol
 from ppafo.engine.lanes import Floats
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario, scenario_document
+from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     import pandas  # type: ignore[import-untyped]
@@ -50,6 +51,7 @@ def channel_names(self: Recorded) -> list[str]:
     return list(self.recording.names)
 
 
+@in_units(lambda result: result.scenario.device.shown)
 def html(self: Recorded) -> str:
     """Return metrics and figure, which a notebook shows."""
     from ppafo.report.notebook import result_html

@@ -8,7 +8,7 @@ numerically sensitive. They hold for one run among many, and a check says so.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -21,6 +21,7 @@ from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import in_units, units_in_force
 
 SHORTER = 4
 """How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
@@ -49,13 +50,18 @@ _COURSES = {
 }
 
 
+def _units_of(shown: "ErrorEstimate | Check") -> Mapping[str, str]:
+    return shown.units
+
+
 @dataclass(frozen=True, slots=True)
 class ErrorEstimate:
     """Estimated error of a run from its time stepping: largest over time of the angle [rad] and of a pressure [Pa].
 
     ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number; ``largest`` the
     name of the one whose error is largest over its value or the range of its quantity, empty without metrics, and
-    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other.
+    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other; ``units`` are
+    those in which a person is shown it.
     """
 
     angle: float
@@ -64,8 +70,10 @@ class ErrorEstimate:
     temperature: float | None = None
     largest: str = ""
     share: float = 0.0
+    units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
+    @in_units(_units_of)
     def sentence(self) -> str:
         """The errors of angle, pressures, temperatures and metrics in the units that people are shown."""
         from ppafo.report.display_units import metric_change
@@ -124,6 +132,7 @@ class Check:
     parts_at: float | None
     failed: tuple[str, ...]
     atmosphere: float = STANDARD_ATMOSPHERE
+    units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
     def is_determined(self) -> bool:
@@ -159,6 +168,7 @@ class Check:
         parting = [] if self.parts_at is None else [f"The runs part at t = {self.parts_at:.4g} s."]
         return " ".join([f"Numerically sensitive: {' Also: '.join(found)}", self.error.sentence, *parting])
 
+    @in_units(_units_of)
     def __repr__(self) -> str:
         """Return the table of all changes in the units that people are shown, and the sentence."""
         from ppafo.report.display_units import metric_change, metric_level

@@ -35,6 +35,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.units import format_quantity, from_si, parse_quantity, to_si
+from ppafo.units.shown import shown_unit
 
 PLAIN = ("", "1")
 """Units of a plain number."""
@@ -333,8 +334,13 @@ OF_A_VANE = Declared(
 """What the file of a vane alone can hold; one without lines can be given some."""
 
 
-WRITTEN_UNITS = {"rad": "deg", "rad/s": "deg/s", "Pa_a": "psi_g", "Pa_d": "psi_d"}
+_WRITTEN_UNITS = {"rad": "deg", "rad/s": "deg/s", "Pa_a": "psi_g", "Pa_d": "psi_d"}
 _ROUND = 1.0e-9
+
+
+def written_unit(si_unit: str) -> str:
+    """Return the unit in which people write what has a unit in SI: the set's or the usual one, empty for a number."""
+    return shown_unit(si_unit, _WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit))
 
 
 @dataclass(frozen=True, slots=True)
@@ -399,7 +405,7 @@ class Reading:
 
 def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return an SI value in the unit in which people write it: degrees, psi; rounding errors are left out."""
-    unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
+    unit = written_unit(si_unit)
     number = from_si(value, unit, si_unit, atmosphere)
     # A number so small that nine places would show nothing of it stays as it is.
     return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
@@ -407,14 +413,14 @@ def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOS
 
 def short_quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return an SI value as ``quantity_text`` does, with six digits, for a message."""
-    unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
+    unit = written_unit(si_unit)
     return f"{from_si(value, unit, si_unit, atmosphere):.6g} {unit}".rstrip()
 
 
 def _form(quantity: Quantity, number: float) -> str:
     if quantity.unit in PLAIN:
         return "a number"
-    unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit)
+    unit = written_unit(quantity.unit)
     return f"a text with its unit, for example '{format_quantity(number, unit)}'"
 
 
@@ -424,7 +430,7 @@ def limits(quantity: Quantity, atmosphere: float) -> str:
     ``atmosphere`` [Pa absolute] is what gauge pressures are measured from.
     """
     # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
-    unit = WRITTEN_UNITS.get(quantity.unit, quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
+    unit = written_unit(quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
     unit = "" if unit in PLAIN else unit
     lower, upper = (
         f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""

@@ -6,7 +6,7 @@ walk above 12 times a stride, else above 10 times a second. A law that only swit
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ppafo.simulation.declaration import controller_settings
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
+from ppafo.units.shown import in_units, units_in_force
 
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Reversals of the command above which a loop oscillates."""
@@ -111,8 +112,10 @@ class Oscillation:
     wanted: float
     remedy: str
     controlled: str = TORQUE
+    units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
+    @in_units(lambda oscillation: oscillation.units)
     def sentence(self) -> str:
         """The verdict in one line."""
         followed = CONTROLLED[self.controlled]
@@ -170,6 +173,7 @@ def most_reversals(scenario: Scenario, law: ControllerKind, duration: float, str
     return duration * (MOST_PER_STRIDE / stride_time if stride_time > 0.0 else MOST_PER_SECOND)
 
 
+@in_units(lambda scenario, *_, **__: scenario.device.shown)
 def oscillation_of(
     scenario: Scenario,
     law: ControllerKind,

@@ -17,6 +17,7 @@ from ppafo.signals.recording import Recording
 from ppafo.simulation import at_hand
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario, scenario_document
+from ppafo.units.shown import in_units
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -81,6 +82,10 @@ class Measuring:
         return Measuring, (self(),)
 
 
+def _units_of(result: "Result") -> Mapping[str, str]:
+    return result.scenario.device.shown
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Result:
     """A finished run. ``versions`` are the packages', ``engine`` the figures of the time stepping."""
@@ -110,6 +115,7 @@ class Result:
             [f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}", *lines]
         )
 
+    @in_units(_units_of)
     def __str__(self) -> str:
         """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
         from ppafo.report.display_units import metrics_lines
@@ -117,6 +123,7 @@ class Result:
         head = f"{self.scenario.name}: {self.status.kind}"
         return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
 
+    @in_units(_units_of)
     def plot(self) -> "Figure":
         """Return a figure of angle, pressures, torque, command and gas; ``.savefig(...)`` writes it."""
         from ppafo.report.notebook import shown
@@ -128,6 +135,7 @@ class Result:
         joint = self.scenario.device.joint
         return shown(recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve, joint))
 
+    @in_units(_units_of)
     def error(self) -> "ErrorEstimate":
         """Return the estimated error [SI] of this run from its steps: it runs again with a sixteenth of it.
 
@@ -139,6 +147,7 @@ class Result:
 
         return estimated_error(self, results_of(self.scenario, [finer(plan_run(self.scenario))])[0])
 
+    @in_units(_units_of)
     def check(self) -> "Check":
         """Return whether this run can be repeated: with finer steps, and with start and measurements moved.
 
@@ -159,6 +168,7 @@ class Result:
             "seed": self.scenario.sensors.seed,
             "engine": plain(self.engine),
             "scenario": scenario_document(self.scenario),
+            "shown": dict(self.scenario.device.shown),
         }
 
     __getitem__ = at_hand.channel_values

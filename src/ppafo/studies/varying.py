@@ -18,7 +18,7 @@ from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.overrides import split_override
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
-from ppafo.simulation.declaration import WRITTEN_UNITS
+from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.loading import set_name
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.overrides import is_of_device
@@ -38,7 +38,8 @@ from ppafo.studies.distributions import (
 )
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Axis, Drawn
-from ppafo.units import from_si, parse_quantity, split_quantity
+from ppafo.units import from_si, parse_quantity, split_pressure_kind, split_quantity
+from ppafo.units.shown import shown_unit
 
 WHOLE = (NOISE, "wearer.person")
 """Paths of numbers that name one of many: a random seed, and a person of the population."""
@@ -84,8 +85,8 @@ class VariedPath:
 
     def quote(self, value: float) -> str:
         """Return a value of the path as messages write it."""
-        unit = WRITTEN_UNITS.get(self.quantity.unit, self.quantity.unit) if self.quantity.unit != "Pa_a" else "Pa_a"
-        unit, zero = ("Pa_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
+        unit = written_unit(self.quantity.unit) if self.quantity.unit != "Pa_a" else shown_unit("Pa_a", "Pa_a")
+        unit, zero = (f"{split_pressure_kind(unit)[0]}_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
         said = "" if unit in declaration.PLAIN else unit
         return f"{from_si(value, unit, self.quantity.unit, zero):.6g} {said}".rstrip()
 

@@ -19,7 +19,7 @@ from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
-from ppafo.errors import DataError, StudyError, one_line
+from ppafo.errors import DataError, StudyError, UnitError, one_line
 from ppafo.metrics import METRICS
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.plan import plan_run
@@ -27,6 +27,7 @@ from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
+from ppafo.units import to_si
 from ppafo.version import __version__
 
 _DIGITS = 16
@@ -148,6 +149,7 @@ def manifest(study: Study) -> dict[str, Any]:
         "runs_of_configuration": study.runs_of_configuration,
         "chunks": chunk_count(study),
         "runs_of_chunk": chunk_size(study),
+        "shown": dict(study.configurations[0].scenario.device.shown),
         "varied": {path: {"unit": study.units[path]} for path in study.paths},
         "metrics": {
             name: {"unit": METRICS[name].unit, "summary": METRICS[name].summary} for name in study.outputs.metrics
@@ -244,6 +246,7 @@ class _Stored(_Part):
     chunks: Annotated[int, Field(ge=1)]
     varied: dict[str, _StoredUnit]
     metrics: dict[str, _StoredUnit]
+    shown: dict[str, str] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -254,6 +257,11 @@ class _Stored(_Part):
         lost = [item.path for item in self.study.vary if item.path not in self.varied]
         if lost:
             raise ValueError(f"'{one_line(lost[0])}' varies and has no unit")
+        for si_unit, unit in self.shown.items():
+            try:
+                to_si(1.0, unit, si_unit)
+            except UnitError as error:
+                raise ValueError(f"shown: {one_line(error)}") from error
         return self
 
 

@@ -319,7 +319,8 @@ def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tu
         if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
         room = device.supply.atmospheric_pressure
-        shown = [f"{path} = {from_si(value, 'psi_g', 'Pa_a', room):.4g} psi_g" for path, value in used.items()]
+        unit = device.shown.get("Pa_a", "psi_g")
+        shown = [f"{path} = {from_si(value, unit, 'Pa_a', room):.4g} {unit}" for path, value in used.items()]
         verb = "was" if len(shown) == 1 else "were"
         remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:

@@ -13,6 +13,7 @@ from ppafo.parameters.device import Device
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.units import from_si
 from ppafo.validation.agreement import ReplaySettings, replay_of
 from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
 from ppafo.validation.replay import Motion, replayed_scenario
@@ -174,8 +175,9 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
     supply = device.supply
     room = supply.atmospheric_pressure
     gauge = max(supply.pressure, supply.dorsiflexion_pressure) - room
+    bare, per_unit = _unit_of_pressure(device)
     sensors = [
-        (words, group, verb, room, gauge, "kPa", 1.0e-3, USUAL_PRESSURE, USUAL_GAIN)
+        (words, group, verb, room, gauge, bare, per_unit, USUAL_PRESSURE, USUAL_GAIN)
         for words, group, verb in _groups(names)
     ]
     if ANGLE in names:
@@ -244,8 +246,15 @@ def numbers(measured: Measured, device: Device, settings: ReplaySettings) -> Ite
         numbers = {_ATMOSPHERE: room + higher, **{path: own + higher for path, own in pressures.items()}}
         return Change(dict.fromkeys((PRESSURE_1, PRESSURE_2, *_OF_SUPPLY.values()), Sensor(zero=-higher)), numbers)
 
-    words = "the atmosphere under gauge pressures seems to be {:.4g} kPa"
-    yield Candidate("atmosphere", words, in_room, _ROOMS, is_ratio=True, shown=1.0e-3 * room)
+    unit, per_unit = _unit_of_pressure(device)
+    words = f"the atmosphere under gauge pressures seems to be {{:.4g}} {unit}"
+    yield Candidate("atmosphere", words, in_room, _ROOMS, is_ratio=True, shown=per_unit * room)
+
+
+def _unit_of_pressure(device: Device) -> tuple[str, float]:
+    """The unit in which a difference of pressures is shown, and how many of it are 1 Pa."""
+    unit = device.shown.get("Pa_d", "kPa_d")
+    return unit.removesuffix("_d"), from_si(1.0, unit, "Pa_d")
 
 
 def _numbered(path: str, own: float, factor: float) -> Change:

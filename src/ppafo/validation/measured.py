@@ -248,7 +248,8 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
         level = max(float(recording[name][0]), float(np.median(recording[name])))
         if level > allowed * (1.0 + _ROUNDING):
             atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
-            shown = [f"{from_si(one, 'psi_g', 'Pa_a', atmosphere):.4g} psi_g" for one in (level, highest)]
+            unit = device.shown.get("Pa_a", "psi_g")
+            shown = [f"{from_si(one, unit, 'Pa_a', atmosphere):.4g} {unit}" for one in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
             remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
             top = float(recording[name].max()) - atmosphere

@@ -15,7 +15,7 @@ from ppafo.control.walking.fault_flags import FAULT_FLAGS, FaultFlag
 from ppafo.engine.lanes import Floats
 from ppafo.model import contact as ground
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED, SWING
-from ppafo.simulation.declaration import PLAIN, WRITTEN_UNITS
+from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si
 from ppafo.walking.motion import walk_of
@@ -213,7 +213,7 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
 
 def _text(value: float, si_unit: str, atmosphere: float) -> str:
     """Return a value in SI as people write it, with three digits; gauge counts from ``atmosphere`` [Pa absolute]."""
-    unit = WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit)
+    unit = written_unit(si_unit)
     value = value if abs(value) > _NOTHING else 0.0
     return f"{from_si(value, unit, si_unit, atmosphere):.3g} {unit}".rstrip()
 

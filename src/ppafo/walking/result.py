@@ -22,6 +22,7 @@ from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import opensim_recording, write_opensim
+from ppafo.units.shown import in_units
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
@@ -166,6 +167,11 @@ WALK_FORMAT = "ppafo walk"
 """What the results of walks say of themselves on the disk; analyses read them by it."""
 
 
+def _units_of(walked: "WalkResult | Scenario", *_: Any) -> Mapping[str, str]:
+    scenario = walked if isinstance(walked, Scenario) else walked.scenario
+    return scenario.device.shown
+
+
 @dataclass(frozen=True, slots=True, repr=False, eq=False)
 class WalkResult:
     """A finished walk: recording, numbers of each stride (strides,), curves over the stride, and numbers of the whole.
@@ -213,6 +219,7 @@ class WalkResult:
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *lines])
 
+    @in_units(_units_of)
     def __str__(self) -> str:
         """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
         from ppafo.report.display_units import metrics_lines
@@ -220,6 +227,7 @@ class WalkResult:
         head = f"{self.scenario.name}: {self.status.kind}"
         return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
 
+    @in_units(_units_of)
     def plot(self) -> "Figure":
         """Return a figure of the mean stride with the healthy gait beside it; ``.savefig(...)`` writes it."""
         from ppafo.report.notebook import shown
@@ -254,6 +262,7 @@ def result_of_walk(scenario: Scenario, run: Run, outcome: BatchResult, supply: S
     return _result(scenario, run, time, record, status, supply)
 
 
+@in_units(_units_of)
 def _result(
     scenario: Scenario,
     run: Run,

@@ -20,6 +20,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
+from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,6 +119,7 @@ _PARETO = (
 )
 
 
+@in_units(lambda found: found.tasks[0].cases[0].scenario.device.shown)
 def finding_of(found: Compared) -> Finding[Compared]:
     """Return a comparison in words, tables and panels."""
     names = found.configurations

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from ppafo.arguments import Count, Overrides, Threads, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from ppafo.analyses.find.answer import Threshold
@@ -59,4 +60,5 @@ def find(
     from ppafo.studies.study import with_overrides
 
     base = with_overrides(scenario_or_load(scenario), overrides)
-    return finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))
+    with shown_in(base.device.shown):
+        return finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))

@@ -20,6 +20,7 @@ from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet
+from ppafo.report.display_units import gauge_shift
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -27,6 +28,7 @@ from ppafo.report.residuals import Course, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
+from ppafo.units.shown import in_units
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +116,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
             model=model[name],
             names=(_KIND_WORDS[measurement.kind], "model"),
             colour=look.colour,
-            # A pressure is shown as gauge of the standard atmosphere.
-            above=0.0 if is_angle else atmosphere - STANDARD_ATMOSPHERE,
+            above=0.0 if is_angle else gauge_shift(atmosphere),
         )
         panels += course_panels(course, "circles", "" if panels else "above")
     return panels
@@ -126,6 +127,7 @@ _FAR, _SHOWN = 2.0, 0.05
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 
 
+@in_units(lambda identification: identification.before.shown)
 def finding_of(identification: Identification) -> Finding[Identification]:
     """Return what was identified in words and tables; passed where recordings agree and the set makes a device."""
     name, new_set, before = identification.name, identification.new_set, identification.before

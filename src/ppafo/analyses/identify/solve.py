@@ -32,6 +32,7 @@ from ppafo.parameters.parameter_set import (
 from ppafo.progress import Report, report_nothing
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording
+from ppafo.units.shown import shown_in
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
@@ -40,6 +41,11 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     Raises the errors of ``identify``.
     """
     before = _base_set(problem, folder)
+    with shown_in(before.shown):
+        return _solved(problem, before, folder, file, progress)
+
+
+def _solved(problem: ProblemFile, before: ParameterSet, folder: Path, file: str, progress: Report) -> Identification:
     valve = chosen_valve(before, problem.device.valve)
     current, results = before, list[BenchResult]()
     tasks = [

@@ -20,6 +20,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial, PrescribedMotion, Scenario
+from ppafo.units.shown import in_units
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -321,6 +322,7 @@ _SEVERAL = 1.0e-6
 """Imaginary part of a pole, over its size, below which it is real."""
 
 
+@in_units(lambda model: model.scenario.device.shown)
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model in words, tables and panels."""
     responds = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))

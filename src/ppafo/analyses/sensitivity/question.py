@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ppafo.arguments import Confidence, MaximumFailed, Metrics, Name, Overrides, Seed, Threads, Whole, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from ppafo.analyses.sensitivity.solve import Influences
@@ -78,4 +79,5 @@ def sensitivity(
     settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = Tally(count * by.block_rows(len(used.drawn)), progress)
     runs = Runs(base.scenario, requested, tally, used.gauge, threads)
-    return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))
+    with shown_in(base.scenario.device.shown):
+        return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))

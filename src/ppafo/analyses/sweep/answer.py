@@ -22,6 +22,7 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import place_at, read_document
 from ppafo.studies.sampling import NOISE
 from ppafo.study.manifest import MANIFEST, read_manifest
+from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,6 +45,7 @@ _CAPTION = (
 )
 
 
+@in_units(lambda results: results.document.get("shown", {}))
 def finding_of(results: StudyResults) -> Finding[StudyResults]:
     """Return the results in words, tables and panels; they have passed where any run completed."""
     document, summary = results.document, results.summary

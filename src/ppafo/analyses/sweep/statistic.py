@@ -57,6 +57,7 @@ from ppafo.studies.draws import (
 from ppafo.studies.study import Study
 from ppafo.study.runs import Runs, Tally
 from ppafo.units import number_text, parse_quantity
+from ppafo.units.shown import shown_in
 
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
 _QUANTILE = re.compile(r"quantile\s+([0-9]*\.?[0-9]+)")
@@ -366,7 +367,9 @@ def estimate(
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     runs = Runs(base.scenario, wanted, Tally(rule.first, progress), uncertainty.gauge, threads)
-    return draw_until(runs, uncertainty, metric, what, rule, chosen.sample.seed if seed is None else seed, wanted[1:])
+    with shown_in(base.scenario.device.shown):
+        first = chosen.sample.seed if seed is None else seed
+        return draw_until(runs, uncertainty, metric, what, rule, first, wanted[1:])
 
 
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:

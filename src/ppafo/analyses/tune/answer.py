@@ -23,6 +23,7 @@ from ppafo.simulation.simulate import Result
 from ppafo.studies.distributions import fraction_text
 from ppafo.studies.draws import Limit
 from ppafo.units import percentage
+from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -145,6 +146,7 @@ _DIFFERENT = 0.1
 _COURSE = "Left: the best objective so far in each start. Right: where the gains lie between their bounds."
 
 
+@in_units(lambda problem, *_: problem.scenario.device.shown)
 def finding_of(
     problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
 ) -> Finding[Tuned]:

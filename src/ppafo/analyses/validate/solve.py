@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.parameters.device import Device
-from ppafo.report.display_units import display_value, quantity_of_unit
+from ppafo.report.display_units import display_value, gauge_shift, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -19,6 +18,7 @@ from ppafo.report.residuals import Course, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.foreign import ColumnMap, load_column_map
+from ppafo.units.shown import in_units
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import (
     RecordingAgreement,
@@ -126,19 +126,18 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     course = Course(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
-        change=Kind("Residual (measured - model)", "", shown.quantity),
+        change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
         times=scale * measured.time,
         samples=given,
         # The measurement is late by the delay, so the model is read that much earlier.
         model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
         names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
         colour=_LOOKS.get(name, ACTUAL).colour,
-        above=atmosphere - STANDARD_ATMOSPHERE if is_chamber else 0.0,
+        above=gauge_shift(atmosphere) if is_chamber else 0.0,
     )
     # Where the residual is far from the limit of its RMS value, that would only press it flat.
     is_near = float(np.abs(course.model - given).max()) >= _NEAR_LIMIT * limit
-    title = f"{shown.title}: RMS {100 * channel.fraction:.2g} %"
-    return course_panels(course, "dots", "figure" if is_first else "", title, (-limit, limit) if is_near else ())
+    return course_panels(course, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
 
 
 _MILLISECONDS = 1.0e3
@@ -146,6 +145,7 @@ _HEAD = ("channel", "RMS error", "in noise", "variation", "of range", "limit", "
 _UNUSUAL = re.compile(r"[^A-Za-z0-9_.-]+")
 
 
+@in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation in words, tables and panels; it has passed where every error is within its limit."""
     count = len(validation.recordings)
@@ -248,8 +248,9 @@ def in_words(one: Cause) -> str:
         return one.in_words
     ((value, unit),) = one.numbers.values()
     # An atmosphere in gauge pressure says nothing.
-    absolute, quantity = unit == "Pa_a", quantity_of_unit(unit)
-    shown = f"{1e-3 * value:.4g} kPa" if absolute else Kind("", "" if unit == "-" else unit, quantity).text(value)
+    absolute = unit == "Pa_a"
+    quantity = "pressure change" if absolute else quantity_of_unit(unit)
+    shown = Kind("", "" if unit == "-" else unit, quantity).text(value)
     return f"{one.in_words} ({shown})"
 
 

@@ -41,6 +41,7 @@ from ppafo.simulation.oscillation import gains_of
 from ppafo.simulation.scenario import UNITS
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.units.shown import in_units
 from ppafo.walking import task_sequence as task_sequences
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
@@ -106,6 +107,7 @@ class Wearers:
         }
 
 
+@in_units(lambda population: population.scenario.device.shown)
 def wearers_finding(population: Population) -> Finding[Wearers]:
     """Return what many wearers get; no figure where every walk diverged."""
     configuration = population.scenario
@@ -236,6 +238,7 @@ _LIMITS = (
 )
 
 
+@in_units(lambda comparison: comparison.with_device.scenario.device.shown)
 def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device

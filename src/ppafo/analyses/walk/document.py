@@ -30,6 +30,7 @@ def walk_data(name: str, version: int, comparison: Comparison) -> dict[str, Any]
         "events": [event.to_dict() for event in worn.events],
         "versions": versions(),
         "configuration": walk_document(worn.scenario),
+        "shown": dict(worn.scenario.device.shown),
     }
 
 

@@ -4,7 +4,7 @@ import math
 from functools import partial
 
 from ppafo.control.walking.assistance import PEAKS
-from ppafo.report.display_units import display_value
+from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Part
 from ppafo.report.kind import Kind
 from ppafo.walking.events import event_lines
@@ -47,9 +47,11 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
         if largest > _FAR_ABOVE * given:
-            reached, fed = (display_value(value, "pressure", supply.atmospheric_pressure) for value in (largest, given))
+            reached, fed = (
+                quantity_text(value, "pressure", ".3g", supply.atmospheric_pressure) for value in (largest, given)
+            )
             remarks.append(
-                f"the pressure in {words} reaches {reached:.0f} psi_g, and its supply is set to {fed:.0f} psi_g: "
+                f"the pressure in {words} reaches {reached}, and its supply is set to {fed}: "
                 "actuator, valves and tubing must withstand that"
             )
     if not worn.events:

@@ -30,6 +30,7 @@ from ppafo.identification.source import (
     pool,
 )
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
+from ppafo.identification.wording import in_shown_unit
 from ppafo.report.kind import Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
@@ -112,9 +113,15 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         Reported(names.zero_path, names.unit, f"Zero of the {load} sensor", float(np.ptp(torque))),
     )
     values = found.by_name
+    (friction, shown), (scatter, _) = (
+        in_shown_unit(number, names.unit) for number in (values[names.friction_path], float(np.std(left)))
+    )
     ends = np.array([pressure.min(), pressure.max()])
     branches = {"rising": branch > 0.0, "falling": branch < 0.0}
-    marks = [readings_mark(f"pressure {role}", pressure[on], torque[on], role) for role, on in branches.items()]
+    # Of an actuator that slides at constant pressure the branches are its two ways.
+    ways = {"rising": "moving with the pressure", "falling": "moving against the pressure"}
+    labels = ways if names.is_in_motion else {role: f"pressure {role}" for role in branches}
+    marks = [readings_mark(labels[role], pressure[on], torque[on], role) for role, on in branches.items()]
     marks.append(curve_mark("nominal", ends, values[names.slope_path] * ends + values[names.zero_path]))
     axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(load.capitalize(), names.unit, load)
     return result_of(
@@ -123,8 +130,8 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         found,
         reported,
         f"{pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
-        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {values[names.friction_path]:.3g} "
-        f"{names.unit}; scatter {np.std(left):.3g} {names.unit}",
+        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {friction:.3g} {shown}; "
+        f"scatter {scatter:.3g} {shown}",
         with_residuals(f"Static {load}", *axes, marks, pressure, left),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
@@ -174,6 +181,7 @@ class Names:
     friction_path: str
     growth_path: str
     zero_path: str = "static_torque.zero_offset"
+    is_in_motion: bool = False
 
 
 def names_of(load: str, slides: bool) -> Names:
@@ -181,9 +189,21 @@ def names_of(load: str, slides: bool) -> Names:
     word, key = ("friction in motion", "dynamic") if slides else ("static friction", "static")
     if load == _FORCE:
         growth = "static_torque.friction_per_pressure"
-        return Names(load, "N", "area", "static_torque.area", "m^2", word, f"static_torque.{key}_friction", growth)
+        return Names(
+            load,
+            "N",
+            "area",
+            "static_torque.area",
+            "m^2",
+            word,
+            f"static_torque.{key}_friction",
+            growth,
+            is_in_motion=slides,
+        )
     growth, slope = f"effects.seal_friction.{key}_per_pressure", "actuator.torque_constant"
-    return Names(load, "N m", "torque constant", slope, "m^3", word, f"friction.{key}_torque", growth)
+    return Names(
+        load, "N m", "torque constant", slope, "m^3", word, f"friction.{key}_torque", growth, is_in_motion=slides
+    )
 
 
 @dataclass(frozen=True, slots=True)

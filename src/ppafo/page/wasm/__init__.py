@@ -103,7 +103,7 @@ from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.compiling import asked, complaint
-from ppafo.units import to_si
+from ppafo.units import split_pressure_kind, to_si
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -215,8 +215,9 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
         return {"unit": unit, "factor": 1.0, "zero": 0.0}
     shown = display_unit(quantity)
     if quantity.startswith("pressure"):
-        bare = shown.removesuffix("_g")
-        factor, is_change = to_si(1.0, f"{bare}_d", "Pa_d"), quantity == "pressure change"
+        is_change = quantity == "pressure change"
+        bare, kind = (shown, "") if is_change else split_pressure_kind(shown)
+        factor, is_absolute = to_si(1.0, f"{bare}_d", "Pa_d"), is_absolute or kind == "a"
         return {
             "unit": bare if is_change else f"{bare}_a" if is_absolute else f"{bare}_g",
             "factor": factor,

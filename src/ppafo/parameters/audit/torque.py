@@ -8,7 +8,7 @@ from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters.audit.evidence import Evidence, Finding, Interval, Severity, Side
 from ppafo.parameters.device import Gas
-from ppafo.units import to_si
+from ppafo.units import from_si, to_si
 
 # Do damping and dynamic friction agree with the inertia and the reported ratios they were computed from?
 
@@ -130,8 +130,9 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
         return
     ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
-    # Torque constants are quoted per psi in the field.
-    per_psi = constant * to_si(1.0, "psi", "Pa")
+    # Torque constants are quoted per psi in the field, or per bar where the set has bar.
+    unit = evidence.parameter_set.shown.get("Pa_d", "psi_d")
+    per_unit = constant * to_si(1.0, unit, "Pa_d")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
     held = (f"{ceilings[path]:#.3g} N m at {pressures[path]} ({path})" for path in supplies)
     yield Finding(
@@ -141,22 +142,23 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
         values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
         sides=tuple(Side(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
         paragraph=(
-            f"The torque constant is {per_psi:#.3g} N m/psi. With one chamber at supply and the other at atmosphere "
-            f"the vane gives {', '.join(held)}, before friction.{verdict}"
+            f"The torque constant is {per_unit:#.3g} N m/{unit.removesuffix('_d')}. With one chamber at supply "
+            f"and the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
         ),
     )
 
 
 def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:
     static, demand = evidence.number(_STATIC), evidence.number(_DEMAND)
+    unit = evidence.parameter_set.shown.get("Pa_d", "kPa_d")
     if static is not None and static >= ceiling:
-        needed = static / constant / 1e3
-        return "error", f" Static friction of {static:.3g} N m is more: the vane cannot move below {needed:.4g} kPa_d."
+        needed = f"{from_si(static / constant, unit, 'Pa_d'):.4g} {unit}"
+        return "error", f" Static friction of {static:.3g} N m is more: the vane cannot move below {needed}."
     if demand is not None and demand > ceiling:
-        needed = demand / constant / 1e3
+        needed = f"{from_si(demand / constant, unit, 'Pa_d'):.4g} {unit.removesuffix('_d')}_g"
         return "warning", (
             f" The requested {demand:.3g} N m lie above it, so that every valve and controller keeps an error of "
-            f"{demand - ceiling:.3g} N m; it would take {needed:.4g} kPa_g of supply, or a smaller request."
+            f"{demand - ceiling:.3g} N m; it would take {needed} of supply, or a smaller request."
         )
     return "note", " A reference above that cannot be followed by any valve or controller."
 

@@ -1,6 +1,7 @@
 """The mean stride of walks beside the healthy gait: ankle, torques, pressures and toes, mean with band."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -64,7 +65,8 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
     healthy = {ANGLE: (ankle, gait.ankle_angle.deviation), TOES: (healthy_toe_height(first.scenario), 0.0)}
     panels: list[Panel] = []
     for kind, channels in _CHANNELS.items():
-        marks = [Mark("span", (0.0, gait.stance_share), colour=STANCE, style={"alpha": 1.0, "zorder": 0})]
+        filled = {"alpha": 1.0, "zorder": 0}
+        marks = [Mark("span", (0.0, gait.stance_share), label="stance", colour=STANCE, style=filled)]
         if kind is not PRESSURE:
             marks.append(Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8}))
         for (name, result), colour in zip(walks.items(), (WITH, WITHOUT), strict=False):
@@ -83,25 +85,24 @@ def walk_figure(walks: Mapping[str, Strides]) -> "Figure":
             mean, deviation = healthy[kind]
             look = {"linewidth": 1.2, "linestyle": (0, (1, 1.2))}
             marks.append(Mark("line", PHASES, mean, label="healthy gait", colour=HEALTHY, style=look))
-            marks.append(_band(mean, deviation, GREY, 0.15))
+            marks.append(replace(_band(mean, deviation, GREY, 0.15), label="band: standard deviation"))
         panels.append(Panel(STRIDE, kind, marks, legend="", then=_whole_stride, shares_x=True))
     figure = draw_panels(
         panels,
         size=(7.1, 1.7),
-        title=(
-            f"{first.scenario.name}: {gait.name}, {first.metrics['strides'].value:.0f} strides; "
-            "band: standard deviation; grey: stance"
-        ),
+        title=f"{first.scenario.name}: {gait.name}, {first.metrics['strides'].value:.0f} strides",
         kind=first.recording.kind,
     )
     # Between title and panels: a name with its number of strides is too long to stand beside the title of a panel.
-    names, place = figure.axes[0].get_legend_handles_labels(), (0.008, 1.0 - 0.32 / figure.get_figheight())
+    names, below = figure.axes[0].get_legend_handles_labels(), 0.29 + 0.17 * figure.get_suptitle().count("\n")
+    place = (0.008, 1.0 - below / figure.get_figheight())
     figure.legend(
         *names,
         loc="upper left",
         bbox_to_anchor=place,
         ncols=3,
         borderaxespad=0.0,
+        labelspacing=0.2,
         handlelength=1.8,
         frameon=False,
         fontsize=9,

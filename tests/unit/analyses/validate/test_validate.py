@@ -136,7 +136,9 @@ def test_the_verb_of_python_takes_what_the_command_takes(
         thresholds=["5%"],
     )
     assert json.loads(json.dumps(validation.to_dict())) == printed
-    assert validation.plot().axes[0].get_title(loc="left").startswith("Pressure in chamber 1: RMS")
+    titles = [axes.get_title(loc="left") for axes in validation.plot().axes]
+    assert titles[0] == "Pressure in chamber 1 (psig)"
+    assert any(title.startswith("Measured - model, RMS ") for title in titles)
     validation.save(tmp_path / "saved")
     assert json.loads((tmp_path / "saved" / "validate.json").read_text()) == printed
 

@@ -109,7 +109,7 @@ def test_chamber_1_is_checked_at_the_lower_end() -> None:
 def test_a_demand_above_the_ceiling_is_a_warning_with_the_pressure_that_is_needed() -> None:
     finding = findings("reported.demanded_torque=6 N m")["torque-ceiling"]
     assert finding.severity == "warning"
-    assert "413.5 kPa_g" in finding.paragraph
+    assert "59.97 psi_g" in finding.paragraph
 
 
 def test_a_demand_below_the_ceiling_is_a_note() -> None:

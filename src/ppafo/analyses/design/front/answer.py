@@ -24,6 +24,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREY
 from ppafo.signals.recording import Floats
 from ppafo.simulation.simulate import Result
+from ppafo.units.shown import in_units
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -221,6 +222,7 @@ _MEANS = (
 )
 
 
+@in_units(lambda design: next(iter(design.problem.tasks[0].scenarios.values())).device.shown)
 def finding_of(design: Design) -> Finding[Design]:
     """Return a design study in words, tables and panels."""
     problem, points = design.problem, [design.front[place] for place in design.shown]

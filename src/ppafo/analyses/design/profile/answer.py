@@ -21,6 +21,7 @@ from ppafo.report.style import BLACK, GREY, REFERENCE
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.units.shown import in_units
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -270,6 +271,7 @@ _READING = (
 )
 
 
+@in_units(lambda sizing: sizing.problem.scenario.device.shown)
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study in words, tables and panels; it has not passed where nothing can be suggested."""
     problem, profile, recording = sizing.problem, sizing.problem.profile, sizing.recording

@@ -1,0 +1,106 @@
+"""What is said and drawn is in the units in which the author of a parameter set wrote it."""
+
+import re
+from importlib import resources
+from pathlib import Path
+
+import pytest
+
+import ppafo
+from ppafo.analyses.stored_figures import draw_folder, names_in
+from ppafo.parameters.parameter_set import written_units
+
+PSI = 6894.757293168361
+TASK, SHORT = "torque-task-proportional", "run.duration=0.4 s"
+BAR = {"Pa_a": "bar_g", "Pa_d": "bar_d", "N m": "N cm", "rad": "deg", "rad/s": "deg/s"}
+
+
+@pytest.fixture
+def in_bar(tmp_path: Path) -> str:
+    """The paper's set as somebody would write it who has bar gauges and a small torque sensor."""
+    text = resources.files("ppafo.parameters.sets").joinpath("ppafo2011.toml").read_text(encoding="utf-8")
+
+    def number(factor: float, unit: str) -> object:
+        return lambda found: f'value = {float(found[1]) * factor:.12g}\nunit = "{unit}"'
+
+    text = re.sub(r'value = ([\d.]+)\nunit = "psi_g"', number(PSI / 1e5, "barg"), text)  # type: ignore[call-overload]
+    text = re.sub(r'value = ([\d.]+)\nunit = "N m"', number(100.0, "N cm"), text)  # type: ignore[call-overload]
+    # A citation of the paper has to have the paper's numbers.
+    text = re.sub(r'key = ".*"\n|parent = ".*"\n', "", text)
+    file = tmp_path / "bar.toml"
+    file.write_text(text.replace('"ppafo2011"', '"bar"', 1), encoding="utf-8")
+    return str(file)
+
+
+def test_the_units_of_a_set_are_those_in_which_it_is_written(in_bar: str) -> None:
+    assert ppafo.load_parameter_set(in_bar).shown.items() >= BAR.items()
+    paper = ppafo.load_parameter_set("ppafo2011").shown
+    assert (paper["Pa_a"], paper["N m"], paper["rad"]) == ("psi_g", "N m", "deg")
+    assert written_units({}) == {}
+
+
+def test_an_override_in_another_unit_does_not_change_what_is_shown(in_bar: str) -> None:
+    changed = ppafo.load_device(in_bar, overrides=["supply.pressure=70 psi_g"])
+    assert changed.shown["Pa_a"] == "bar_g"
+    # A number in SI neither.
+    assert ppafo.load_device(in_bar, overrides={"supply.pressure": 4.0e5}).shown["Pa_a"] == "bar_g"
+
+
+def test_a_run_is_said_and_drawn_in_the_units_of_its_set(in_bar: str, tmp_path: Path) -> None:
+    result = ppafo.simulate(TASK, overrides=[f"device.set={in_bar}", SHORT])
+    text = str(result)
+    assert "psi" not in text
+    assert "N m" not in text
+    assert re.search(r"largest_pressure +\d\.\d+ bar_g", text)
+    assert "psi" not in result.error().sentence
+    assert " bar " in result.error().sentence
+    assert " bar_g" in result._repr_html_()
+    titles = [axes.get_title(loc="left") for axes in result.plot().axes]
+    assert "Pressure (bar gauge)" in titles
+    assert "Actuator torque (N cm)" in titles
+    # The numbers themselves stay in SI.
+    assert result.metrics["largest_pressure"].unit == "Pa"
+    result.save(tmp_path / "run")
+    stored = draw_folder(tmp_path / "run", names_in(tmp_path / "run"))["figure"]
+    assert [axes.get_title(loc="left") for axes in stored.axes] == titles
+
+
+def test_every_table_of_an_analysis_is_in_the_units_of_the_set(in_bar: str, tmp_path: Path) -> None:
+    changes = [f"device.set={in_bar}", SHORT]
+    compared = ppafo.compare([TASK, "torque-task-solenoid"], overrides=changes)
+    assert "RMS error (N cm)" in str(compared)
+    found = ppafo.find(TASK, vary="supply.pressure=40..60 psi_g", such_that="peak_torque >= 1 N m", overrides=changes)
+    assert re.search(r"supply.pressure = [\d.]+ bar_g is the lowest value", found.said[0])
+    linear = str(ppafo.linearise(TASK, overrides=[*changes, "reference.level=3 N m"]))
+    assert re.search(r"supply_pressure +Pa +3.447\d* bar_g", linear)
+    assert re.search(r"torque +N m +[\d.]+ N cm", linear)
+    recorded = ppafo.simulate("step-response", overrides=[f"device.set={in_bar}"]).save(tmp_path / "bench")
+    validated = ppafo.validate(in_bar, [recorded], motion="leg", overrides=["supply.pressure=3.8 bar_g"])
+    for said in (str(compared), str(found), linear, str(validated)):
+        assert "psi" not in said
+    assert re.search(r"supply.pressure = [\d.]+ bar_g was used", str(validated))
+    # Drawn later, out of the call, and from a file.
+    axes = linear_axes(validated)
+    assert any("(bar" in label for label in axes)
+
+
+def linear_axes(finding: object) -> list[str]:
+    """Return what the axes of a finding's first figure say."""
+    figure = finding.plot()  # type: ignore[attr-defined]
+    return [text for axes in figure.axes for text in (axes.get_ylabel(), axes.get_title(loc="left"))]
+
+
+def test_results_of_a_study_are_in_the_units_of_its_set_when_they_are_read_again(in_bar: str, tmp_path: Path) -> None:
+    ppafo.sweep("torque-task-uncertainty", draws=4, out=tmp_path / "study", overrides=[f"device.set={in_bar}", SHORT])
+    again = str(ppafo.load_study_results(tmp_path / "study"))
+    assert re.search(r"rms_error +N cm", again)
+    manifest = tmp_path / "study" / "study.json"
+    manifest.write_text(manifest.read_text().replace('"bar_g"', '"furlong"'))
+    with pytest.raises(ppafo.DataError, match="furlong"):
+        ppafo.load_study_results(tmp_path / "study")
+
+
+def test_the_audit_has_the_pressures_of_the_set(in_bar: str) -> None:
+    text = str(ppafo.audit(in_bar))
+    assert "N m/bar" in text
+    assert "psi" not in text
