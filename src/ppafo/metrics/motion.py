@@ -15,6 +15,8 @@ TRAVEL_FRACTION = 0.01
 
 # Travel [rad] below which nothing has moved: fractions of it would be rounding over rounding.
 _STANDSTILL = 1.0e-6
+_RETURNED = 0.1
+"""Fraction of the range of the angle: a move that ends nearer to where it began has come back, and is none."""
 
 
 def angle_range(recording: Recording) -> float:
@@ -28,9 +30,12 @@ def largest_speed(recording: Recording) -> float:
 
 
 def time_of_fraction(recording: Recording, fraction: float) -> float | None:
-    """Time [s] at which a fraction of the way from the first to the last angle is first done; None without a move."""
+    """Time [s] at which a fraction of the way from the first to the last angle is first done; None without a move.
+
+    One that ends about where it began is no move.
+    """
     travelled = recording["angle"] - recording["angle"][0]
-    if abs(travelled[-1]) < _STANDSTILL:
+    if abs(travelled[-1]) < max(_STANDSTILL, _RETURNED * float(np.ptp(travelled))):
         return None
     # By a line between two samples; at the first one nothing is done, so that there is one before.
     done = travelled / travelled[-1]
@@ -66,7 +71,7 @@ EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_m
 def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
     """As ``time_of_fraction`` [s], of traces (samples, runs): the first angle is judged by the last."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
-    moves = np.abs(travelled[-1]) >= _STANDSTILL
+    moves = np.abs(travelled[-1]) >= np.maximum(_STANDSTILL, _RETURNED * np.ptp(travelled, axis=0))
     done = travelled / np.where(moves, travelled[-1], np.nan)
     # The first True of each run; where nothing moves all are nan, and so is the time.
     after = np.argmax(done >= fraction, axis=0)

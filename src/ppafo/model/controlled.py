@@ -6,6 +6,7 @@ table in their place. To add one: a function and a line of ``CONTROLLED``.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -65,6 +66,37 @@ def value_in(sample: Sample) -> float:
     return controlled(sample.angle, sample.pressure_1, sample.pressure_2, sample.torque)
 
 
+class Ends(NamedTuple):
+    """Stops [rad] of an actuator, absolute pressures [Pa] of both supplies and the atmosphere; arrays (runs,) too."""
+
+    angle_min: Any
+    angle_max: Any
+    supply_pressure: Any
+    dorsiflexion_pressure: Any
+    atmospheric_pressure: Any
+
+
+def stops(ends: Ends) -> tuple[Any, Any]:
+    """Between which angles [rad] a joint turns."""
+    return ends.angle_min, ends.angle_max
+
+
+def reach_of_pressure_1(ends: Ends) -> tuple[Any, Any]:
+    """Between which pressures [Pa] a valve brings chamber 1: it is fed, or vented."""
+    return ends.atmospheric_pressure, ends.supply_pressure
+
+
+def reach_of_pressure_2(ends: Ends) -> tuple[Any, Any]:
+    """Between which pressures [Pa] a valve brings chamber 2."""
+    return ends.atmospheric_pressure, ends.dorsiflexion_pressure
+
+
+def reach_of_difference(ends: Ends) -> tuple[Any, Any]:
+    """Between which differences of pressure [Pa] a valve brings both: one is full while the other one is vented."""
+    room = ends.atmospheric_pressure
+    return room - ends.dorsiflexion_pressure, ends.supply_pressure - room
+
+
 @dataclass(frozen=True, slots=True)
 class Controlled:
     """Something that a reference can be a value of.
@@ -72,7 +104,8 @@ class Controlled:
     ``words`` name it in a sentence, ``level`` declares a value of it, ``difference`` is the unit of a difference of two
     values. ``value(angle, pressure_1, pressure_2, torque)`` gives it of what sensors show. ``size`` is about as much of
     it as 1 N m is of a torque: the ranges of gains are scaled by it. A command above 0 raises it, or lowers it where
-    ``sign`` is -1.
+    ``sign`` is -1. ``reach`` says between what it can be, called ``limits`` in a sentence; None of a torque, which
+    depends on what moves the joint.
     """
 
     name: str
@@ -82,6 +115,8 @@ class Controlled:
     value: Callable[[float, float, float, float], float]
     size: float = 1.0
     sign: float = 1.0
+    reach: Callable[[Ends], tuple[Any, Any]] | None = None
+    limits: str = "the range between atmosphere and supply"
 
     @property
     def channel(self) -> str:
@@ -130,9 +165,34 @@ CONTROLLED: dict[str, Controlled] = {
     item.name: item
     for item in (
         Controlled(TORQUE, "torque", Quantity("level", "N m", "", None, -1.0e4, 1.0e4), "N m", controlled),
-        Controlled(ANGLE, "angle", Quantity("level", "rad", "", None, -10.0, 10.0), "rad", controlled_angle),
-        Controlled("pressure_1", "chamber 1 pressure", _PRESSURE, "Pa_d", controlled_pressure_1, 1.0e5),
-        Controlled("pressure_2", "chamber 2 pressure", _PRESSURE, "Pa_d", controlled_pressure_2, 1.0e5, -1.0),
+        Controlled(
+            ANGLE,
+            "angle",
+            Quantity("level", "rad", "", None, -10.0, 10.0),
+            "rad",
+            controlled_angle,
+            reach=stops,
+            limits="the stops",
+        ),
+        Controlled(
+            "pressure_1",
+            "chamber 1 pressure",
+            _PRESSURE,
+            "Pa_d",
+            controlled_pressure_1,
+            1.0e5,
+            reach=reach_of_pressure_1,
+        ),
+        Controlled(
+            "pressure_2",
+            "chamber 2 pressure",
+            _PRESSURE,
+            "Pa_d",
+            controlled_pressure_2,
+            1.0e5,
+            -1.0,
+            reach=reach_of_pressure_2,
+        ),
         Controlled(
             "pressure_difference",
             "pressure difference",
@@ -140,6 +200,7 @@ CONTROLLED: dict[str, Controlled] = {
             "Pa_d",
             controlled_difference,
             1.0e5,
+            reach=reach_of_difference,
         ),
     )
 }

@@ -33,7 +33,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.motion_kind import MotionKind, MotionSection, ProfileTable
-from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile
+from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.schema import profile_table, shank_table
 
@@ -125,8 +125,7 @@ LOCKED_MOTION = MotionKind(
 
 def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
     profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
-    stops = device.actuator.angle_min, device.actuator.angle_max
-    problem = profile_problem(device.name, stops, profile, duration, step)
+    problem = profile_problem(stops_of(device), profile, duration, step)
     if problem:
         raise ScenarioError(f"{reading.file}: {problem}")
     return PrescribedMotion(profile)

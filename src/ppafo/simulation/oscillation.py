@@ -13,8 +13,8 @@ import numpy as np
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.command import asked_samples
-from ppafo.metrics.metric import followed, has_reference
-from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.metrics.metric import Floats, followed, has_reference
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import Term
 from ppafo.report.display_units import metric_change
@@ -54,9 +54,12 @@ _FIRST = (
     torque_loop.PROPORTIONAL_GAIN,
     torque_loop.BOUNDARY,
     torque_loop.CONVERGENCE,
+    angle_loop.INNER_GAIN,
     angle_loop.ANGLE_STIFFNESS,
 )
-"""What sets how fast a loop is."""
+"""What sets how fast a loop is; of a cascade the inner one first, on which the outer one relies."""
+_ON_STOP = 1.0e-6
+"""How near to a stop a joint lies on it [rad]."""
 _SLOPES = ("derivative_gain", "damping")
 _NEAR = 0.02
 """Fraction by which a gain may differ from another one that is called the same."""
@@ -187,6 +190,10 @@ def oscillation_of(
         return None
     asked = asked_samples(recording) if scenario.walks else np.ones(len(recording), dtype=np.bool_)
     reference, value = (series[asked] for series in followed(recording))
+    unlike = _unlike(scenario, law)
+    # With the device's gains a command that turns there comes from what presses the joint, and no gain would help.
+    if scenario.controlled == ANGLE and not unlike and _lies_on_stop(scenario, value):
+        return None
     origin = 0.0 if scenario.controlled == TORQUE else value[0]
     scale, per = (stride_time, "stride") if stride_time > 0.0 else (1.0, "second")
     return Oscillation(
@@ -194,22 +201,43 @@ def oscillation_of(
         per=per,
         error=float(np.sqrt(np.mean((reference - value) ** 2))),
         wanted=float(np.sqrt(np.mean((reference - origin) ** 2))),
-        remedy=_remedy(scenario, law),
+        remedy=_remedy(scenario, law, unlike),
         controlled=scenario.controlled,
     )
 
 
-def _remedy(scenario: Scenario, law: ControllerKind) -> str:
-    """Return which gain the device asks for, or what else to look at where it has that one."""
-    item = next((item for item in settings_of(scenario, law) if set(_FIRST).intersection(item.follows)), None)
-    if item is None:
+def _lies_on_stop(scenario: Scenario, angle: Floats) -> bool:
+    """Tell whether a joint lies on a stop for most of a run."""
+    actuator = scenario.device.actuator
+    away = np.minimum(np.abs(angle - actuator.angle_min), np.abs(angle - actuator.angle_max))
+    return bool(np.mean(away <= _ON_STOP) > 0.5)
+
+
+def _first(scenario: Scenario, law: ControllerKind) -> dict[str, Quantity]:
+    """Return the settings of a law that say how fast its loops are, by what they follow, the innermost first."""
+    items = {name: item for item in settings_of(scenario, law) for name in _FIRST if name in item.follows}
+    return {name: items[name] for name in _FIRST if name in items}
+
+
+def _unlike(scenario: Scenario, law: ControllerKind) -> list[tuple[Quantity, float]]:
+    """Return those of them that are not the device's, each with the number [SI] that would be."""
+    terms, settings = _terms(scenario, law), scenario.controller.settings
+    rights = {
+        name: (item, float(terms[name].number(lambda path: number_at(scenario, path))))
+        for name, item in _first(scenario, law).items()
+    }
+    return [(item, right) for item, right in rights.values() if abs(float(settings[item.name]) - right) > _NEAR * right]
+
+
+def _remedy(scenario: Scenario, law: ControllerKind, unlike: list[tuple[Quantity, float]]) -> str:
+    """Return which gain the device asks for, or what else to look at where it has all of them."""
+    items = _first(scenario, law)
+    if not items:
         return "give its law smaller gains, or a slower one"
-    name = next(name for name in _FIRST if name in item.follows)
-    term = _terms(scenario, law)[name]
-    right = float(term.number(lambda path: number_at(scenario, path)))
-    now = float(scenario.controller.settings[item.name])
-    if abs(now - right) <= _NEAR * right:
-        return f"{item.name} is this device's: look for what delays it (sensors, lines), or give half of it"
+    if not unlike:
+        first = next(iter(items.values()))
+        return f"{first.name} is this device's: look for what delays it (sensors, lines), or give half of it"
+    item, right = unlike[0]
     # The rules leave the slope of the error alone.
     slopes = [name for name in _SLOPES if scenario.controller.settings.get(name, 0.0) > 0.0]
     rest = "".join(f" and `{name} = 0`" for name in slopes)

@@ -1,6 +1,6 @@
 """Functions of time of a scenario: read from its file, as the engine takes them, and their values and bounds."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -8,15 +8,16 @@ from ppafo.control.catalog import PROFILES
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.catalog import VALVES
-from ppafo.model.columns import over_runs
-from ppafo.model.controlled import ANGLE
+from ppafo.model.columns import at, over_runs
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, Controlled, Ends
 from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
-"""How far beyond a stop an angle may be [rad]: rounding of a stop that is given in degrees."""
+"""How far beyond a stop an angle may be [rad]: rounding of a stop that is given in degrees; of more a share."""
 
 
 def profile_parameters(choice: ProfileChoice) -> Any:
@@ -47,17 +48,60 @@ def read_profile(reading: Reading, section: str, prescribed: Quantity) -> Profil
     return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
 
 
+class Limits(NamedTuple):
+    """Lowest and highest value that something can have, arrays (runs,) where they vary; what they are, unit, room [Pa].
+
+    ``room`` is the pressure of the atmosphere, from which a pressure is shown.
+    """
+
+    words: str
+    lowest: Any
+    highest: Any
+    unit: str
+    room: Any
+
+    @property
+    def margin(self) -> Any:
+        """How far beyond its limits a value may be: rounding of one that is given in another unit."""
+        return TOLERANCE * np.maximum(1.0, np.maximum(np.abs(self.lowest), np.abs(self.highest)))
+
+    def text(self, value: float) -> str:
+        """A value in the unit in which people write it."""
+        return quantity_text(value, self.unit, self.room)
+
+    def of_run(self, run: int) -> "Limits":
+        """The limits of one run."""
+        lowest, highest, room = (at(number, run) for number in (self.lowest, self.highest, self.room))
+        return self._replace(lowest=lowest, highest=highest, room=room)
+
+
+def stops_of(device: Device) -> Limits:
+    """The stops [rad] of a device."""
+    return limits_of(device, CONTROLLED[ANGLE])
+
+
+def limits_of(device: Device, followed: Controlled) -> Limits:
+    """Between what a device can bring what a reference is of; a torque has no limits here."""
+    actuator, supply = device.actuator, device.supply
+    ends = Ends(
+        angle_min=actuator.angle_min,
+        angle_max=actuator.angle_max,
+        supply_pressure=supply.pressure,
+        dorsiflexion_pressure=supply.dorsiflexion_pressure,
+        atmospheric_pressure=supply.atmospheric_pressure,
+    )
+    lowest, highest = (-np.inf, np.inf) if followed.reach is None else followed.reach(ends)
+    words, room = f"{followed.limits} of {device.name}", supply.atmospheric_pressure
+    return Limits(words=words, lowest=lowest, highest=highest, unit=followed.level.unit, room=room)
+
+
 def profile_problem(
-    device: str,
-    stops: tuple[float, float],
-    profile: ProfileChoice,
-    duration: float,
-    step: float,
-    section: str = "motion.profile",
+    limits: Limits, profile: ProfileChoice, duration: float, step: float, section: str = "motion.profile"
 ) -> str:
-    """Return where the profile of a section leaves the stops [rad] of a device, named by ``device``; "" if nowhere."""
+    """Return where the profile of a section leaves its limits; "" if nowhere."""
     kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
     # The times that the engine asks for, as far as they can be gone through one by one.
+    lowest, highest = limits.lowest - limits.margin, limits.highest + limits.margin
     count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
     for number in range(count + 1):
         time = duration * number / count
@@ -68,10 +112,10 @@ def profile_problem(
         if 0.0 < away < min(duration / count, duration - time):
             places.append((time + away, angle + 0.5 * rate * away))
         for moment, reached in places:
-            if not stops[0] - TOLERANCE <= reached <= stops[1] + TOLERANCE:
+            if not lowest <= reached <= highest:
                 return (
-                    f"[{section}] leaves the stops of {device}, {range_text(stops)}: it is at "
-                    f"{quantity_text(reached, 'rad')} at {moment:.6g} s"
+                    f"[{section}] leaves {limits.words}, {limits.text(limits.lowest)} to "
+                    f"{limits.text(limits.highest)}: it is at {limits.text(reached)} at {moment:.6g} s"
                 )
     return ""
 
@@ -83,19 +127,18 @@ def range_text(stops: tuple[float, float]) -> str:
 
 def reference_problem(scenario: Scenario) -> str:
     """Return why no controller could follow the reference of a scenario of a vane; an empty text where one might."""
-    if scenario.controlled != ANGLE:
+    if scenario.controlled == TORQUE:
         return ""
-    if vane_motion(scenario).profile is not None:
+    if scenario.controlled == ANGLE and vane_motion(scenario).profile is not None:
         return (
             f"reference.of = 'angle': motion.kind = '{scenario.motion.motion_kind.name}' moves the angle by itself; "
             "take motion.kind = 'free' or 'leg'"
         )
     valve = scenario.device.valve.kind
-    if VALVES[valve].vents_at_rest:
+    if scenario.controlled == ANGLE and VALVES[valve].vents_at_rest:
         return (
             f"reference.of = 'angle': a valve of kind '{valve}' vents both chambers at a command of 0 and holds no "
             "angle; take one that is closed there, such as device.valve = 'proportional'"
         )
-    actuator, run = scenario.device.actuator, scenario.run
-    stops = actuator.angle_min, actuator.angle_max
-    return profile_problem(scenario.device.name, stops, scenario.reference, run.duration, run.step, "reference")
+    limits, run = limits_of(scenario.device, CONTROLLED[scenario.controlled]), scenario.run
+    return profile_problem(limits, scenario.reference, run.duration, run.step, "reference")

@@ -12,7 +12,6 @@ from ppafo.engine.linking import python_place
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.model.plant import actuator_torque, chamber_pressures
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
@@ -127,7 +126,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
                 torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
         seen = measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
-        return measurement_of(actuator, plant, seen) if program.has_shape else seen
+        return measurement_of(actuator, plant, seen)
 
     return see
 
@@ -137,7 +136,7 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
 
     ScenarioError for sensors that are late and for gas that warms, of which the lanes know more than this.
     """
-    program, rows = batch.program, row_numbers(batch.program.state_rows())
+    program, actuator, rows = batch.program, batch.program.actuator, row_numbers(batch.program.state_rows())
     if program.late_readings or program.is_thermal:
         raise ScenarioError("a walk with a late sensor or with gas that warms has no controller in Python")
     plant, sensors, gait_sensors = (_group(batch, name) for name in ("plant", "sensors", "gait_sensors"))
@@ -150,19 +149,19 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
             float(state[rows[path]])
             for path in ("state.angle", "state.mass_1", "state.mass_2", "walk.heel_force", "walk.toe_force")
         )
-        pressures = chamber_pressures(plant, angle, mass_1, mass_2)
+        pressures = actuator.pressures(plant, angle, mass_1, mass_2)
         if program.ideal_sensors:
             return GaitMeasurement(
                 angle=angle,
                 pressure_1=pressures[0],
                 pressure_2=pressures[1],
-                torque=actuator_torque(*pressures, plant.torque_constant),
+                torque=actuator.torque(plant, angle, *pressures),
                 heel_force=heel,
                 toe_force=toe,
             )
         seen, last = measure_gait(
             sensors, gait_sensors, last, angle, *pressures, heel, toe, plant.torque_constant, sample * period, sample
         )
-        return seen
+        return measurement_of(actuator, plant, seen)
 
     return see

@@ -2,7 +2,8 @@
 
 A field of a structure is ``a.b``, one of an array of structures ``a(2).b``, a column of a matrix ``M(:,3)`` and a row
 ``M(3,:)``. A structure with ``data`` and ``colheaders``, as ``importdata`` makes it, has a column by each of its
-labels. Objects (timeseries, timetable, table, datetime) are for MATLAB alone, and are only named.
+labels. Objects (timeseries, timetable, table, datetime) are in a form that is not published: they are named, with the
+line of MATLAB that saves them as plain arrays.
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,21 +41,37 @@ _LABELS = ("colheaders", "labels", "names")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MatlabFile:
-    """Columns of numbers and of texts by name, every other text in the file, and variables that are objects."""
+    """Columns of numbers and of texts by name, every other text in the file, and the objects in it, name and class."""
 
     columns: Mapping[str, Floats]
     texts: Mapping[str, list[str]]
     words: tuple[str, ...] = ()
-    objects: tuple[str, ...] = ()
+    objects: tuple[tuple[str, str], ...] = ()
 
     def said_of_objects(self) -> str:
         """Return what to do with the objects of the file, as the end of a message; nothing where there are none."""
-        if not self.objects:
-            return ""
-        return (
-            f"; {', '.join(self.objects)} is an object that only MATLAB reads: save ts.Time and ts.Data of a "
-            'timeseries by themselves, or of a table s = table2struct(T, "ToScalar", true) with save -struct'
+        return "".join(
+            f"; {name}{f' ({kind})' if kind else ''} is an object that only MATLAB reads, {_plainly(name, kind)}"
+            for name, kind in self.objects
         )
+
+
+_OF_TABLE = "s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"
+_PLAIN = {
+    "timeseries": "t = {name}.Time; y = squeeze({name}.Data); save('plain.mat', 't', 'y')",
+    "table": f"T = {{name}}; {_OF_TABLE}",
+    "timetable": f"T = timetable2table({{name}}); T.(1) = seconds(T.(1) - T.(1)(1)); {_OF_TABLE}",
+    "datetime": "t = seconds({name} - {name}(1)); save('plain.mat', 't')",
+    "duration": "t = seconds({name}); save('plain.mat', 't')",
+}
+"""Line of MATLAB by the class of an object: it saves the numbers in it, and times in seconds, as plain arrays."""
+
+
+def _plainly(name: str, kind: str) -> str:
+    """Return how the numbers of an object are saved so that they can be read."""
+    if kind in _PLAIN:
+        return f"where it is saved as plain arrays by {_PLAIN[kind].format(name=name)}"
+    return "where its numbers are saved as arrays of their own, such as t = ts.Time; y = ts.Data; save plain.mat t y"
 
 
 @dataclass(slots=True)
@@ -62,7 +79,7 @@ class _Found:
     columns: dict[str, Floats] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
     words: list[str] = field(default_factory=list)
-    objects: list[str] = field(default_factory=list)
+    objects: list[tuple[str, str]] = field(default_factory=list)
 
 
 def read_matlab(path: str | Path) -> MatlabFile:
@@ -113,9 +130,19 @@ def _read_older(path: str | Path, found: _Found) -> None:
     for name, value in variables.items():
         # What MATLAB keeps for its objects has no name of its own.
         if name in ("__function_workspace__", "None"):
-            found.objects += [] if found.objects else ["a variable"]
+            named = _named_object(value)
+            found.objects += [named] if named[1] or not found.objects else []
         elif not name.startswith("__"):
             _add(name, _tree_of(value), 0, found)
+
+
+def _named_object(value: Any) -> tuple[str, str]:
+    """Return name and class of an object of SciPy, which says them in its first fields."""
+    names = getattr(getattr(value, "dtype", None), "names", None) or ()
+    if not {"s0", "s2"} <= set(names) or value.size != 1:
+        return "a variable", ""
+    said = [item.decode("ascii", "replace") if isinstance(item, bytes) else str(item) for item in value.ravel()[0]]
+    return one_line(said[0]), one_line(said[2])
 
 
 def _tree_of(value: Any) -> Tree:
@@ -207,7 +234,7 @@ def _add(name: str, tree: Tree, depth: int, found: _Found) -> None:
         found.texts[name] = [tree]
         found.words.append(tree)
     elif isinstance(tree, _Object):
-        found.objects.append(f"{name} ({tree.kind})" if tree.kind else name)
+        found.objects.append((name, tree.kind))
     else:
         _add_numbers(name, tree, found)
 

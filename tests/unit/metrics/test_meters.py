@@ -119,6 +119,12 @@ def test_a_vane_that_stands_still_has_no_times_of_arrival_and_no_gas_per_work() 
     assert found["work_per_gas"] == 0.0
 
 
+def test_a_vane_that_comes_back_has_no_times_of_arrival() -> None:
+    angle = np.array([1.0, 1.2, 1.5, 1.2, 1.01])
+    found = read(recorded(np.ones(5), np.ones(5), np.ones(5), angle))
+    assert np.isnan([found[name] for name in ("departure_time", "arrival_time")]).all()
+
+
 ROUNDED = st.floats(-10.0, 10.0).map(lambda value: round(value, 3))
 
 

@@ -201,6 +201,11 @@ def test_departure_and_arrival_are_at_one_percent_of_the_move_from_either_end() 
     assert metrics["angle_range"].value == pytest.approx(2.0)
 
 
+def test_a_move_that_comes_back_neither_departs_nor_arrives() -> None:
+    there_and_back = 0.3 + np.sin(np.pi * TIME / TIME[-1]) + 0.01 * TIME / TIME[-1]
+    assert not {"departure_time", "arrival_time"} & set(evaluate(recording(angle=there_and_back)))
+
+
 def test_a_vane_that_is_held_neither_departs_nor_arrives() -> None:
     metrics = evaluate(recording(angle=np.full(3001, 1.3)))
     assert set(metrics) == {"angle_range"}

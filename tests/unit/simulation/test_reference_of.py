@@ -11,7 +11,7 @@ from ppafo.analyses.linearise.point import equilibrium
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.run import plant_of
 from ppafo.processor.firmware import firmware
-from ppafo.running import simulate
+from ppafo.running import oscillation, simulate
 from ppafo.simulation.ensemble import COMPLETED, REFUSED, run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.numbers import with_numbers
@@ -84,8 +84,17 @@ def test_a_profile_has_levels_and_differences() -> None:
             "vents both chambers at a command of 0 and holds no angle",
         ),
         (document("pressure_1", "20 psi_g", "on_off_dead_zone"), "'controller.dead_zone' is missing"),
+        (
+            document("pressure_1", "60 psi_g"),
+            "leaves the range between atmosphere and supply.*it is at 60 psi_g at 0 s",
+        ),
+        (document("pressure_2", "-1 psi_g"), "leaves the range between atmosphere and supply.*it is at -1 psi_g"),
+        (document("pressure_difference", "-51 psi_d"), "leaves the range.*-50 psi_d to 50 psi_d"),
     ],
-    ids=["beyond stops", "locked", "cascade of torque", "torque law", "fixed point", "name", "unit", "pair", "zone"],
+    ids=[
+        *("beyond stops", "locked", "cascade of torque", "torque law", "fixed point", "name", "unit", "pair", "zone"),
+        *("above supply", "below atmosphere", "difference"),
+    ],
 )
 def test_what_cannot_be_followed_is_refused_in_a_line(content: dict[str, Any], message: str) -> None:
     with pytest.raises(ScenarioError, match=message) as error:
@@ -116,6 +125,35 @@ def test_metered_runs_have_what_a_recording_has_whatever_is_controlled() -> None
         for name in names:
             assert found.metrics[name][0] == pytest.approx(metrics[name].value, rel=1e-9, abs=1e-15), name
         assert found.traces[f"reference_{of}"][-1, 0] == pytest.approx(scenario.reference.level)
+
+
+def test_an_ensemble_refuses_the_run_whose_pressure_no_supply_gives() -> None:
+    scenario = scenario_from_dict(document("pressure_1", "40 psi_g"))
+    supplies = 101325.0 + np.array([50.0, 30.0]) * PSI
+    found = run_ensemble(scenario, {"supply.pressure": supplies}, ["rms_pressure_1_error"])
+    assert found.status.tolist() == [COMPLETED, REFUSED]
+    assert "it is at 40 psi_g" in found.reasons[1]
+
+
+def test_a_pressure_as_high_as_the_supply_and_as_low_as_the_atmosphere_may_be_asked_for() -> None:
+    for level in ("50 psi_g", "0 psi_g"):
+        assert scenario_from_dict(document("pressure_2", level)).reference.level > 1.0e5
+
+
+def test_a_loop_within_a_cascade_that_is_too_fast_is_the_one_that_is_named() -> None:
+    given = ["controller.torque_gain=80 1/(N m)"]
+    quick = oscillation(simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), given)))
+    assert quick is not None
+    assert quick.remedy == "for this device `torque_gain = 4.2 1/(N m)`"
+    pressed = [*given, "motion.external_torque=8 N m"]
+    on_stop = oscillation(simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), pressed)))
+    assert on_stop is not None
+    assert on_stop.remedy == quick.remedy
+
+
+def test_the_first_knot_of_a_smooth_profile_has_no_time_and_the_next_one_is_named() -> None:
+    with pytest.raises(ScenarioError, match=r"no value 'reference.time_01', did you mean 'reference.time_02'"):
+        load_scenario("swing-foot-angle", ["reference.time_01=0.1 s"])
 
 
 def test_an_ensemble_refuses_the_run_whose_reference_is_beyond_the_stops() -> None:

@@ -10,7 +10,7 @@ import scipy.io
 
 from ppafo.errors import DataError
 from ppafo.storage.foreign import ColumnMap, read_foreign
-from ppafo.storage.matlab import read_matlab
+from ppafo.storage.matlab import open_matlab, read_matlab
 from ppafo.storage.result_folder import read_recording
 
 LVM = """LabVIEW Measurement\t
@@ -283,9 +283,11 @@ def test_a_variable_that_is_not_there_is_named_with_its_key(matlab: Path, column
 
 def test_an_object_of_matlab_is_named_with_what_to_save(tmp_path: Path) -> None:
     saved_v73(tmp_path / "run.mat")
-    assert read_matlab(tmp_path / "run.mat").objects == ("thing (timeseries)",)
+    assert read_matlab(tmp_path / "run.mat").objects == (("thing", "timeseries"),)
     channels = {"time": {"column": "thing.Time", "unit": "s"}}
-    with pytest.raises(DataError, match=r"thing \(timeseries\) is an object .* save ts\.Time and ts\.Data"):
+    with pytest.raises(
+        DataError, match=r"thing \(timeseries\) is an object .* t = thing\.Time; y = squeeze\(thing\.Data\)"
+    ):
         read_foreign(tmp_path / "run.mat", columns(channels))
 
 
@@ -301,3 +303,36 @@ def test_what_is_no_matlab_file_is_one_line(tmp_path: Path, content: bytes) -> N
 def test_a_matlab_file_without_a_map_says_what_it_needs(matlab: Path) -> None:
     with pytest.raises(DataError, match="column map, --columns"):
         read_recording(matlab)
+
+
+@pytest.mark.parametrize(
+    ("kind", "line"),
+    [
+        ("timeseries", "t = log.Time; y = squeeze(log.Data); save('plain.mat', 't', 'y')"),
+        ("table", "T = log; s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"),
+        ("timetable", "T = timetable2table(log); T.(1) = seconds(T.(1) - T.(1)(1)); s = table2struct("),
+        ("datetime", "t = seconds(log - log(1)); save('plain.mat', 't')"),
+        ("containers.Map", "save plain.mat t y"),
+    ],
+)
+def test_an_object_of_an_older_file_is_named_with_the_line_that_saves_it_plainly(
+    kind: str, line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.mat"
+    scipy.io.savemat(path, {"y": PRESSURE})
+    # As SciPy gives what MATLAB wrote: without a name of its own, and with what it is in its fields.
+    fields = [(name, object) for name in ("s0", "s1", "s2", "arr")]
+    thing = np.array([(b"log", b"MCOS", kind.encode(), np.zeros(6))], dtype=fields)
+    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {"y": PRESSURE, "None": thing})
+    file = open_matlab(path)
+    assert file.objects == (("log", kind),)
+    assert f"log ({kind}) is an object that only MATLAB reads" in file.said_of_objects()
+    assert line in file.said_of_objects()
+
+
+def test_what_the_line_of_a_table_saves_is_read_by_its_names(tmp_path: Path) -> None:
+    # A structure saved with -struct has its fields as variables, columns that stand upright.
+    scipy.io.savemat(tmp_path / "plain.mat", {"t": SECONDS[:, None], "p1": PRESSURE[:, None]})
+    columns = read_matlab(tmp_path / "plain.mat").columns
+    np.testing.assert_array_equal(columns["t"], SECONDS)
+    np.testing.assert_array_equal(columns["p1"], PRESSURE)

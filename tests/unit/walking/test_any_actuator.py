@@ -11,6 +11,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE, PYTHON
 from ppafo.engine.run import batch_of
 from ppafo.model.catalog import ACTUATORS
+from ppafo.model.sensors import GaitMeasurement
 from ppafo.walking import load_walk, walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
@@ -119,6 +120,36 @@ def test_compiled_and_in_python_a_walk_has_the_same_bits(actuator: str, monkeypa
     compiled = run_batch(batch)
     monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
     assert run_batch(batch).states.tobytes() == compiled.states.tobytes()
+
+
+class Watching:
+    """Fills both chambers of a walk in turn, and keeps what the sensors show."""
+
+    def __init__(self) -> None:
+        self.seen: list[GaitMeasurement] = []
+
+    def reset(self) -> None:
+        """Nothing was seen yet."""
+        self.seen = []
+
+    def update(self, time: float, _reference: float, measurement: GaitMeasurement) -> float:
+        """Half open, to either side for 0.2 s."""
+        self.seen.append(measurement)
+        return 0.5 if time % 0.4 < 0.2 else -0.5
+
+
+@pytest.mark.parametrize("sensors", [(), NOISY], ids=["ideal", "noisy"])
+def test_a_controller_in_python_is_shown_the_pressures_and_the_torque_of_the_kind(sensors: tuple[str, ...]) -> None:
+    watching = Watching()
+    result = walk(load_walk("proportional", [BLADDER, *sensors]).controlled_by(watching), minutes=0.1)
+    assert result.status.is_completed
+    run = plan_walk(result.scenario)
+    for seen in watching.seen[::137]:
+        torque = run.program.actuator.torque(run.plant, seen.angle, seen.pressure_1, seen.pressure_2)
+        assert seen.torque == torque
+    if not sensors:
+        shown = [seen.pressure_1 for seen in watching.seen]
+        assert max(shown) == pytest.approx(float(np.max(result.recording["pressure_1"])), rel=0.02)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ made of them, it calls its actuator's.
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.scheme.pneumatics import (
@@ -150,6 +150,9 @@ def torque_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, 
     return _of_plant(actuator, actuator.torque, plant, angle, pressure_1, pressure_2)
 
 
-def measurement_of(actuator: ActuatorModel, plant: Any, seen: Measurement) -> Measurement:
+Seen = TypeVar("Seen", Measurement, GaitMeasurement)
+
+
+def measurement_of(actuator: ActuatorModel, plant: Any, seen: Seen) -> Seen:
     """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
     return seen._replace(torque=actuator.torque(plant, seen.angle, seen.pressure_1, seen.pressure_2))

@@ -10,11 +10,11 @@ from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
 from ppafo.model.columns import Problem, at
-from ppafo.model.controlled import ANGLE
+from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
 from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
-from ppafo.simulation.profiles import TOLERANCE, profile_bounds, profile_problem
+from ppafo.simulation.profiles import Limits, limits_of, profile_bounds, profile_problem, stops_of
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 
 
@@ -28,7 +28,7 @@ def rules(scenario: Scenario) -> tuple[Problem, ...]:
 
     return (
         _beyond_the_stops(scenario),
-        _reference_beyond_the_stops(scenario),
+        _reference_beyond_reach(scenario),
         (
             delay > scenario.run.duration,
             lambda run: f"sensors.delay = {at(delay, run):.9g} s: must not be longer than run.duration",
@@ -42,7 +42,7 @@ def _beyond_the_stops(scenario: Scenario) -> Problem:
     actuator, motion = scenario.device.actuator, vane_motion(scenario)
     profile = ProfileChoice("constant", {"level": motion.angle}) if motion.profile is None else motion.profile
     if profile.kind != "constant":
-        return _profile_beyond_the_stops(scenario, profile, "motion.profile")
+        return _profile_beyond(scenario, stops_of(scenario.device), profile, "motion.profile")
     level = profile.level
 
     def angle_line(run: int) -> str:
@@ -50,33 +50,33 @@ def _beyond_the_stops(scenario: Scenario) -> Problem:
         path = path_of_locked_angle(scenario) or LOCKED_ANGLE
         return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
 
-    return _is_beyond_the_stops(scenario, profile), angle_line
+    return _is_beyond(stops_of(scenario.device), profile), angle_line
 
 
-def _reference_beyond_the_stops(scenario: Scenario) -> Problem:
-    """An angle that no controller can reach."""
-    if scenario.controlled != ANGLE or scenario.controller.kind == OPEN_LOOP:
+def _reference_beyond_reach(scenario: Scenario) -> Problem:
+    """An angle or a pressure that no controller can reach."""
+    followed = CONTROLLED[scenario.controlled]
+    if followed.reach is None or scenario.controller.kind == OPEN_LOOP:
         return np.zeros(1, dtype=np.bool_), lambda _: ""
-    return _profile_beyond_the_stops(scenario, scenario.reference, "reference")
+    return _profile_beyond(scenario, limits_of(scenario.device, followed), scenario.reference, "reference")
 
 
-def _is_beyond_the_stops(scenario: Scenario, profile: ProfileChoice) -> NDArray[np.bool_]:
-    """Tell in which runs (runs,) a profile leaves the stops at any time."""
-    actuator, (lowest, highest) = scenario.device.actuator, profile_bounds(profile)
-    lower, upper = actuator.angle_min - TOLERANCE, actuator.angle_max + TOLERANCE
+def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
+    """Tell in which runs (runs,) a profile leaves its limits at any time."""
+    lowest, highest = profile_bounds(profile)
+    lower, upper = limits.lowest - limits.margin, limits.highest + limits.margin
     return np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
 
 
-def _profile_beyond_the_stops(scenario: Scenario, profile: ProfileChoice, section: str) -> Problem:
-    """A profile of a section that leaves the stops."""
-    actuator, outside = scenario.device.actuator, _is_beyond_the_stops(scenario, profile)
+def _profile_beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, section: str) -> Problem:
+    """A profile of a section that leaves its limits."""
+    outside = _is_beyond(limits, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
     found: dict[int, str] = {}
     for run in np.flatnonzero(outside).tolist():
-        stops = at(actuator.angle_min, run), at(actuator.angle_max, run)
         own = ProfileChoice(profile.kind, {name: at(value, run) for name, value in profile.settings.items()})
         duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
-        found[run] = profile_problem(scenario.device.name, stops, own, duration, step, section)
+        found[run] = profile_problem(limits.of_run(run), own, duration, step, section)
         outside[run] = bool(found[run])
     return outside, lambda run: found[run]
 
