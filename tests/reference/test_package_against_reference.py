@@ -20,12 +20,15 @@ from tests.reference.simulator import independent_run
 
 SEED = 1
 DRAWS = 9
+COSTLY = {"dead volumes": 3, "loops without friction": 4}
+"""Draws of families whose reference takes many seconds for each."""
 
 
 @pytest.mark.parametrize("family", [name for name in FAMILIES if name != "mixed"])
 def test_determined_draws_are_within_the_limits(family: str) -> None:
-    verdicts = {number: verdict(scenario_from_dict(draw(family, SEED, number))) for number in range(DRAWS)}
-    assert 2 * sum(case.is_determined for case in verdicts.values()) > DRAWS, "the family must say something"
+    draws = COSTLY.get(family, DRAWS)
+    verdicts = {number: verdict(scenario_from_dict(draw(family, SEED, number))) for number in range(draws)}
+    assert 2 * sum(case.is_determined for case in verdicts.values()) > draws, "the family must say something"
     assert {number: case for number, case in verdicts.items() if case.is_wrong} == {}
 
 

@@ -87,3 +87,18 @@ def test_an_impaired_wearer_has_no_moment_of_dorsiflexors_to_speak_of() -> None:
     result = walk(load_walk("proportional"), minutes=MINUTES)
     assert "dorsiflexor_moment" not in result.recording
     assert "dorsiflexor_moment" not in result.metrics
+
+
+QUICK = (
+    *("actuator.torque_constant=18 cm^3", "actuator.displacement_per_radian=18 cm^3/rad", "gas.species=air"),
+    *("actuator.dead_volume_1=10 cm^3", "actuator.dead_volume_2=3 cm^3", "supply.pressure=3.7 bar_g"),
+    *("valve.sonic_conductance=2.1 L/(s bar)", "valve.critical_ratio=0.3", "controller.largest_torque=5 N m"),
+)
+"""Chambers that a wide valve empties in less than the dead time of a slow one."""
+
+
+@pytest.mark.parametrize("delay", ["0 ms", "3 ms", "10 ms", "13 ms"])
+def test_a_vent_valve_that_follows_late_on_quick_chambers_is_no_fault(delay: str) -> None:
+    result = walk(load_walk("proportional", [*QUICK, f"valve.delay={delay}"]), minutes=MINUTES)
+    assert result.status.is_completed
+    assert "safe_state_time" not in result.metrics

@@ -39,7 +39,7 @@ class NominalDevice(NamedTuple):
 
     ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
     the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
-    with a vent valve, which follows its command after ``nominal_delay`` with ``nominal_lag`` beyond
+    with a vent valve, which both follow their command after ``nominal_delay``, the spool with ``nominal_lag`` beyond
     ``nominal_dead_band``.
     ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
     as its content p V [J]; a volume of 0 stands for a supply that needs none.
@@ -137,7 +137,7 @@ class Coil(NamedTuple):
 
 
 class OnTheWay(NamedTuple):
-    """A command on its way to a spool [-], a third of the dead time behind it each."""
+    """A command on its way to a spool or a vent valve [-], a third of the dead time behind it each."""
 
     first: float
     second: float
@@ -170,6 +170,7 @@ class Observer(NamedTuple):
     coil_1: Coil
     coil_2: Coil
     on_the_way: OnTheWay
+    venting: OnTheWay
     spool: float
     joined: float
     lines: LineState
@@ -179,9 +180,17 @@ LONG_AGO = 1.0e9
 _EMPTY = Chamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
 _OFF = Coil(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
 _FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
-_AT_REST = OnTheWay(first=0.0, second=0.0, third=0.0)
 START = Observer(
-    _EMPTY, _EMPTY, command=2.0, coil_1=_OFF, coil_2=_OFF, on_the_way=_AT_REST, spool=0.0, joined=0.0, lines=_FULL
+    _EMPTY,
+    _EMPTY,
+    command=2.0,
+    coil_1=_OFF,
+    coil_2=_OFF,
+    on_the_way=OnTheWay(first=0.0, second=0.0, third=0.0),
+    venting=OnTheWay(first=1.0, second=1.0, third=1.0),
+    spool=0.0,
+    joined=0.0,
+    lines=_FULL,
 )
 
 FORGETS = 0.128
@@ -416,12 +425,13 @@ def next_observer(
     coil_1, on_1 = next_coil(nominal, state.coil_1, 1.0 if (command > 0.0) & (not vents) else 0.0, period)
     coil_2, on_2 = next_coil(nominal, state.coil_2, 1.0 if command < 0.0 else 0.0, period)
     on_the_way = next_on_the_way(nominal, state.on_the_way, opening_of(nominal, command), period)
+    venting = next_on_the_way(nominal, state.venting, 1.0 if vents else 0.0, period)
     spool, is_pair = next_spool(nominal, state.spool, on_the_way.third, period), nominal.nominal_pair > 0.5
     towards_1, towards_2 = max(spool, 0.0), max(-spool, 0.0)
     # A pair feeds by its coils' mean positions, a spool by its opening to either side.
     source_1, source_2 = on_1 if is_pair else towards_1, on_2 if is_pair else towards_2
-    vent_1 = 1.0 - on_1 if is_pair else (1.0 if vents else towards_2)
-    vent_2 = 1.0 - on_2 if is_pair else (1.0 if vents else towards_1)
+    vent_1 = 1.0 - on_1 if is_pair else max(venting.third, towards_2)
+    vent_2 = 1.0 - on_2 if is_pair else max(venting.third, towards_1)
     fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
     left = max(state.joined - period, 0.0)
     # The joining time counts from when the coil of chamber 1 lets go.
@@ -458,6 +468,7 @@ def next_observer(
         coil_1=coil_1,
         coil_2=coil_2,
         on_the_way=on_the_way,
+        venting=venting,
         spool=spool,
         joined=joined,
         lines=next_lines(nominal, lines, taken_1, taken_2, period),
@@ -507,9 +518,12 @@ def is_fed(nominal: NominalDevice, coil: Coil, spool: float) -> bool:
     return (coil.position > 0.5) if nominal.nominal_pair > 0.5 else (spool > 0.0)
 
 
-def is_vented(nominal: NominalDevice, coil: Coil, spool: float, command: float) -> bool:
-    """True where a valve is believed to vent its chamber; ``spool`` [-] is above 0 towards it."""
-    return (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((command > VENTS_ABOVE) | (spool < 0.0))
+def is_vented(nominal: NominalDevice, coil: Coil, spool: float, venting: float) -> bool:
+    """True where a valve is believed to vent its chamber; ``spool`` [-] is above 0 towards it.
+
+    ``venting`` [-] is how far the vent valve is believed to be open.
+    """
+    return (coil.position < 0.5) if nominal.nominal_pair > 0.5 else ((venting > 0.5) | (spool < 0.0))
 
 
 SHOWS_GAS = 0.05
@@ -566,8 +580,8 @@ def found_cause(
         return NO_FLAG
     now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
     fed_1, fed_2 = is_fed(nominal, state.coil_1, state.spool), is_fed(nominal, state.coil_2, -state.spool)
-    vented_1 = is_vented(nominal, state.coil_1, state.spool, state.command)
-    vented_2 = is_vented(nominal, state.coil_2, -state.spool, state.command)
+    vented_1 = is_vented(nominal, state.coil_1, state.spool, state.venting.third)
+    vented_2 = is_vented(nominal, state.coil_2, -state.spool, state.venting.third)
     to_1, to_2 = supplied(nominal, state.lines)
     lost_1 = (state.chamber_1.pressure - pressure_1) * now_1 if has_gas(state.chamber_1, now_1, pressure_1) else 0.0
     lost_2 = (state.chamber_2.pressure - pressure_2) * now_2 if has_gas(state.chamber_2, now_2, pressure_2) else 0.0

@@ -12,6 +12,7 @@ from ppafo.analyses.tune.answer import Tuned, verdict
 from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning
 from ppafo.analyses.tune.question import tune
 from ppafo.errors import StudyError
+from ppafo.running import oscillation
 from ppafo.studies.varying import value_at
 
 DOCUMENT: dict[str, Any] = {
@@ -207,3 +208,21 @@ def test_a_value_that_is_not_there_yet_is_said() -> None:
     conductance = {"path": "valve.sonic_conductance", "minimum": "1e-9 m^3/(s Pa)", "maximum": "1e-8 m^3/(s Pa)"}
     with pytest.raises(StudyError, match=r"has no value for 'valve.sonic_conductance'; set one"):
         load_tuning(changed(search=[conductance]))
+
+
+def test_gains_with_which_the_loop_oscillates_are_not_recommended_however_they_score() -> None:
+    late = [*DOCUMENT["overrides"], "valve.delay=10 ms"]
+    highest = ppafo.simulate("torque-task-proportional", [*late, "controller.proportional_gain=8 1/(N m)"])
+    assert oscillation(highest) is not None
+    # What is asked for is a large error: the one of the highest gains is larger than any of a loop at rest.
+    tuned = tune(
+        changed(
+            overrides=late,
+            search=[{"path": "controller.proportional_gain", "minimum": "0.1 1/(N m)", "maximum": "8 1/(N m)"}],
+            objective=[{"metric": "rms_error", "weight": -1.0}],
+            effort={"starts": 1, "generations": 4, "candidates_per_gain": 8},
+        )
+    ).found
+    assert oscillation(tuned.after.result) is None
+    assert tuned.after.values["rms_error"] < highest.metrics["rms_error"].value
+    assert tuned.after.gains["controller.proportional_gain"] < 1.0
