@@ -116,9 +116,9 @@ def drawn(module: WasmModule, draws: int, spread: tuple[float, float] = (0.7, 1.
     }
     for key, values in times.items():
         found[1:, column[key]] = values[1:]
-    if _wants_angle(module):
-        # An angle that is wanted stays between the stops, where a file has to have it.
-        kept = [place for key, place in column.items() if key.startswith(("reference.", "actuator.angle_m"))]
+    if _wants_a_place(module):
+        # An angle that is wanted stays between the stops, a pressure below the supply's, where a file has to have it.
+        kept = [place for key, place in column.items() if key.startswith(("reference.", "actuator.angle_m", "supply."))]
         found[:, kept] = found[0, kept]
     if "motion.angle" in column:
         stops = found[:, column["actuator.angle_min"]], found[:, column["actuator.angle_max"]]
@@ -205,14 +205,15 @@ def _compared_run(module: WasmModule, ran: Ran, row: Floats, result: Result | Wa
     if result is None:
         # A module does not know all contradictions of a walk, nor whether an angle that is wanted is beyond the stops.
         is_walk = module.description["kind"] == "walk"
-        assert ran.status == REFUSED or is_walk or _wants_angle(module) or _leaves_the_stops(module, ran, row)
+        assert ran.status == REFUSED or is_walk or _wants_a_place(module) or _leaves_the_stops(module, ran, row)
         return "refused"
     assert_same(module, ran, result)
     return "completed" if result.status.is_completed else "diverged"
 
 
-def _wants_angle(module: WasmModule) -> bool:
-    return bool(module.description["document"].get("reference", {}).get("of") == "angle")
+def _wants_a_place(module: WasmModule) -> bool:
+    """True where the reference is of an angle or of pressures, of which a device reaches some only."""
+    return module.description["document"].get("reference", {}).get("of", "torque") != "torque"
 
 
 def assert_same(module: WasmModule, ran: Ran, result: Result | WalkResult) -> None:

@@ -264,14 +264,10 @@ def _experiment(item: ExperimentSection, setting: Setting) -> Experiment:
     )
 
 
-_TRUE_LAW = ("flow.linear_ratio=0.9999",)
-"""The straight line near equal pressures is numerics of a step: a fit takes the law as far as a run can follow it."""
-
-
 def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
     found = name if name in list_scenarios() else str(setting.folder / name)
     # The valve of the problem goes before what the experiment changes of it.
-    chosen = _TRUE_LAW if setting.valve is None else (*_TRUE_LAW, f"device.valve={setting.valve}")
+    chosen = () if setting.valve is None else (f"device.valve={setting.valve}",)
     return load_scenario(found, over(chosen, overrides, ScenarioError), setting.parameter_set)
 
 
@@ -327,8 +323,7 @@ def _replay(
     first = quantity_in(item, "start", "s", said)
     first = float(recording.time[0]) if first is None else first
     used = recording.between(first, float(recording.time[-1]))
-    changes = over(_TRUE_LAW, item.overrides)
-    device = build_device(apply_overrides(setting.parameter_set, changes, valve=setting.valve), setting.valve)
+    device = build_device(apply_overrides(setting.parameter_set, item.overrides, valve=setting.valve), setting.valve)
     angle, volume = quantity_in(item, "locked", "rad", said), positive_in(item, "volume", "m^3", said)
     known = {} if angle is None else {ANGLE: angle}
     if volume is not None:
