@@ -83,6 +83,16 @@ def test_a_key_that_is_missing_is_named(name: str, key: str, results: Path, tmp_
         ppafo.load_study_results(folder)
 
 
+@pytest.mark.parametrize("damaged", [[], "3", 1.5, {"proportional": "many"}])
+def test_counts_of_oscillating_runs_that_are_none_are_named(damaged: object, results: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    shutil.copytree(results, folder)
+    document = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    (folder / "summary.json").write_text(json.dumps(document | {"oscillating": damaged}), encoding="utf-8")
+    with pytest.raises(DataError, match=r"summary.json.*\boscillating\b"):
+        ppafo.load_study_results(folder)
+
+
 @pytest.mark.parametrize("name", ["bands.parquet", "runs/chunk-0000000.parquet"])
 def test_a_table_that_is_missing_is_named(name: str, results: Path, tmp_path: Path) -> None:
     folder = tmp_path / "out"

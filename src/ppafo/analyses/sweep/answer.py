@@ -189,6 +189,7 @@ class _Summary(_Part):
     diverged: _Count
     refused: _Count
     completed_by_configuration: dict[str, _Count]
+    oscillating: dict[str, _Count] = Field(default_factory=dict)
     failures: list[_Failure]
     quantile_definition: str
     configurations: dict[str, dict[str, _Described]]
