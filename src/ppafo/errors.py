@@ -143,10 +143,11 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=0.6)
-    # Of names that are as near, the one that begins like it: 'time_02' and not 'time_31' for 'time_01'.
-    alike = [name for name in near if _likeness(name, word) == _likeness(near[0], word)]
-    near = sorted(alike, key=lambda name: (-_begins_alike(name, word), known.index(name)))
-    if not near:
+    if near:
+        # Of names that are as near, the one that begins like it: 'time_02' and not 'time_31' for 'time_01'.
+        alike = [name for name in known if name in near and _likeness(name, word) == _likeness(near[0], word)]
+        near = [max(alike, key=lambda name: _letters_shared(name, word))]
+    else:
         # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
         words = [(re.split(r"[^0-9A-Za-z]+", one), one) for one in known]
         near = [one for found, one in words if found[0] == word] or [one for found, one in words if word in found[1:]]
@@ -157,9 +158,10 @@ def _likeness(name: str, word: str) -> float:
     return difflib.SequenceMatcher(None, name, word).ratio()
 
 
-def _begins_alike(name: str, word: str) -> int:
-    """Number of letters at the beginning of two words that are the same."""
-    return next((number for number in range(len(name)) if name[: number + 1] != word[: number + 1]), len(name))
+def _letters_shared(name: str, word: str) -> int:
+    """Number of letters with which both begin."""
+    pairs = enumerate(zip(name, word, strict=False))
+    return next((number for number, (own, other) in pairs if own != other), min(len(name), len(word)))
 
 
 def first_twice(names: Iterable[str]) -> str | None:

@@ -174,7 +174,7 @@ def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
 
 
 def _is_of(unit: str, si_unit: str) -> bool:
-    """Tell whether a unit can be brought to one in SI; of another the audit tells."""
+    """Tell whether a unit converts to an SI unit. One that does not is a finding of the audit, and no error here."""
     try:
         to_si(1.0, unit, si_unit)
     except UnitError:

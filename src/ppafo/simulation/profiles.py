@@ -61,9 +61,10 @@ class Limits(NamedTuple):
     room: Any
 
     @property
-    def margin(self) -> Any:
-        """How far beyond its limits a value may be: rounding of one that is given in another unit."""
-        return TOLERANCE * np.maximum(1.0, np.maximum(np.abs(self.lowest), np.abs(self.highest)))
+    def allowed(self) -> tuple[Any, Any]:
+        """Lowest and highest value that are not refused: beyond the limits by the rounding of another unit."""
+        margin = TOLERANCE * np.maximum(1.0, np.maximum(np.abs(self.lowest), np.abs(self.highest)))
+        return self.lowest - margin, self.highest + margin
 
     def text(self, value: float) -> str:
         """A value in the unit in which people write it."""
@@ -101,7 +102,7 @@ def profile_problem(
     """Return where the profile of a section leaves its limits; "" if nowhere."""
     kind, parameters = PROFILES[profile.kind], profile_parameters(profile)
     # The times that the engine asks for, as far as they can be gone through one by one.
-    lowest, highest = limits.lowest - limits.margin, limits.highest + limits.margin
+    lowest, highest = limits.allowed
     count = max(1, min(MAXIMUM_CHECKED_TIMES, round(duration / step)))
     for number in range(count + 1):
         time = duration * number / count

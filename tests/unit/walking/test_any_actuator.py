@@ -62,7 +62,7 @@ def written_by_others(folder: Path) -> str:
     return f"device.set={folder / 'others.toml'}"
 
 
-def stays_help(result: WalkResult) -> None:
+def assert_helps(result: WalkResult) -> None:
     """A device begins with vented chambers, has gas of a possible pressure, and helps without an event."""
     supply = result.scenario.device.supply
     pressures = np.array([result.recording["pressure_1"], result.recording["pressure_2"]])
@@ -88,7 +88,7 @@ def test_the_vane_of_another_package_walks_as_the_built_in_one(tmp_path: Path) -
 @pytest.mark.parametrize("chambers", [1, 2])
 def test_a_soft_actuator_helps_a_walk_and_nothing_stops_it(walked: str, chambers: int, tmp_path: Path) -> None:
     result = walk(load_walk(walked, [soft(tmp_path, chambers), "supply.pressure=50 psi_g", *NOISY]), minutes=MINUTES)
-    stays_help(result)
+    assert_helps(result)
     assert result.metrics["net_push_off_work"].value > 0.5
     assert 0.02 < result.metrics["gas"].value / 1.0e-3 < 3.0
 
@@ -99,7 +99,7 @@ def test_a_soft_actuator_helps_a_walk_and_nothing_stops_it(walked: str, chambers
     ids=["cylinder", "cylinder-lines", "bladder"],
 )
 def test_a_cylinder_and_a_bladder_walk_and_nothing_stops_them(walked: str, actuator: str) -> None:
-    stays_help(walk(load_walk(walked, [actuator, *NOISY]), minutes=MINUTES))
+    assert_helps(walk(load_walk(walked, [actuator, *NOISY]), minutes=MINUTES))
 
 
 def test_a_cylinder_brings_the_ankle_near_to_the_healthy_one() -> None:

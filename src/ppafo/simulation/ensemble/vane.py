@@ -64,7 +64,7 @@ def _reference_beyond_reach(scenario: Scenario) -> Problem:
 def _is_beyond(limits: Limits, profile: ProfileChoice) -> NDArray[np.bool_]:
     """Tell in which runs (runs,) a profile leaves its limits at any time."""
     lowest, highest = profile_bounds(profile)
-    lower, upper = limits.lowest - limits.margin, limits.highest + limits.margin
+    lower, upper = limits.allowed
     return np.atleast_1d(np.logical_or(lowest < lower, highest > upper))
 
 
