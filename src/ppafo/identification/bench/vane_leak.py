@@ -33,7 +33,7 @@ from ppafo.identification.bench.flow import (
 )
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
-from ppafo.identification.fit import Free
+from ppafo.identification.residuals import Free
 from ppafo.identification.source import (
     Source,
     check_no_gap,

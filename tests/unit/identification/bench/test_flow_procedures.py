@@ -18,7 +18,7 @@ from ppafo.identification.bench import (
 )
 from ppafo.identification.bench.flow import GasAt, Opening, Sizes, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
-from ppafo.identification.fit import burg
+from ppafo.identification.noise import burg
 from ppafo.identification.source import Source
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
 
