@@ -2,7 +2,7 @@
 
 import ast
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
@@ -19,6 +19,7 @@ from ppafo.engine.source_text import (
     is_step_function,
 )
 from ppafo.errors import ProgramError
+from ppafo.model.plain_function import PlainFunction
 
 
 @dataclass(slots=True)
@@ -71,7 +72,7 @@ class StepText:
         """Classes of the groups that have rows."""
         return {**self.parameters, **self.states, **self.of_step, **self.further}
 
-    def phase(self, function: Callable[..., Any], known: Mapping[str, Any] | None = None) -> Composed:
+    def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> Composed:
         """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
         assert isinstance(function, FunctionType), "it is no other callable"
         return self._composed(function, known or {}, is_phase=True)

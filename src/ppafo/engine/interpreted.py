@@ -19,6 +19,7 @@ import numpy as np
 from ppafo.engine.entries import entry_types
 from ppafo.engine.going_on import MATH, power, quotient, whole_part
 from ppafo.engine.plain_python import parse_module, place_in, refusal
+from ppafo.model.plain_function import PlainFunction
 
 
 @lru_cache(maxsize=64)
@@ -55,11 +56,11 @@ class _AsCompiled(ast.NodeTransformer):
         return ast.copy_location(ast.Call(ast.Name(called, ast.Load()), [node.left, node.right], []), node)
 
 
-def _as_it_is(function: Callable[..., Any]) -> Callable[..., Any]:
+def _as_it_is(function: PlainFunction) -> PlainFunction:
     return function
 
 
-def _entry(_types: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _entry(_types: str) -> Callable[[PlainFunction], PlainFunction]:
     return _as_it_is
 
 

@@ -10,7 +10,7 @@ import ast
 import inspect
 import math
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
@@ -26,6 +26,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
+from ppafo.model.plain_function import PlainFunction
 
 Floats = NDArray[np.float64]
 OWN = "ppafo."
@@ -209,7 +210,7 @@ class Linked:
                 scope |= {"_quotient": quotient, "int": whole_part}
         return self._made[function]
 
-    def _law(self, function: FunctionType, rows: tuple[str, ...]) -> Callable[..., Any]:
+    def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """The law of an effect, called as its port is; its own rows are those of the lane that is gone through."""
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         own = [name for name in names if name not in rows]

@@ -18,9 +18,10 @@ from ppafo.engine.plain_python import parse_module
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.source_text import COMPILED_BUILTINS, SourceCollector
 from ppafo.errors import ProgramError
+from ppafo.model.plain_function import PlainFunction
 
 
-def over_samples(function: Callable[..., Any], *given: Any) -> Any:
+def over_samples(function: PlainFunction, *given: Any) -> Any:
     """Value of a function of the model, in its own units, of rows and numbers any of which may be columns (samples,).
 
     What is the same for all samples may stay one number.
@@ -33,8 +34,8 @@ def over_samples(function: Callable[..., Any], *given: Any) -> Any:
     return called_over_samples(function, (None if found is None else found[1]), *given)
 
 
-def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., Any] | None, *given: Any) -> Any:
-    """As ``over_samples``, of a function whose form for columns is known; None where it has none."""
+def called_over_samples(function: PlainFunction, of_columns: PlainFunction | None, *given: Any) -> Any:
+    """Value of a function over samples whose form for columns is known; None where it has none."""
     if of_columns is not None:
         # A choice works out what no sample takes, too.
         with np.errstate(all="ignore"):
@@ -56,7 +57,7 @@ def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., 
 
 
 @lru_cache(maxsize=64)
-def _composed(function: Callable[..., Any]) -> tuple[SourceCollector, Callable[..., Any] | None] | None:
+def _composed(function: PlainFunction) -> tuple[SourceCollector, PlainFunction | None] | None:
     collector = SourceCollector("")
     try:
         name = collector.add(function)
@@ -65,7 +66,7 @@ def _composed(function: Callable[..., Any]) -> tuple[SourceCollector, Callable[.
     return collector, in_columns(collector.text(), name)
 
 
-def in_columns(text: str, name: str) -> Callable[..., Any] | None:
+def in_columns(text: str, name: str) -> PlainFunction | None:
     """A function of a composed text for columns; None where it has no such form."""
     try:
         tree = _Columns().visit(parse_module(text))
@@ -73,8 +74,8 @@ def in_columns(text: str, name: str) -> Callable[..., Any] | None:
         return None
     scope: dict[str, Any] = {"namedtuple": namedtuple, **_OPERATIONS}
     exec(compile(ast.fix_missing_locations(tree), "<columns>", "exec"), scope)
-    found: Callable[..., Any] = scope[name]
-    return found
+    function: PlainFunction = scope[name]
+    return function
 
 
 def _gathered(results: list[Any]) -> Any:
@@ -117,7 +118,7 @@ def _as_float(number: Any) -> Any:
     return number.astype(np.float64) if isinstance(number, np.ndarray) else float(number)
 
 
-_OPERATIONS: dict[str, Callable[..., Any]] = {
+_OPERATIONS: dict[str, Callable[..., Any]] = {  # of one number, of two, or of any
     "_chosen": _chosen,
     "_all": np.logical_and,
     "_any": np.logical_or,

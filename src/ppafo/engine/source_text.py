@@ -27,6 +27,7 @@ from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError, nearest_name, one_line
+from ppafo.model.plain_function import PlainFunction
 
 COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
@@ -411,7 +412,7 @@ class SourceCollector:
     effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
     needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
-    def add(self, item: Callable[..., Any] | type) -> str:
+    def add(self, item: PlainFunction | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
         return self._add(self.links.get(item, item))
 

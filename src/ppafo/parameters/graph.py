@@ -13,6 +13,7 @@ import numpy as np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import quantities_of
+from ppafo.model.plain_function import PlainFunction
 from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
@@ -44,7 +45,7 @@ class Term:
     """
 
     sources: tuple[str, ...]
-    function: Callable[..., Any] = itself
+    function: PlainFunction = itself
     rows: tuple[type, ...] = ()
     orifice: str = ""
     in_other_form: "Term | None" = None

@@ -51,7 +51,11 @@ class Numbers:
 
 
 def fixed_point_kind(
-    floats: ControllerKind, parameters: type, initial: Any, update: Callable[..., Any], plan: Numbers
+    floats: ControllerKind,
+    parameters: type,
+    initial: Any,
+    update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
+    plan: Numbers,
 ) -> ControllerKind:
     """The integer form of a law as a controller of the catalogue: its settings, and the converter's."""
     return replace(

@@ -24,7 +24,7 @@ from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
 from ppafo.parameters.overrides import FORMS, check_valve, either, in_two_forms, split_override
 from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
 from ppafo.simulation.declaration import (
     ACCURACY,
     AT_REST,
@@ -51,7 +51,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
-from ppafo.simulation.motion_kind import MOTIONS
+from ppafo.simulation.motion_kind import MOTIONS, Clock
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths
 from ppafo.simulation.profiles import reference_problem

@@ -16,8 +16,9 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
-from ppafo.simulation.clock import Clock, read_clock
+from ppafo.simulation.clock import read_clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
+from ppafo.simulation.motion_kind import Clock
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
 
@@ -50,8 +51,7 @@ def chosen_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
-    own: dict[str, Quantity] = scenario.motion.motion_kind.quantities(scenario)
-    return device_numbers(scenario.device) | own
+    return device_numbers(scenario.device) | scenario.motion.motion_kind.quantities(scenario)
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:

@@ -277,8 +277,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
     """
-    planned: tuple[Run, tuple[Problem, ...]] = scenario.motion.motion_kind.plan(scenario)
-    return planned
+    return scenario.motion.motion_kind.plan(scenario)
 
 
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:

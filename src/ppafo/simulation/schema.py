@@ -83,7 +83,7 @@ def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: d
     )
 
 
-def motion_kinds() -> dict[str, MotionKind]:
+def motion_kinds() -> dict[str, MotionKind[Any]]:
     """Return the kinds of motion of a vane alone: all of this package, and loaded ones of others."""
     others = {name: kind for name, kind in MOTIONS.loaded().items() if kind.section is not None}
     return {name: MOTIONS[name] for name in VANE_MOTIONS} | others

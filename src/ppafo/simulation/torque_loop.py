@@ -18,6 +18,7 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Number
+from ppafo.model.plain_function import PlainFunction
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
@@ -322,11 +323,11 @@ class LoopFrames(NamedTuple):
     ``joint`` is what ``joint_of`` needs, {} where it is not known.
     """
 
-    loop: Callable[..., TorqueLoop]
-    torque_loop: Callable[..., TorqueLoop]
+    loop: PlainFunction
+    torque_loop: PlainFunction
     rows: tuple[type, ...]
     sources: tuple[str, ...]
-    joint: dict[str, Callable[..., Any]]
+    joint: dict[str, PlainFunction]
 
 
 def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: bool) -> LoopFrames:
@@ -350,7 +351,7 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
         **_PER_PRESSURE.get(controlled, {}),
     }
     loop = inner = bind(loop_of, "loop_of_device", components)
-    joint: dict[str, Callable[..., Any]] = {}
+    joint: dict[str, PlainFunction] = {}
     if is_joint:
         parts = {"mean_chambers": chambers.function, "turning": turning_with_foot if has_leg else turning_alone}
         joint = {"joint_of": bind(joint_of, "joint_of_device", parts), "torque_loop_of": inner}
@@ -380,15 +381,13 @@ def loop_terms(
     of_area, of_sonic = (_frames(device, walks, controlled, has_leg, sonic) for sonic in (False, True))
     names = {item.name for item in VALVES[device.valve.kind].quantities}
 
-    def in_form(
-        frames: LoopFrames, frame: Callable[..., float], by: Callable[..., float], settings: tuple[str, ...]
-    ) -> Term:
+    def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> Term:
         # A law of the angle alone has the torque loop inside it.
         own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
         inner = {**frames.joint, "rule_of_joint": by} if frame is gain_of_joint else {"loop_of": own_loop, "rule": by}
         return Term((*frames.sources, *settings), bind(frame, f"{by.__name__}_of_device", inner), frames.rows)
 
-    def term(frame: Callable[..., float], by: Callable[..., float], *settings: str) -> Term:
+    def term(frame: PlainFunction, by: PlainFunction, *settings: str) -> Term:
         return in_its_form(device, VALVE, in_form(of_area, frame, by, settings), in_form(of_sonic, frame, by, settings))
 
     found = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}

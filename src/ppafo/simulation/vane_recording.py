@@ -13,7 +13,6 @@ from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.metrics import evaluate
-from ppafo.metrics.metric import Metric
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import gravity_torque, sliding_friction
@@ -21,11 +20,9 @@ from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario, vane_motion
-
-Measured = tuple[Recording, Mapping[str, Metric], str]
-"""Recording and metrics, and how a completed run ended, in words."""
 
 
 def measured_free(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:

@@ -4,12 +4,13 @@ What the engine steps and what is differentiated here are the same functions: po
 energy balance, vane. Only the sums of equation (9) and the state of the vane, which stands or slides, are said here.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.model.orifice import orifice_flow
+from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -23,9 +24,9 @@ from ppafo.model.plant import (
     pressures_per_mass,
 )
 from ppafo.model.ports import gas_density, leakage_path
-from ppafo.translation.symbolic import Acting, Compare, both_sides, symbolic
+from ppafo.translation.symbolic import Acting, Compare, Wrapper, both_sides, symbolic
 
-Around = Mapping[Any, Callable[..., Any]]
+Around = Mapping[PlainFunction, Wrapper]
 
 
 class GasFlows(NamedTuple):

@@ -11,13 +11,14 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 from ppafo.engine.linking import link_effects
 from ppafo.engine.rows import is_number, is_row, members
 from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.model.effects.kind import Effect
+from ppafo.model.plain_function import PlainFunction
 from ppafo.translation import typed
 from ppafo.translation.typed import Function, Statement, Term
 from ppafo.translation.value_types import FLOAT, INT, Handed, Items, Row, Type, is_empty
@@ -25,7 +26,16 @@ from ppafo.translation.walk import walk_module
 
 Compare = Callable[[str, Any, Any, str], Any]
 """From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
-Around = Mapping[str, Callable[..., Any]]
+
+
+class Wrapper(Protocol):
+    """What stands before a function of the model: it is called with that function and with its arguments."""
+
+    def __call__(self, function: Callable[..., Any], /, *arguments: Any) -> Any:
+        """Return what stands for the function's value."""
+
+
+Around = Mapping[str, Wrapper]
 Acting = Mapping[Effect, Any]
 """Effects in the order in which they act, with their parameters."""
 
@@ -41,7 +51,7 @@ _COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     **{"==": operator.eq, "!=": operator.ne},
 }
-_ARITHMETIC: dict[str, Callable[..., Any]] = {
+_ARITHMETIC: dict[str, Any] = {
     **{"+": operator.add, "-": operator.sub, "*": operator.mul, "//": operator.floordiv, "%": operator.mod},
     **{"&": operator.and_, "|": operator.or_, "^": operator.xor, ">>": operator.rshift},
     "/": _quotient,
@@ -89,9 +99,9 @@ class Symbolic:
 
 
 def symbolic(
-    function: Callable[..., Any],
-    *given: type | Callable[..., Any],
-    around: Mapping[Callable[..., Any], Callable[..., Any]] | None = None,
+    function: PlainFunction,
+    *given: type | PlainFunction,
+    around: Mapping[PlainFunction, Wrapper] | None = None,
     compare: Compare = both_sides,
     acting: Acting | None = None,
 ) -> Symbolic:
@@ -126,9 +136,7 @@ class _Walked:
 
 
 @lru_cache(maxsize=32)
-def _walked(
-    function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...], effects: tuple[Effect, ...]
-) -> _Walked:
+def _walked(function: PlainFunction, given: tuple[type | PlainFunction, ...], effects: tuple[Effect, ...]) -> _Walked:
     """The typed functions of a function of the model, for types of its parameters, with effects in their order."""
     collector = SourceCollector("@function")
     link_effects(effects, collector)

@@ -15,9 +15,8 @@ from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import SHUT_OFF
-from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import THERMAL, line_paths
-from ppafo.simulation.motion_kind import MotionKind
+from ppafo.simulation.motion_kind import Clock, MotionKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.declaration import (
@@ -47,7 +46,7 @@ class WalkMotion:
     It, and numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
 
-    motion_kind: MotionKind = field(compare=False)
+    motion_kind: MotionKind[Scenario] = field(compare=False)
     gait: Gait
     wearer: Wearer
     timing: str

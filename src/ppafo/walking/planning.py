@@ -60,8 +60,7 @@ def plan_walk(scenario: Scenario) -> Run:
 
     ScenarioError where it cannot be.
     """
-    planned: tuple[Run, tuple[Problem, ...]] = walk_of(scenario).motion_kind.plan(scenario)
-    run, problems = planned
+    run, problems = walk_of(scenario).motion_kind.plan(scenario)
     for is_bad, line in problems:
         if is_bad:
             raise ScenarioError(f"{scenario.origin.file or scenario.name}: {line(0)}")

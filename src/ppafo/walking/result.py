@@ -17,6 +17,7 @@ from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
 from ppafo.simulation import at_hand
+from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.oscillation import Oscillation, oscillation_of
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
@@ -317,9 +318,7 @@ def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
     return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")
 
 
-def measured(
-    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
-) -> tuple[Recording, Mapping[str, Metric], str]:
+def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:
     """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
     check_no_bottle(scenario)
     completed = Status("completed", None, "completed")

@@ -137,7 +137,7 @@ class Writing:
         self.device = device
         self.lines = lines
         self.program = program
-        self.add: Callable[[Callable[..., Any] | type], str] = collector.add
+        self.add = collector.add
         self.needs = collector.needs
         self.rows: dict[str, list[str]] = {}
 

@@ -27,6 +27,7 @@ from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, 
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.metrics.readable import ThermalTotals, Totals, real_totals, thermal_totals, totals
 from ppafo.model.columns import over_runs
+from ppafo.model.plain_function import PlainFunction
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
 
@@ -273,7 +274,7 @@ def metrics_entry(item: ExportedProgram, collector: SourceCollector, boundary: B
     program, groups = item.program, item.program.state_rows()
     names = [kind.name for kind in program.meters]
     kind: Any = ThermalTotals if program.is_thermal else Totals
-    make: Callable[..., Any] = thermal_totals if program.is_thermal else totals
+    make: PlainFunction = thermal_totals if program.is_thermal else totals
     if program.has_true_masses and not program.is_thermal:
         # Totals of a gas that is not ideal count true masses.
         make = real_totals

@@ -17,9 +17,8 @@ from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
-from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
-from ppafo.simulation.motion_kind import MotionKind
+from ppafo.simulation.motion_kind import Clock, MotionKind
 from ppafo.simulation.numbers import TIMES, Columns, clock_of, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
@@ -225,7 +224,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
     return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
 
 
-def rules_of(kind: MotionKind) -> tuple[Rule, ...]:
+def rules_of(kind: MotionKind[Scenario]) -> tuple[Rule, ...]:
     """The rules for the scenarios of a kind of motion."""
     of_device = _inconsistent, _misshapen, _beyond_the_table, _without_growth
     return *of_device, kind.rules, _second_regulator_above_the_first
