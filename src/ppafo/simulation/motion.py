@@ -193,7 +193,7 @@ def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, 
     shank = ProfileChoice(kind, reading.section(_SHANK, shank_settings(kind)))
     if kind != GAIT_SHANK:
         if not PROFILES[kind].is_smooth:
-            smooth = ", ".join([name for name, item in PROFILES.items() if item.is_smooth] + [GAIT_SHANK])
+            smooth = ", ".join([name for name, profile in PROFILES.items() if profile.is_smooth] + [GAIT_SHANK])
             raise reading.refusal(
                 f"{_SHANK}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
             )

@@ -129,10 +129,10 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
     The valve of another package is not known: then ``nominal_flow`` is 0, and the observer off.
     """
     valve, kind = device.valve, VALVES[device.valve.kind]
-    names = tuple(item.name for item in kind.quantities)
+    names = tuple(quantity.name for quantity in kind.quantities)
     is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
-    found = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
-    found |= {
+    terms = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
+    terms |= {
         "gas_product": Term(_MASS, product_of),
         "valve_conductance": _conductance(device, VALVE),
         "leak_conductance": _conductance(device, LEAK),
@@ -154,7 +154,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
         else Term(_ANY, no),
     }
     for name in ("opening_delay", "closing_delay", "switching_interval", "dead_band"):
-        found[name] = Term((f"valve.{name}",)) if name in names and is_known else Term(_ANY, no)
+        terms[name] = Term((f"valve.{name}",)) if name in names and is_known else Term(_ANY, no)
     for number, line in enumerate(SUPPLY_LINES, start=1):
         path = f"{SUPPLY_LINE}.{line}"
         of_line = {
@@ -162,9 +162,9 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
             "line_largest_flow": Term((f"{path}.largest_flow", *_MASS), as_content),
             "line_volume": Term((f"{path}.volume",)),
         }
-        found |= {f"{name}_{number}": Term(_ANY, no) if lines is None else term for name, term in of_line.items()}
-    found["line_relieving"] = Term(_ANY, yes if lines is not None and first(lines.relieving) else no)
-    return {NOMINAL[name]: term for name, term in found.items()}
+        terms |= {f"{name}_{number}": Term(_ANY, no) if lines is None else term for name, term in of_line.items()}
+    terms["line_relieving"] = Term(_ANY, yes if lines is not None and first(lines.relieving) else no)
+    return {NOMINAL[name]: term for name, term in terms.items()}
 
 
 def _conductance(device: Device, section: str) -> Term:

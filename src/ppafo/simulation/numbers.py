@@ -140,12 +140,12 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
-def _changing_form(scenario: Scenario, given: Collection[str]) -> list[str]:
+def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
     """Return the sections of the orifices that take the form in which they are not."""
     return [
         section
         for section in _ORIFICES
-        if any(f"{section}.{name}" in given for name in other_form(scenario.device, section))
+        if any(f"{section}.{name}" in paths for name in other_form(scenario.device, section))
     ]
 
 
@@ -267,11 +267,11 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
     """
     document = {section: dict(texts) for section, texts in given.items()}
     for path, value in times.items():
-        section, item = path.split(".")
+        section, key = path.split(".")
         # A rate takes the place of a period that the file has, and the reverse.
         if section == "controller":
             document[section] = {}
-        document[section][item] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
+        document[section][key] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
     return read_clock(Reading(name, document, frozenset(times)))
 
 

@@ -337,7 +337,7 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
     """
     valve = VALVES[device.valve.kind]
     chambers = chambers_of(device)
-    names = {item.name for item in valve.quantities}
+    names = {quantity.name for quantity in valve.quantities}
     timed = {"follow_time": valve.lag or valve.choose(valve_settings(device.valve)).command_delay}
     is_joint = controlled == ANGLE
     signals = (OfLeg if has_leg else OfJoint) if is_joint else (SignalsOfWalk if walks else Signals)
@@ -362,7 +362,7 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
     sources = (
         *chambers.sources,
         *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
-        *(f"valve.{name}" for name in (*orifice, *(item.name for item in valve.quantities))),
+        *(f"valve.{name}" for name in (*orifice, *(quantity.name for quantity in valve.quantities))),
         *late,
         *of_joint,
         *(LEG_PATHS if is_joint and has_leg else ()),
@@ -379,7 +379,7 @@ def loop_terms(
     ``controlled`` says what the law controls; with a leg the foot of it turns about the joint, too.
     """
     of_area, of_sonic = (_frames(device, walks, controlled, has_leg, sonic) for sonic in (False, True))
-    names = {item.name for item in VALVES[device.valve.kind].quantities}
+    names = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
 
     def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> Term:
         # A law of the angle alone has the torque loop inside it.
@@ -390,14 +390,14 @@ def loop_terms(
     def term(frame: PlainFunction, by: PlainFunction, *settings: str) -> Term:
         return in_its_form(device, VALVE, in_form(of_area, frame, by, settings), in_form(of_sonic, frame, by, settings))
 
-    found = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
+    terms = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
     for name, of_joint in _OF_JOINT.items() if TORQUE not in law.controls else ():
-        found[name] = term(gain_of_joint, of_joint, "controller.error_limit")
+        terms[name] = term(gain_of_joint, of_joint, "controller.error_limit")
     opening = opening_beyond_band if "dead_band" in names else gain_of_loop_and_setting
-    found[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
+    terms[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
     # An integral, and what is learnt, go with the proportional gain, also where that one is given.
-    gain = next((item.name for item in law.quantities if torque_loop.PROPORTIONAL_GAIN in item.follows), "")
+    gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
     path = f"controller.{gain}"
-    found[torque_loop.INTEGRAL_GAIN] = term(gain_of_loop_and_setting, torque_loop.integral_gain, path)
-    found[torque_loop.LEARNING_GAIN] = Term((path,), torque_loop.learning_gain)
-    return found
+    terms[torque_loop.INTEGRAL_GAIN] = term(gain_of_loop_and_setting, torque_loop.integral_gain, path)
+    terms[torque_loop.LEARNING_GAIN] = Term((path,), torque_loop.learning_gain)
+    return terms

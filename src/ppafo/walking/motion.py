@@ -85,21 +85,27 @@ SHORTEST_TASK_SEQUENCE = 1.0
 LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
-    **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
+    **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{
-        f"timing.{item.name}": ("controller", "settings", item.name)
+        f"timing.{quantity.name}": ("controller", "settings", quantity.name)
         for kind in TIMINGS.values()
-        for item in kind.quantities
+        for quantity in kind.quantities
     },
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
-        f"faults.{part}.{item.name}": ("motion", "faults" if part in FAULTY else "broken", part, "numbers", item.name)
+        f"faults.{part}.{quantity.name}": (
+            "motion",
+            "faults" if part in FAULTY else "broken",
+            part,
+            "numbers",
+            quantity.name,
+        )
         for part, kinds in FAULTS.items()
         for fault in kinds.values()
-        for item in fault.quantities
+        for quantity in fault.quantities
     },
-    **{f"shut_off.{item.name}": ("motion", "shut_off", item.name) for item in SHUT_OFF},
+    **{f"shut_off.{quantity.name}": ("motion", "shut_off", quantity.name) for quantity in SHUT_OFF},
 }
 """The attributes, or keys, that lead to the numbers of a walk that other scenarios have not."""
 
@@ -107,13 +113,13 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a walk beside its device's, by path."""
     motion, control = walk_of(scenario), scenario.controller
-    found = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
+    declared = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
     # An object in charge has no settings, and a timing is one of a controller that has some.
-    found["timing"] = tuple(item for item in found["timing"] if item.name in control.settings)
+    declared["timing"] = tuple(quantity for quantity in declared["timing"] if quantity.name in control.settings)
     for part, fault in {**motion.faults, **motion.broken}.items():
-        found[f"faults.{part}"] = fault_numbers(part, fault.kind)
-    found["shut_off"] = SHUT_OFF if motion.shut_off else ()
-    return by_path(found) | ({} if scenario.supply_lines is None else line_paths())
+        declared[f"faults.{part}"] = fault_numbers(part, fault.kind)
+    declared["shut_off"] = SHUT_OFF if motion.shut_off else ()
+    return by_path(declared) | ({} if scenario.supply_lines is None else line_paths())
 
 
 def record_interval(seconds: float) -> float:

@@ -95,8 +95,8 @@ def recording_of_walk(
 
 def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
     """Channels of the bottle of a walk with their units, straight between the times at which it met the device."""
-    found = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
-    return found | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
+    channels = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
+    return channels | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
 
 
 def with_cold_gas(run: Run, supply: SupplyCourse | None, time: Floats) -> Run:
@@ -124,13 +124,13 @@ def _task_sequence_channels(
         phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)
     )
     above = path.toes_over_ankle(shank, record["state.angle"]) - path.toes_over_ankle(shank, record["walk.now.ankle"])
-    found: dict[str, tuple[Any, str]] = {
+    channels: dict[str, tuple[Any, str]] = {
         "toe_height": (pace.stride * healthy + above, "m"),
         "stride_frequency": (pace.frequency, "Hz"),
     }
     if gait.walking_speed is not None:
-        found["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
-    return found
+        channels["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
+    return channels
 
 
 def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:
@@ -216,7 +216,7 @@ class WalkResult:
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
         width = max((len(name) for name in self.metrics), default=0)
-        lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
+        lines = [f"  {name:<{width}}  {metric.value:.4g} {metric.unit}" for name, metric in self.metrics.items()]
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *lines])
 

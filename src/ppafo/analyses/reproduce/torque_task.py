@@ -49,8 +49,8 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
         return PhasedRuns(np.array([solenoid.metrics["rms_error"].value]), np.array([gas]))
     fine = replace(scenario, run=replace(scenario.run, step=_FINE, output_interval=_FINE))
-    found = [run for tie in (_TIE, -_TIE) for run in _with_first_valve(fine, tie)]
-    errors, gas = np.array(found).T
+    runs = [run for tie in (_TIE, -_TIE) for run in _with_first_valve(fine, tie)]
+    errors, gas = np.array(runs).T
     return PhasedRuns(errors, gas)
 
 
@@ -169,10 +169,13 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
         both = [pair, replace(spool, controller=replace(spool.controller, settings=gains))]
         if level is not None:
             both = [
-                replace(item, reference=replace(item.reference, settings={**item.reference.settings, "level": level}))
-                for item in both
+                replace(
+                    scenario,
+                    reference=replace(scenario.reference, settings={**scenario.reference.settings, "level": level}),
+                )
+                for scenario in both
             ]
-        first, second = (simulate(item).metrics for item in both)
+        first, second = (simulate(scenario).metrics for scenario in both)
         names = ("rms_error", "gas_supplied")
         error, gas = (_PERCENT * (1.0 - second[name].value / first[name].value) for name in names)
         return error, gas
@@ -274,9 +277,9 @@ def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
     less = _PERCENT * (1.0 - faster / runs.errors)
     median, low, high = (float(end) for end in (np.median(less), less.min(), less.max()))
-    found = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
+    sentence = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
     claim = stated_claim(
-        entry.id, median, "undetermined", entry.note, ("the torque task as completed here",), None, found
+        entry.id, median, "undetermined", entry.note, ("the torque task as completed here",), None, sentence
     )
     return replace(claim, range=(low, high))
 
@@ -287,6 +290,6 @@ def _undetermined(identifier: str, error: float, other: float | str) -> Claim:
     if isinstance(other, str):
         return stated_claim(identifier, None, "undetermined", f"{entry.note} {other}.")
     value = _PERCENT * (other / error - 1.0)
-    found = f"{abs(value):.0f} % {'more' if value > 0.0 else 'less'} error"
+    sentence = f"{abs(value):.0f} % {'more' if value > 0.0 else 'less'} error"
     note = f"{entry.note} In this task {other:.3f} instead of {error:.3f} N m."
-    return stated_claim(identifier, value, "undetermined", note, ("the torque task as completed here",), None, found)
+    return stated_claim(identifier, value, "undetermined", note, ("the torque task as completed here",), None, sentence)

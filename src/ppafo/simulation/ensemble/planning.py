@@ -89,10 +89,10 @@ def screen_columns(columns: Columns) -> Screen:
     for rule in rules_of(columns.base.motion.motion_kind):
         # After each problem that some runs have, the others are checked again: their numbers may have fewer.
         while screen.members.size:
-            found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
-            if not found:
+            problems_left = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
+            if not problems_left:
                 break
-            screen.refuse(*found[0])
+            screen.refuse(*problems_left[0])
     return screen
 
 
@@ -101,12 +101,12 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
     unit = quantity.unit
 
     def line(run: int) -> str:
-        given = f"{path} = {values[run]:.9g} {unit}".rstrip()
+        said = f"{path} = {values[run]:.9g} {unit}".rstrip()
         if not np.isfinite(values[run]):
-            return f"{given}: is not a finite number"
+            return f"{said}: is not a finite number"
         if path in _WHOLE and values[run] != np.floor(values[run]):
-            return f"{given}: must be a whole number"
-        return f"{given}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
+            return f"{said}: must be a whole number"
+        return f"{said}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
 
     above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
     is_good = np.isfinite(values) & above & (values <= quantity.maximum)
@@ -193,8 +193,8 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
         return f"actuator: {problem}" if problem else ""
 
     # A kind checks single numbers, so the runs are gone through one by one.
-    found = [words(run) for run in range(varied[0].size)]
-    return ((np.array([bool(line) for line in found]), lambda run: found[run]),)
+    problems = [words(run) for run in range(varied[0].size)]
+    return ((np.array([bool(line) for line in problems]), lambda run: problems[run]),)
 
 
 def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:

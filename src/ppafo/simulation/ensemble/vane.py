@@ -73,13 +73,13 @@ def _profile_beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, 
     """A profile of a section that leaves its limits."""
     outside = _is_beyond(limits, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
-    found: dict[int, str] = {}
+    problems: dict[int, str] = {}
     for run in np.flatnonzero(outside).tolist():
         own = ProfileChoice(profile.kind, {name: at(value, run) for name, value in profile.settings.items()})
         duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
-        found[run] = profile_problem(limits.of_run(run), own, duration, step, section)
-        outside[run] = bool(found[run])
-    return outside, lambda run: found[run]
+        problems[run] = profile_problem(limits.of_run(run), own, duration, step, section)
+        outside[run] = bool(problems[run])
+    return outside, lambda run: problems[run]
 
 
 def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
@@ -88,13 +88,13 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Proble
     Times are read as those of a file are, once for each combination of them.
     """
     # Once for each combination: times are read as the texts of a file are, and an ensemble has few of them.
-    given = time_texts(base)
+    texts = time_texts(base)
     rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
     places = places.reshape(-1)
     reasons, table = [""] * len(rows), np.full((len(rows), 4), np.nan)
     for number, row in enumerate(rows.tolist()):
         try:
-            read = clock_with(base.name, given, dict(zip(times, row, strict=True)))
+            read = clock_with(base.name, texts, dict(zip(times, row, strict=True)))
         except ScenarioError as error:
             reasons[number] = str(error)
         else:

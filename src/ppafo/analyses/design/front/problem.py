@@ -51,8 +51,8 @@ _BY_PARTS = {
     "actuator.dead_volume_1": DEAD_VOLUME,
     "actuator.dead_volume_2": DEAD_VOLUME,
 }
-_AREA = {f"valve.{item.name}" for item in AREA_FORM}
-_SONIC = {f"valve.{item.name}" for item in SONIC_FORM}
+_AREA = {f"valve.{quantity.name}" for quantity in AREA_FORM}
+_SONIC = {f"valve.{quantity.name}" for quantity in SONIC_FORM}
 
 
 class VariableTable(StrictTable):
@@ -106,7 +106,7 @@ def read_variables(
     known = {path: quantity for scenario in everything for path, quantity in declared_numbers(scenario).items()}
     known = {path: quantity for path, quantity in known.items() if path not in _BY_PARTS} | OWN
     atmosphere = everything[0].device.supply.atmospheric_pressure
-    found = []
+    variables = []
     for path, table in tables.items():
         place = f"{file}: variables.'{path}'"
         _check_path(path, known, valves, place)
@@ -116,8 +116,8 @@ def read_variables(
             for kind, of_kind in scenarios.items()
         }
         kinds = () if all(having.values()) else tuple(kind for kind, has in having.items() if has)
-        found.append(replace(_variable(path, table, known[path], atmosphere, place), kinds=kinds))
-    return tuple(found)
+        variables.append(replace(_variable(path, table, known[path], atmosphere, place), kinds=kinds))
+    return tuple(variables)
 
 
 def _check_path(path: str, known: Mapping[str, Quantity], valves: Sequence[Part], place: str) -> None:
@@ -359,8 +359,8 @@ def _constraints(document: DesignFile, tasks: Sequence[Task], file: str) -> tupl
     # Gauge pressures count from the atmosphere, which may differ from task to task; a searched one is not known: 0.
     searched = [0.0] if ATMOSPHERE_PATH in document.variables else []
     scenarios = [scenario for task in tasks for scenario in task.scenarios.values()]
-    atmospheres = frozenset([*searched, *(item.device.supply.atmospheric_pressure for item in scenarios)])
-    found = []
+    atmospheres = frozenset([*searched, *(scenario.device.supply.atmospheric_pressure for scenario in scenarios)])
+    constraints = []
     for name, table in document.constraints.items():
         place = f"{file}: constraints.{name}"
         if name not in units:
@@ -379,5 +379,5 @@ def _constraints(document: DesignFile, tasks: Sequence[Task], file: str) -> tupl
             raise StudyError(
                 f"{place}: least = '{table.least}' is above most = '{table.most}'; no design can satisfy both"
             )
-        found.append(Constraint(_OWN_NAMES.get(name, name), units[name], least, most))
-    return tuple(found)
+        constraints.append(Constraint(_OWN_NAMES.get(name, name), units[name], least, most))
+    return tuple(constraints)

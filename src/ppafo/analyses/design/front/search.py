@@ -250,13 +250,13 @@ def search_front(
     """
     begun = time.monotonic()
     random = np.random.default_rng(settings.seed)
-    found = evenly_spread(settings.screening, choices, variables, settings.seed)
-    worth = evaluate(found)
+    evaluated = evenly_spread(settings.screening, choices, variables, settings.seed)
+    worth = evaluate(evaluated)
     best = survivors(worth, settings.population)
-    population, standing = found.at(best), worth.at(best)
+    population, standing = evaluated.at(best), worth.at(best)
     box = _box(worth)
     keep = non_dominated(worth) & worth.is_feasible
-    found, worth = found.at(keep), worth.at(keep)
+    evaluated, worth = evaluated.at(keep), worth.at(keep)
     growth = [(settings.screening, _dominated_fraction(worth, box))]
     while len(growth) <= settings.generations and not _has_settled(growth, settings.tolerance):
         children = vary(population, choices, random)
@@ -265,13 +265,13 @@ def search_front(
         best = survivors(standing, settings.population)
         population, standing = population.at(best), standing.at(best)
         good = value.is_feasible
-        found, worth = found.with_more(children.at(good)), worth.with_more(value.at(good))
+        evaluated, worth = evaluated.with_more(children.at(good)), worth.with_more(value.at(good))
         # Equal points do not dominate each other: without this one design would fill the front with its copies.
         _, once = np.unique(worth.objectives, axis=0, return_index=True)
         once.sort()
-        found, worth = found.at(once), worth.at(once)
+        evaluated, worth = evaluated.at(once), worth.at(once)
         keep = non_dominated(worth)
-        found, worth = found.at(keep), worth.at(keep)
+        evaluated, worth = evaluated.at(keep), worth.at(keep)
         # No design of the first sample kept the constraints: the first that do give the box.
         if box is None:
             box = _box(worth)
@@ -280,7 +280,7 @@ def search_front(
         designs, fraction = growth[-1]
         most = settings.screening + settings.generations * settings.population
         progress(Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs"))
-    return Front(found, worth, tuple(growth), _has_settled(growth, settings.tolerance))
+    return Front(evaluated, worth, tuple(growth), _has_settled(growth, settings.tolerance))
 
 
 def vary(population: Candidates, choices: int, random: np.random.Generator) -> Candidates:

@@ -281,7 +281,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
             )
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
-    gains = tuple(f"controller.{item.name}" for item in quantities if "(N m" in item.unit)
+    gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
     lowest, highest = _pressures(document, scenario, file)
     use = document.use
     if (use.repetitions is None) == (use.hours is None):
