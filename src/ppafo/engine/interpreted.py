@@ -67,16 +67,16 @@ def _entry(_types: str) -> Callable[[PlainFunction], PlainFunction]:
 def _with_views(entry: Callable[..., None], path: str, lines: list[str]) -> Callable[..., None]:
     """An entry that goes through its arrays as views; what a law does wrong is a ProgramError about its file."""
 
-    def called(*given: Any) -> None:
-        views: Any = (memoryview(item) if hasattr(item, "shape") else item for item in given)
+    def called(*arguments: Any) -> None:
+        views: Any = (memoryview(argument) if hasattr(argument, "shape") else argument for argument in arguments)
         try:
             entry(*views)
         except (AttributeError, IndexError, NameError, TypeError) as error:
             numbers = [at.lineno for at in traceback.extract_tb(error.__traceback__) if at.filename == path]
-            place = place_in(lines, numbers[-1] or 0) if numbers else None
-            if place is None:
+            origin = place_in(lines, numbers[-1] or 0) if numbers else None
+            if origin is None:
                 raise
-            raise refusal(place.file, place.line, str(error)) from error
+            raise refusal(origin.file, origin.line, str(error)) from error
 
     return called
 

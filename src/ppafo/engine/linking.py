@@ -118,10 +118,10 @@ def python_place(port: PlainFunction, effects: Sequence[Effect], rows: Sequence[
     composed = composed_with(port, effects)
     if composed is None:
         return None
-    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+    parameters = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
 
     def called(states: Mapping[str, Any], *own: float) -> Any:
-        return composed.function(*((given | dict(states))[row] for row in composed.needed), *own)
+        return composed.function(*((parameters | dict(states))[row] for row in composed.needed), *own)
 
     return called
 
@@ -131,10 +131,10 @@ def place_over_samples(port: PlainFunction, effects: Sequence[Effect], rows: Seq
     composed = composed_with(port, effects)
     if composed is None:
         return None
-    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+    parameters = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
 
     def called(states: Mapping[str, Any], *own: Any) -> Any:
-        of_effects = ((given | dict(states))[row] for row in composed.needed)
+        of_effects = ((parameters | dict(states))[row] for row in composed.needed)
         return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
 
     return called

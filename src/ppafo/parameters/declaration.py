@@ -111,7 +111,9 @@ def _by_path(
     for name, kind in valve_kinds:
         sections.append((f"valves.{name}", ORIFICE + VALVES[kind].quantities))
         sections.append((f"reported.valves.{name}", REPORTED_OF_A_VALVE))
-    declared = (replace(item, name=f"{section}.{item.name}") for section, items in sections for item in items)
+    declared = (
+        replace(quantity, name=f"{section}.{quantity.name}") for section, items in sections for quantity in items
+    )
     return MappingProxyType({quantity.name: quantity for quantity in declared})
 
 

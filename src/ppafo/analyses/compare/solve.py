@@ -97,8 +97,8 @@ def on_task(
             again = None
             if first.renoised is not None and other.renoised is not None:
                 again = (first.renoised[name], other.renoised[name])
-            found = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
-            pairs[other.configuration] += [] if found is None else [found]
+            compared = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
+            pairs[other.configuration] += [] if compared is None else [compared]
     best: dict[str, dict[str, Interval]] = {}
     judged = [case for case in cases if case.oscillation is None]
     rows = [case.rows for case in judged if case.rows is not None]

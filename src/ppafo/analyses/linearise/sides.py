@@ -26,7 +26,7 @@ class Sides:
         self._values, self._other_side = values, other_side
         self.edges: dict[str, Edge] = {}
 
-    def __call__(self, sign: str, left: Any, right: Any, place: str) -> bool:
+    def __call__(self, sign: str, left: Any, right: Any, where: str) -> bool:
         """Return whether the comparison of two expressions that stands at a place counts as true."""
         import casadi
 
@@ -44,8 +44,8 @@ class Sides:
         # Signs that are not in the table are == and !=: they have no edge.
         is_true = tests.get(sign, (left_value == right_value) == (sign == "=="))
         if sign in tests and abs(difference) <= ON_THE_EDGE * larger:
-            self.edges[place] = Edge(place, is_true)
-        return is_true != (place == self._other_side)
+            self.edges[where] = Edge(where, is_true)
+        return is_true != (where == self._other_side)
 
 
 def _direction(name: str, values: Mapping[str, float]) -> float:

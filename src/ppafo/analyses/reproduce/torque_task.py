@@ -123,12 +123,14 @@ def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[s
         if not np.isfinite(values).all():
             return stated_claim(identifier, None, "undetermined", note, rests_on, window)
         median, low, high = (float(end) for end in (np.median(values), values.min(), values.max()))
-        found = f"{median:.{decimals}f} {entry.unit}"
+        median_text = f"{median:.{decimals}f} {entry.unit}"
         if high > low:
-            found = f"{found} ({low:.{decimals}f} to {high:.{decimals}f})"
+            median_text = f"{median_text} ({low:.{decimals}f} to {high:.{decimals}f})"
         verdict: Verdict = "met_by_fitted_settings" if window[0] <= median <= window[1] else "undetermined"
         note = f"{note} Accepted from {window[0]:g} to {window[1]:g} {entry.unit}."
-        return replace(stated_claim(identifier, median, verdict, note, rests_on, window, found), range=(low, high))
+        return replace(
+            stated_claim(identifier, median, verdict, note, rests_on, window, median_text), range=(low, high)
+        )
 
     with np.errstate(divide="ignore", invalid="ignore"):
         better, saved = (_PERCENT * (1.0 - own / pair) for own, pair in ((error, runs.errors), (gas, runs.gas)))

@@ -103,11 +103,11 @@ def sweep_into_folder(
     if scheduler is not None:
         raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
     chosen = study_of(study, overrides)
-    place = Path(out or Path("out") / f"{chosen.name}-{metric}")
-    check_owned_folder(place, marked_folder("sweep"))
+    target = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(target, marked_folder("sweep"))
     most = MOST_DRAWS if draws is None else draws
     estimated = estimate(
         chosen, metric=metric, statistic=statistic, seed=seed, draws=most, threads=threads, progress=progress, **named
     )
-    estimated.save(place)
-    return replace(estimated, found=replace(estimated.found, folder=str(place)))
+    estimated.save(target)
+    return replace(estimated, found=replace(estimated.found, folder=str(target)))

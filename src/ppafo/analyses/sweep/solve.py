@@ -228,15 +228,15 @@ def sweep(
         # Before a folder is made: a wrong address must leave nothing.
         check_scheduler(scheduler)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
-    place = place_at(kept.name if kept is not None else str(out))
-    store = Store.claim(chosen, place, agreed, threads)
-    _work(Task(chosen, place.address, threads), store, scheduler, progress)
-    results = StudyResults(place, read_manifest(place), {}, kept)
+    location = place_at(kept.name if kept is not None else str(out))
+    store = Store.claim(chosen, location, agreed, threads)
+    _work(Task(chosen, location.address, threads), store, scheduler, progress)
+    results = StudyResults(location, read_manifest(location), {}, kept)
     summary = _summary(chosen, results)
     if chosen.outputs.bands:
-        place.write(BANDS, bands_file(chosen, results))
+        location.write(BANDS, bands_file(chosen, results))
     # Last, because a study counts as finished once its summary is there.
-    place.write(SUMMARY, f"{json_text(summary)}\n".encode())
+    location.write(SUMMARY, f"{json_text(summary)}\n".encode())
     return finding_of(replace(results, summary=summary))
 
 
@@ -254,7 +254,7 @@ def studies_of_the_package() -> list[dict[str, Any]]:
 
 def _work(task: Task, store: Store, scheduler: str | None, progress: Report | None) -> None:
     """Compute the chunks that are missing, and add a line on this session to the log."""
-    study, place, started = store.study, store.place, time.monotonic()
+    study, location, started = store.study, store.place, time.monotonic()
     known = store.finished()
     earlier, missing = sum(block.runs for block in known), set(range(chunk_count(study)))
     missing -= {block.number for block in known}
@@ -264,20 +264,20 @@ def _work(task: Task, store: Store, scheduler: str | None, progress: Report | No
         tally.add(finished.runs, finished.failed)
 
     # Rows change below: an old summary would pass for a finished study meanwhile.
-    if missing and SUMMARY in place.names():
-        place.remove(SUMMARY)
+    if missing and SUMMARY in location.names():
+        location.remove(SUMMARY)
     if scheduler is None:
         _compute_here(task, store, sorted(missing), count)
     else:
         from ppafo.analyses.sweep.cluster import compute_on_cluster
 
         compute_on_cluster(scheduler, replace(task, plugins=plugins_to_send()), sorted(missing), count)
-        place.tidy()
-        names = place.names()
+        location.tidy()
+        names = location.names()
         if any(note_file(number) not in names for number in missing):
             raise StudyError(
-                f"--scheduler {scheduler}: the workers finished chunks that are not in {place.address}: --out must be "
-                "a folder that they share with this machine, or an address such as s3://bucket/study"
+                f"--scheduler {scheduler}: the workers finished chunks that are not in {location.address}: --out must "
+                "be a folder that they share with this machine, or an address such as s3://bucket/study"
             )
     line = {
         "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
@@ -291,11 +291,11 @@ def _work(task: Task, store: Store, scheduler: str | None, progress: Report | No
         "seconds": round(time.monotonic() - started, 3),
     }
     try:
-        with place.open(LOG) as file:
+        with location.open(LOG) as file:
             before = file.read()
     except OSError:
         before = b""
-    place.write(LOG, before + f"{json.dumps(line)}\n".encode())
+    location.write(LOG, before + f"{json.dumps(line)}\n".encode())
 
 
 def _compute_here(task: Task, store: Store, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:

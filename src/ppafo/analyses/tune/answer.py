@@ -386,9 +386,9 @@ def _places(problem: Problem, after: Setting, starts: Sequence[Start]) -> Panel:
     searched = problem.searched
     rows = np.arange(len(searched))[::-1]
     ends = [
-        gain.fraction(float(gain.value(np.array(start.fractions[place]))))
+        gain.fraction(float(gain.value(np.array(start.fractions[row]))))
         for start in starts
-        for place, gain in enumerate(searched)
+        for row, gain in enumerate(searched)
     ]
     first = [float(np.clip(gain.fraction(gain.before), -0.05, 1.05)) for gain in searched]
     last = [gain.fraction(after.gains[gain.path]) for gain in searched]

@@ -248,7 +248,7 @@ def finding_of(design: Design) -> Finding[Design]:
             finding.Part(
                 "Designs",
                 _columns(design, points),
-                marked=[row for row, place in enumerate(design.shown) if place == design.knee],
+                marked=[row for row, point in enumerate(design.shown) if point == design.knee],
                 left=2,
             ),
             finding.Part(remarks=_remarks(design)),

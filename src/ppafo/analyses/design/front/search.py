@@ -153,16 +153,16 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     ys: list[float] = []
     volume = area = 0.0
     for (x, y, height), above in zip(ordered.tolist(), [*ordered[1:, 2].tolist(), last], strict=True):
-        place = bisect_left(xs, x)
-        level = ys[place - 1] if place else top
-        if level > y and not (place < len(xs) and xs[place] == x and ys[place] <= y):
+        step = bisect_left(xs, x)
+        level = ys[step - 1] if step else top
+        if level > y and not (step < len(xs) and xs[step] == x and ys[step] <= y):
             # What it dominates and no point before it did; the points that it dominates leave the staircase.
-            gained, start, end = 0.0, x, place
+            gained, start, end = 0.0, x, step
             while end < len(xs) and ys[end] >= y:
                 gained += (xs[end] - start) * (level - y)
                 start, level, end = xs[end], ys[end], end + 1
             area += gained + ((xs[end] if end < len(xs) else right) - start) * (level - y)
-            xs[place:end], ys[place:end] = [x], [y]
+            xs[step:end], ys[step:end] = [x], [y]
         volume += area * (above - height)
     return volume
 
@@ -189,7 +189,7 @@ def representatives(objectives: Floats, most: int = MAXIMUM_SHOWN) -> tuple[int,
     """
     scaled = fractions(objectives)
     chosen = list(dict.fromkeys([*np.argmin(objectives, axis=0).tolist(), knee(objectives)]))[:most]
-    distance = np.min([np.linalg.norm(scaled - scaled[place], axis=1) for place in chosen], axis=0)
+    distance = np.min([np.linalg.norm(scaled - scaled[point], axis=1) for point in chosen], axis=0)
     while len(chosen) < min(most, objectives.shape[0]) and distance.max() > 0.0:
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))

@@ -274,8 +274,8 @@ def _points(problem: DesignProblem, candidates: Candidates, assessed: Assessed) 
     """Return designs with what each task reports of each, and the numbers that mean something for its kind of valve."""
     numbers, is_noisy = values_of(problem, candidates), len(assessed.error) > 1
     means = {
-        task.name: (found[problem.error].mean(axis=0), found[GAS].mean(axis=0))
-        for task, found in zip(problem.tasks, assessed.tasks, strict=True)
+        task.name: (metrics[problem.error].mean(axis=0), metrics[GAS].mean(axis=0))
+        for task, metrics in zip(problem.tasks, assessed.tasks, strict=True)
     }
     points = []
     for row, choice in enumerate(candidates.choice.tolist()):
@@ -298,9 +298,9 @@ def _points(problem: DesignProblem, candidates: Candidates, assessed: Assessed) 
     return tuple(points)
 
 
-def _reason(points: tuple[DesignPoint, ...], place: int) -> str:
+def _reason(points: tuple[DesignPoint, ...], number: int) -> str:
     """Return why the knee is suggested, with what the nearest better designs of each objective cost."""
-    chosen = points[place].objectives
+    chosen = points[number].objectives
     said = []
     for index, name in enumerate(OBJECTIVES):
         others = [other for other in range(len(chosen)) if other != index]

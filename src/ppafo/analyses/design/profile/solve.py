@@ -123,7 +123,7 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
     needed = problem.repetitions * period
     # A second more than the use, so that a bottle that lasts is one whose time is up.
     schedule = Schedule(needed + 1.0, 0.0, max(needed, 1.0))
-    for place, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
+    for number, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
         changes = [
             f"{path}={entry.value} {entry.unit}"
             for path, entry in scaled_entries(part, paper.entries).items()
@@ -136,5 +136,5 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
             # Its regulator does not pass the flow even when it is full.
             continue
         if ended == TIME_IS_UP:
-            return part, place > 0
+            return part, number > 0
     return None, bool(enough)

@@ -56,7 +56,7 @@ _KEPT = 0.9
 """Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
 """Times the gauge pressure that are tried where no torque suffices."""
-_LESS_PRESSURE = tuple(0.95 - 0.05 * place for place in range(12))
+_LESS_PRESSURE = tuple(0.95 - 0.05 * step for step in range(12))
 """Times the gauge pressure that are tried where no bottle lasts."""
 _OFFERED = 5
 """Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
@@ -318,8 +318,8 @@ def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, 
     thrifty = sorted((device for device in tried if device.flow > 0.0), key=lambda device: -device.torque / device.flow)
     # Actuators of the same numbers walk alike: one of them is enough.
     pairs = list({(device.valve.name, device.torque, device.flow): device for device in thrifty}.values())[:_OFFERED]
-    for place, share in enumerate(_LESS_PRESSURE):
-        report(Progress("walking at less pressure", place, len(_LESS_PRESSURE), noun="pressures"))
+    for number, share in enumerate(_LESS_PRESSURE):
+        report(Progress("walking at less pressure", number, len(_LESS_PRESSURE), noun="pressures"))
         asked = wish.at_gauge(share)
         if STANDARD_ATMOSPHERE < asked.pressure < wish.pressure:
             lower += [
