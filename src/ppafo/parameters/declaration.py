@@ -119,6 +119,9 @@ def _by_path(
 
 def limits_text(quantity: Quantity) -> str:
     """Return the limits of a declaration with their unit as a message states them: ``at least 0 and at most 1 m``."""
-    lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+    beyond, unit = (
+        "at least" if quantity.minimum_allowed else "more than",
+        "" if quantity.unit == "1" else quantity.unit,
+    )
     upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
-    return f"{lower}{upper} {'' if quantity.unit == '1' else quantity.unit}".rstrip()
+    return f"{beyond} {quantity.minimum:g}{upper} {unit}".rstrip()

@@ -446,6 +446,7 @@ def limits(quantity: Quantity, atmosphere: float) -> str:
         f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""
         for limit in (quantity.minimum, quantity.maximum)
     )
-    parts = [f"{'at least' if quantity.minimum_allowed else 'more than'} {lower}"] if lower else []
+    beyond = "at least" if quantity.minimum_allowed else "more than"
+    parts = [f"{beyond} {lower}"] if lower else []
     parts += [f"at most {upper}"] if upper else []
     return " and ".join(parts)

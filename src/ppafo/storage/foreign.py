@@ -242,11 +242,8 @@ def _check_keys(columns: ColumnMap) -> None:
             if getattr(mapped, key) is not None:
                 raise DataError(f"channels.{name}.{key} is a key of channels.{TIME} alone")
         if len(sources) != 1:
-            keys = (
-                f"{'both' if len(sources) == 2 else 'all of'} a {' and a '.join(sources)}"
-                if sources
-                else f"no {may[2:]}"
-            )
+            several = "both" if len(sources) == 2 else "all of"
+            keys = f"{several} a {' and a '.join(sources)}" if sources else f"no {may[2:]}"
             raise DataError(f"channels.{name} gives {keys}; give one of them")
 
 
@@ -570,7 +567,7 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
 
     with refused_as(DataError, f"direction.of = {wanted.of!r}", DataError):
         unit = recording.unit(wanted.of)
-    rate_unit = f"{'1' if unit == PLAIN_NUMBER else unit.removesuffix('_d')}/s"
+    rate_unit = "1/s" if unit == PLAIN_NUMBER else f"{unit.removesuffix('_d')}/s"
     with refused_as(DataError, f"direction.threshold = {wanted.threshold!r}", UnitError):
         threshold = parse_quantity(wanted.threshold, rate_unit)
     with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):

@@ -50,10 +50,8 @@ class MatlabFile:
 
     def said_of_objects(self) -> str:
         """Return what to do with the objects of the file, as the end of a message; nothing where there are none."""
-        return "".join(
-            f"; {name}{f' ({kind})' if kind else ''} is an object that only MATLAB reads, {_plainly(name, kind)}"
-            for name, kind in self.objects
-        )
+        named = ((f"{name} ({kind})" if kind else name, _plainly(name, kind)) for name, kind in self.objects)
+        return "".join(f"; {called} is an object that only MATLAB reads, {remedy}" for called, remedy in named)
 
 
 _OF_TABLE = "s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"

@@ -140,7 +140,8 @@ class CTerms:
             case "convert":
                 return self.conversion(term)
             case "negative" | "not":
-                return f"{'-' if term.kind == 'negative' else '!'}{self.term(term.parts[0], _ATOM)}", _SIGN
+                sign = "-" if term.kind == "negative" else "!"
+                return f"{sign}{self.term(term.parts[0], _ATOM)}", _SIGN
             case "choice":
                 test, yes, no = (self.term(part, _CHOICE + 1) for part in term.parts)
                 return f"{test} ? {yes} : {no}", _CHOICE
@@ -162,7 +163,8 @@ class CTerms:
                 index = str(term.detail) if len(term.parts) == 1 else self.term(term.parts[1])
                 kind = term.parts[0].type
                 is_uniform = isinstance(kind, Items) and kind.is_uniform
-                text = f"{self.term(term.parts[0], _ATOM)}.item{f'[{index}]' if is_uniform else f'_{index}'}"
+                member = f"item[{index}]" if is_uniform else f"item_{index}"
+                text = f"{self.term(term.parts[0], _ATOM)}.{member}"
             case "element":
                 text = self.element(term)
             case "extent":
@@ -183,7 +185,8 @@ class CTerms:
             return f"{name}[{index}]{''.join(f'[{self.term(index)}]' for index in further)}"
         for number, place in enumerate(further, 1):
             # Arrays are one block of memory: the last index runs fastest, and extents are known only at run time.
-            index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
+            before = index if number == 1 else f"({index})"
+            index = f"{before} * {name}.extent[{number}] + {self.term(place, 9)}"
         return f"{name}.values[{index}]"
 
     def call(self, term: Term) -> str:
@@ -191,7 +194,8 @@ class CTerms:
         if term.kind in ("min", "max") and term.type in (INT, INT16, INT32):
             # The second operand first, as Python's min and max have it for equal numbers.
             first, second = (self.term(part, 6) for part in term.parts)
-            return f"({second} {'<' if term.kind == 'min' else '>'} {first} ? {second} : {first})"
+            sign = "<" if term.kind == "min" else ">"
+            return f"({second} {sign} {first} ? {second} : {first})"
         if term.kind == "call":
             function = self.functions.get(term.detail, term.detail)
         elif term.kind == "build":
@@ -480,13 +484,14 @@ class _Writer:
         self.locals[function.name] = writer.used
         returns = "void" if function.returns is None else self.type_name(function.returns)
         changed = writer.scopes.changes.get(id(function.body), {})
-        parameters = ", ".join(
-            f"{'const ' if isinstance(kind, Shared) and name not in changed else ''}{self.type_name(kind)}"
-            f"{'' if isinstance(kind, Shared) else TIED}{writer.name(name)}"
-            for name, kind in function.parameters
-        )
+        declared = []
+        for name, kind in function.parameters:
+            constant = "const " if isinstance(kind, Shared) and name not in changed else ""
+            between = "" if isinstance(kind, Shared) else TIED
+            declared.append(f"{constant}{self.type_name(kind)}{between}{writer.name(name)}")
+        parameters = ", ".join(declared)
         is_shown = function.is_entry and self.reading is None
-        linkage = f"{'PPAFO_ENTRY' if is_shown else 'PPAFO_INLINE'} {returns}"
+        linkage = f"PPAFO_ENTRY {returns}" if is_shown else f"PPAFO_INLINE {returns}"
         head = _wrapped(f"{linkage} {self.functions.get(function.name, function.name)}({parameters or 'void'})")
         bound = [f"Here {text}." for text in function.bound]
         said = _comment(self.documents.get(function.source, ""), bound)

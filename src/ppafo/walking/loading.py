@@ -219,11 +219,9 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
     )
-    named = tuple(
-        # The path of a file in full means the same from any folder.
-        f"{path}={Path(name).absolute() if Path(name).suffix == '.toml' else name}"
-        for path, name in instead.items()
-    )
+    # The path of a file in full means the same from any folder.
+    full = {path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in instead.items()}
+    named = tuple(f"{path}={name}" for path, name in full.items())
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     room = device.supply.atmospheric_pressure

@@ -140,10 +140,11 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     shortest = SHORTEST_TASK_SEQUENCE if has_task_sequence else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
     fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
 
+    least = "a second of a task sequence" if has_task_sequence else f"{SHORTEST_STRIDES} strides"
+
     def line(run: int) -> str:
         return (
-            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min "
-            f"({'a second of a task sequence' if has_task_sequence else f'{SHORTEST_STRIDES} strides'}) or more, and "
+            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min ({least}) or more, and "
             f"at most {LONGEST_MINUTES:g} min"
         )
 

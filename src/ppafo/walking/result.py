@@ -315,7 +315,8 @@ def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
         return Status("completed", None, "completed")
     # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
     time = failed if failed < NEVER_FAILED else 0.0
-    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")
+    remedy = TOO_MANY_PARTS if too_many_parts else REMEDY
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {remedy}")
 
 
 def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:

@@ -147,7 +147,7 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
             yield index, f"radius must be at least {TIGHTEST:g} m, either way"
         lengths = [name for name in ("duration", "strides") if name in values]
         if segment.kind in ("walk", "ramp", "stairs", "turn") and len(lengths) != 1:
-            yield index, f"give either duration or strides{', not both' if lengths else ''}"
+            yield index, "give either duration or strides" + (", not both" if lengths else "")
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
             yield index, "give the speed or the cadence at its end"
         walks = segment.kind not in _STANDING

@@ -299,11 +299,10 @@ def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:
     if abs(wearer.stature - (own or paper_subject().stature)) <= _SAME * wearer.stature:
         return ""
     low, high = STATURES
-    known = f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
-    return (
-        f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
-        f"{'' if low <= wearer.stature <= high else known}; the curves of the gait are not scaled by stature"
-    )
+    remark = f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
+    if not low <= wearer.stature <= high:
+        remark += f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
+    return f"{remark}; the curves of the gait are not scaled by stature"
 
 
 SCALED_MASS = (0.6, 1.7)

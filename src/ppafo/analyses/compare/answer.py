@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.analyses.compare.pairs import Paired, pareto_front
+from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Interval, Kind, of_metric
@@ -125,8 +126,7 @@ def finding_of(comparison: Compared) -> Finding[Compared]:
     names = comparison.configurations
     has_errors = _ERROR in comparison.metrics
     said = [_READING] if comparison.draws else []
-    counts = ((len(comparison.tasks), "task"), (len(comparison.varied), "uncertain value"))
-    tasks, values = (f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
+    tasks, values = count_of(len(comparison.tasks), "task"), count_of(len(comparison.varied), "uncertain value")
     lead = f"{len(names)} configurations on {tasks}, baseline {comparison.baseline}; "
     if not comparison.draws:
         lead += "the nominal device, without uncertainty"

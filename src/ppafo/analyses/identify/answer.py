@@ -10,8 +10,8 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import plain
-from ppafo.errors import DataError
-from ppafo.identification.bench.result import BenchResult, bench_figure, count_of, figure_3
+from ppafo.errors import DataError, count_of
+from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
@@ -146,8 +146,9 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
-    number = count_of(len(written), "value") if written else "no value"
-    count = f"{number} of the set identified{': ' if written else ''}{', '.join(written)}"
+    count = "no value of the set identified"
+    if written:
+        count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
     return Finding(
@@ -243,11 +244,10 @@ def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
             f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
         )
     rest = len(known) - len(shown)
-    return (
-        [*rows, f"{count_of(rest, 'other tolerance')} {'does' if rest == 1 else 'do'} not affect the intervals"]
-        if rest
-        else rows
-    )
+    if rest:
+        do = "does" if rest == 1 else "do"
+        rows.append(f"{count_of(rest, 'other tolerance')} {do} not affect the intervals")
+    return rows
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:

@@ -339,11 +339,14 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     for kind, variable in shown:
         of_item = Kind("", "" if variable.unit == "1" else variable.unit, quantity_of_unit(variable.unit), ".5g")
         point.append((kind, variable.name, variable.unit, of_item.text(variable.value)))
-    edges = [
-        f"the point lies on an edge, with another linear model beyond: `{edge.place.partition(': ')[2]}` in "
-        f"{edge.place.partition(': ')[0]} was taken to be {'true' if edge.is_true else 'false'}"
-        for edge in model.edges
-    ]
+    edges = []
+    for edge in model.edges:
+        function, _, comparison = edge.place.partition(": ")
+        taken = "true" if edge.is_true else "false"
+        edges.append(
+            f"the point lies on an edge, with another linear model beyond: `{comparison}` in {function} was taken to "
+            f"be {taken}"
+        )
     parts = [
         Part("The point", columns_of(("", "name", "unit in the model", "at the point"), point), left=3),
         Part("Which side was taken", facts(model.sides.items()), remarks=edges),

@@ -81,8 +81,11 @@ def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "against a stop" if is_at_stop else "sticks: friction holds it"
-    valve = f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {max(openings):.4g}" if any(openings) else ""
-    return {"valve": valve or "closed", joint.name: vane, **said}
+    valve = "closed"
+    if any(openings):
+        chamber = 1 if openings.source_1 > 0.0 else 2
+        valve = f"feeds chamber {chamber}, open by {max(openings):.4g}"
+    return {"valve": valve, joint.name: vane, **said}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:

@@ -41,7 +41,8 @@ class AssumedValue:
 
     def sentence(self) -> str:
         """Return the value and its reason on one line."""
-        return f"{self.path} = {self.value}: {self.reason}{f' ({self.source})' if self.source else ''}"
+        source = f" ({self.source})" if self.source else ""
+        return f"{self.path} = {self.value}: {self.reason}{source}"
 
 
 def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...]:

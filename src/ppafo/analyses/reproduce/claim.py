@@ -150,7 +150,7 @@ def told_claim(
         note=" ".join((*notes, "Each statement with its numbers is listed below.")),
         assumptions=assumptions,
         words=f"{len(observations)} statements",
-        found=f"{plain} shown{f', {len(reserved)} with a reservation' if reserved else ''}",
+        found=f"{plain} shown, {len(reserved)} with a reservation" if reserved else f"{plain} shown",
     )
 
 

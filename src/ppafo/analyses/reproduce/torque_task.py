@@ -11,7 +11,7 @@ import numpy as np
 
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.errors import ParameterError, ScenarioError, SimulationError
+from ppafo.errors import ParameterError, ScenarioError, SimulationError, count_of
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
@@ -197,7 +197,7 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
     def reversals(number: int | None, part: str) -> str:
         if number is None:
             return f"this reference has no {part}"
-        return f"{number} torque reversal{'' if number == 1 else 's'} on the {part}"
+        return f"{count_of(number, 'torque reversal')} on the {part}"
 
     ramp, hold = count(solenoid, "ramp"), count(solenoid, "hold")
     own_ramp, own_hold = count(proportional, "ramp"), count(proportional, "hold")
@@ -292,6 +292,7 @@ def _undetermined(identifier: str, error: float, other: float | str) -> Claim:
     if isinstance(other, str):
         return stated_claim(identifier, None, "undetermined", f"{entry.note} {other}.")
     value = _PERCENT * (other / error - 1.0)
-    sentence = f"{abs(value):.0f} % {'more' if value > 0.0 else 'less'} error"
+    more = "more" if value > 0.0 else "less"
+    sentence = f"{abs(value):.0f} % {more} error"
     note = f"{entry.note} In this task {other:.3f} instead of {error:.3f} N m."
     return stated_claim(identifier, value, "undetermined", note, ("the torque task as completed here",), None, sentence)

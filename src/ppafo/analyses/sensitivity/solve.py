@@ -253,9 +253,10 @@ def _part(influences: Influences, metric: OfMetric) -> Part:
     ends = [None if math.isnan(change[row]) else f"± {kind.change_number(band[row], '.2g')}" for row in order]
     shown = [None if math.isnan(change[row]) else change[row] for row in order]
     columns += [Column("change, 5 to 95 %", shown, kind, is_change=True), Column("band", ends)]
-    label = METHODS[influences.method].sizes_label
-    dropped = f"; {metric.dropped_blocks:,} of {influences.settings.samples:,} {label} left out"
-    heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}{dropped if metric.dropped_blocks else ''}"
+    heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}"
+    if metric.dropped_blocks:
+        label = METHODS[influences.method].sizes_label
+        heading += f"; {metric.dropped_blocks:,} of {influences.settings.samples:,} {label} left out"
     return Part(heading, columns, remarks=remarks(influences, metric))
 
 

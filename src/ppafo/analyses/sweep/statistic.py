@@ -412,9 +412,11 @@ def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise
             f"if it lay beyond the others by their range, {kind.change(span)}, the mean would move by up to "
             f"{kind.change(share * span)}, and more the further it lies"
         )
+        if are_equal:
+            moved = f"it would move the mean by up to {share:.2g} times its distance"
         said.append(
             f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): "
-            f"{f'it would move the mean by up to {share:.2g} times its distance' if are_equal else moved}"
+            f"{moved}"
         )
     if noise is not None:
         said.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
@@ -444,8 +446,9 @@ def _finding(estimated: Estimate, statistic: Statistic, rule: StoppingRule) -> F
     )
     rows = []
     for look in looks:
-        met = "narrow enough" if rule.is_narrow(look.interval) else ""
-        met += "" if look.is_carried else f"{', but ' if met else ''}its effective sample size is small"
+        said_of_look = ["narrow enough"] if rule.is_narrow(look.interval) else []
+        said_of_look += [] if look.is_carried else ["its effective sample size is small"]
+        met = ", but ".join(said_of_look)
         ends = (kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high))
         reach = kind.change(look.interval.width) if math.isfinite(look.interval.width) else f"{look.interval.width:.3g}"
         rows.append((f"{look.draws:,}", f"{look.missing:,}", *ends, reach, met))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ppafo.analyses.tune.problem import Gains, Problem, Term
+from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -294,7 +295,7 @@ def _remarks(
     """Return how the search went and what it leaves open."""
     settled = sum(start.is_settled for start in starts)
     said = [
-        f"{len(starts)} start{'' if len(starts) == 1 else 's'}, {sum(start.candidates for start in starts):,} "
+        f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "
         f"candidates, {runs:,} runs; {settled} of {len(starts)} converged before the maximum number of "
         "generations"
     ]

@@ -175,7 +175,8 @@ class Spread:
             return f"{100.0 * self.fraction:g} % quantile"
         if self.deviations == 0.0:
             return "mean"
-        return f"mean and {self.deviations:g} standard deviation{'' if self.deviations == 1.0 else 's'}"
+        noun = "standard deviation" if self.deviations == 1.0 else "standard deviations"
+        return f"mean and {self.deviations:g} {noun}"
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
         """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
@@ -332,9 +333,8 @@ def _goal(goal: Goal) -> Term:
 def _constraint(constraint: Constraint, atmosphere: float | None) -> Limit:
     bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
     if len(bounds) != 1:
-        raise StudyError(
-            f"constraint '{constraint.metric}': needs either at_most or at_least, it has {'both' if bounds else 'none'}"
-        )
+        has = "both" if bounds else "none"
+        raise StudyError(f"constraint '{constraint.metric}': needs either at_most or at_least, it has {has}")
     limit = level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
     return Limit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.errors import count_of
 from ppafo.parameters.device import Device
 from ppafo.report.display_units import display_value, gauge_shift, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
@@ -171,7 +172,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     return Finding(
         name="validate",
         kicker="Validation of a parameter set",
-        title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
+        title=f"{validation.device.name} against {count_of(count, 'recording')}",
         said=said,
         parts=(
             Part(said=[method], is_detail=True),
@@ -224,9 +225,10 @@ def _why(causes: Causes, without: float) -> str:
     wrong samples, which are seen whatever else is wrong.
     """
     if causes.found is not None:
-        others = f" (or, the same for these recordings: {', '.join(cause.name for cause in causes.found.same)})"
-        usual = ", as on any bench" if causes.found.is_usual else ""
-        return f"{in_words(causes.found)}{usual}{others if causes.found.same else ''}"
+        verdict = in_words(causes.found)
+        verdict += ", as on any bench" if causes.found.is_usual else ""
+        same = ", ".join(cause.name for cause in causes.found.same)
+        return f"{verdict} (or, the same for these recordings: {same})" if same else verdict
     if not causes.tried:
         return ""
     nearest = causes.nearest

@@ -256,7 +256,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
     set_up = (
         configuration.description,
-        f"device '{configuration.device.name}', gait '{gait.name}'{f' ({gait.title})' if gait.title else ''}",
+        f"device '{configuration.device.name}', gait '{gait.name}'" + (f" ({gait.title})" if gait.title else ""),
         law_of(configuration).summary,
         f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
         if configuration.origin.overrides
@@ -387,7 +387,8 @@ def default_folder(values: Mapping[str, Any]) -> Path:
     configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
     walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
     along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
-    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
+    kind = "walk" if values["wearers"] is None else "wearers"
+    return Path("out") / f"{kind}-{configuration.name}{along}"
 
 
 def reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:

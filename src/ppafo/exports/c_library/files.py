@@ -278,10 +278,11 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
 def _said(quantity: Quantity) -> str:
     """What a setting is, and its range."""
     low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
-    above = "" if low is None else f"{'from' if quantity.minimum_allowed else 'above'} {low:g}"
+    beyond = "from" if quantity.minimum_allowed else "above"
+    above = "" if low is None else f"{beyond} {low:g}"
     below = "" if high is None else f"up to {high:g}"
     limits = " ".join(filter(None, (above, below)))
-    return f"{quantity.summary or quantity.name}{'; ' if limits else ''}{limits}"
+    return "; ".join(filter(None, (quantity.summary or quantity.name, limits)))
 
 
 def conditions_of_program(library: Library) -> list[tuple[str, str]]:
@@ -444,6 +445,8 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
     forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
+    gas = "thermal" if is_thermal else "isothermal"
+    let = "let" if device.supply.relieving else "do not let"
     return [
         *(
             f"the form of the {name}, `sonic_conductance, critical_ratio`"
@@ -451,8 +454,7 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
             else f"the form of the {name}, `area, discharge_coefficient`"
             for name, orifice in forms.items()
         ),
-        f"the gas, `{'thermal' if is_thermal else 'isothermal'}`; {lines}, which "
-        f"{'let' if device.supply.relieving else 'do not let'} gas back in from a chamber above them",
+        f"the gas, `{gas}`; {lines}, which {let} gas back in from a chamber above them",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
 

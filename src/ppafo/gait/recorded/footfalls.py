@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError
+from ppafo.errors import DataError, count_of
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
@@ -389,7 +389,7 @@ def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[li
     moved = [Stride(stride.start + strike, stride.toe_off + off, stride.end + strike) for stride in strides]
     return moved, (
         f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
-        f"toe-offs by {1000.0 * off:.0f} ms as {len(early)} contact{'' if len(early) == 1 else 's'} on plates show"
+        f"toe-offs by {1000.0 * off:.0f} ms as {count_of(len(early), 'contact')} on plates show"
     )
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.errors import DataError, PpafoError, count_of, noted_in, raise_noted
 from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
@@ -592,7 +592,7 @@ def _check_enough(strides: Strides, usable: list[Stride], walk: Mapping[str, Sig
     if taken >= least:
         return
     spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
-    count = f"{taken} whole stride{'' if taken == 1 else 's'}"
+    count = count_of(taken, "whole stride")
     where = list(walk)[-1]
     events = (
         f"{len(usable)} in the events" if usable else f"no heel strikes were found in {where}: is it the right column?"

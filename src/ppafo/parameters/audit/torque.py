@@ -198,10 +198,8 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
             sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
             paragraph=(
                 f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {held:.3g} N m, published "
-                f"are {torque:.3g} "
-                "N m. This speaks of the torque constant alone: a vane at rest has any volume."
-                f"{f' {note}' if note else ''}"
-            ),
+                f"are {torque:.3g} N m. This speaks of the torque constant alone: a vane at rest has any volume. {note}"
+            ).rstrip(),
         )
         if name == "walking":
             yield from _while_walking(evidence, numbers[1], numbers[2])

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import ParameterError, UnitError
+from ppafo.errors import ParameterError, UnitError, count_of
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
@@ -72,15 +72,16 @@ def check_missing(evidence: Evidence) -> Iterator[Finding]:
             missing += missing_values(parameter_set, valve)
     if missing:
         paths = tuple(dict.fromkeys(missing))
+        are, them = ("is", "it") if len(paths) == 1 else ("are", "them")
         yield Finding(
             id="missing-values",
             severity="warning",
-            title=f"no device yet: {len(paths)} value{' is' if len(paths) == 1 else 's are'} missing",
+            title=f"no device yet: {count_of(len(paths), 'value')} {are} missing",
             values=(),
             sides=(),
             paragraph=(
-                f"A device needs more: {', '.join(paths)}. Add {'it' if len(paths) == 1 else 'them'} to the file or as "
-                "overrides. What rests on missing values is not audited."
+                f"A device needs more: {', '.join(paths)}. Add {them} to the file or as overrides. "
+                "What rests on missing values is not audited."
             ),
         )
 

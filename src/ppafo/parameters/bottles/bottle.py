@@ -405,10 +405,10 @@ def _check_content(bottle: Bottle, file: str) -> None:
     if bottle.mass >= most:
         volume = bottle.entries["bottle.volume"]
         fill = "bottle.gas_mass" if "bottle.gas_mass" in bottle.entries else "bottle.fill_pressure"
+        limit = "liquid would fill it at" if wet else "the property table ends at"
         raise ParameterError(
             f"{file}: {GRAMS_PER_KILOGRAM * bottle.mass:.4g} g of {fluid.name} do not fit into "
-            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: "
-            f"{'liquid would fill it at' if wet else 'the property table ends at'} "
+            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: {limit} "
             f"{GRAMS_PER_KILOGRAM * most:.4g} g; set {fill} or room.temperature lower, or bottle.volume higher"
         )
     content = bottle_content(fluid.table, bottle.mass, bottle.volume, temperature)

@@ -89,8 +89,9 @@ def over_time_figure(result: WalkResult) -> "Figure":
             else:
                 named.append((begin, [part.replace("_", " ")]))
         for number, (begin, words) in enumerate(named):
+            fail = "fails" if len(words) == 1 else "fail"
             axes.annotate(
-                f"{', '.join(words)} {'fails' if len(words) == 1 else 'fail'}",
+                f"{', '.join(words)} {fail}",
                 (begin / scale, 0.98 - 0.16 * (number % 2)),
                 xycoords=("data", "axes fraction"),
                 ha="left" if begin < 0.6 * end else "right",

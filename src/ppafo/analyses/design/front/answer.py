@@ -229,9 +229,9 @@ def finding_of(design: Design) -> Finding[Design]:
     carried = ", ".join(part.title for part in problem.carried)
     front = (
         "No other design found beats one below in tracking error, gas per task and mass together: less of one of the "
-        "three costs more of "
-        f"another.{f' Every design carries {carried}; their mass is in the table.' if carried else ''}"
+        "three costs more of another."
     )
+    front += f" Every design carries {carried}; their mass is in the table." if carried else ""
     tasks = [
         (task.name, task.weight, ", ".join(f"{scenario.name} ({kind})" for kind, scenario in task.scenarios.items()))
         for task in problem.tasks
