@@ -23,7 +23,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
-from ppafo.simulation.nominal import VALVE, flow_of_area, flow_of_sonic, in_its_form
+from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
 PERIOD_PATH = "controller.period"
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
@@ -48,48 +48,55 @@ class FlowNumbers(NamedTuple):
     orifice_2: Annotated[float, Number("", "discharge coefficient or critical ratio")]
 
 
+_Seconds = Annotated[float, Number("s", "")]
+_Hertz = Annotated[float, Number("Hz", "")]
+_Inertia = Annotated[float, Number("kg m^2", "")]
+_Torque = Annotated[float, Number("N m", "")]
+_Damping = Annotated[float, Number("N m s/rad", "")]
+
+
 class Signals(NamedTuple):
     """Sample period and age of a measurement [s], bandwidth of the pressure sensors [Hz]."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
-    delay: Annotated[float, Number("s", "")]
+    period: _Seconds
+    bandwidth: _Hertz
+    delay: _Seconds
 
 
 class SignalsOfWalk(NamedTuple):
-    """The same of a walk, whose measurements are not old."""
+    """Sample period [s] and bandwidth of the pressure sensors [Hz] of a walk, whose measurements are not old."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
+    period: _Seconds
+    bandwidth: _Hertz
 
 
 class OfJoint(NamedTuple):
     """Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
-    delay: Annotated[float, Number("s", "")]
-    angle_bandwidth: Annotated[float, Number("Hz", "")]
-    inertia: Annotated[float, Number("kg m^2", "")]
-    gravity_torque: Annotated[float, Number("N m", "")]
-    viscous_damping: Annotated[float, Number("N m s/rad", "")]
-    dynamic_torque: Annotated[float, Number("N m", "")]
+    period: _Seconds
+    bandwidth: _Hertz
+    delay: _Seconds
+    angle_bandwidth: _Hertz
+    inertia: _Inertia
+    gravity_torque: _Torque
+    viscous_damping: _Damping
+    dynamic_torque: _Torque
 
 
 class OfLeg(NamedTuple):
-    """The same with the foot of a leg: mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
+    """Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
-    delay: Annotated[float, Number("s", "")]
-    angle_bandwidth: Annotated[float, Number("Hz", "")]
-    inertia: Annotated[float, Number("kg m^2", "")]
-    gravity_torque: Annotated[float, Number("N m", "")]
-    viscous_damping: Annotated[float, Number("N m s/rad", "")]
-    dynamic_torque: Annotated[float, Number("N m", "")]
+    period: _Seconds
+    bandwidth: _Hertz
+    delay: _Seconds
+    angle_bandwidth: _Hertz
+    inertia: _Inertia
+    gravity_torque: _Torque
+    viscous_damping: _Damping
+    dynamic_torque: _Torque
     foot_mass: Annotated[float, Number("kg", "")]
     foot_mass_centre: Annotated[float, Number("m", "")]
-    foot_inertia: Annotated[float, Number("kg m^2", "")]
+    foot_inertia: _Inertia
 
 
 def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
@@ -135,7 +142,7 @@ def time_of_spool(valve: Any, period: float) -> float:
 
 
 def time_of_pair(valve: Any, period: float) -> float:
-    """The same of a pair of on/off valves: a coil waits for its next switching, where that is longer."""
+    """Time [s] from a sample to the flow of a pair of on/off valves: a coil may wait for its next switching, too."""
     delay: float = max(valve.opening_delay, valve.closing_delay)
     wait: float = max(SAMPLES_LATE * period, valve.switching_interval)
     return delay + wait
@@ -204,7 +211,7 @@ def turning_alone(signals: OfJoint) -> tuple[float, float]:
 
 
 def turning_with_foot(signals: OfLeg) -> tuple[float, float]:
-    """The same with a foot on it, about the ankle."""
+    """Inertia [kg m^2] and largest gravity torque [N m] of actuator and foot about the ankle."""
     moment = signals.foot_mass * signals.foot_mass_centre
     inertia = signals.inertia + signals.foot_inertia + moment * signals.foot_mass_centre
     return inertia, signals.gravity_torque + moment * STANDARD_GRAVITY
@@ -356,13 +363,13 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
         parts = {"mean_chambers": chambers.function, "turning": turning_with_foot if has_leg else turning_alone}
         joint = {"joint_of": bind(joint_of, "joint_of_device", parts), "torque_loop_of": inner}
         loop = bind(slow_loop_of, "slow_loop_of_device", joint)
-    orifice = ("sonic_conductance", "critical_ratio") if sonic else ("area", "discharge_coefficient")
     late = (PERIOD_PATH, "sensors.pressure_bandwidth", *(() if walks else ("sensors.delay",)))
     of_joint = ("sensors.angle_bandwidth", *_OF_DEVICE) if is_joint else ()
     sources = (
         *chambers.sources,
         *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
-        *(f"valve.{name}" for name in (*orifice, *(quantity.name for quantity in valve.quantities))),
+        *(SONIC_PATHS if sonic else AREA_PATHS)[VALVE],
+        *(f"valve.{quantity.name}" for quantity in valve.quantities),
         *late,
         *of_joint,
         *(LEG_PATHS if is_joint and has_leg else ()),

@@ -376,9 +376,14 @@ def _of_text(content: bytes, columns: ColumnMap, map_name: str) -> _Table:
             dates.append(row[date_place])
     kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
     return _Table(
-        size=len(stamps), numbers={name: np.array(numbers[name]) for name in numbers}, clock=clock, dates=dates,
-        rows=stamps, noun="line", kind=kind,
-    )  # fmt: skip
+        size=len(stamps),
+        numbers={name: np.array(column) for name, column in numbers.items()},
+        clock=clock,
+        dates=dates,
+        rows=stamps,
+        noun="line",
+        kind=kind,
+    )
 
 
 def _of_word(cell: str, words: Mapping[str, float]) -> float | None:

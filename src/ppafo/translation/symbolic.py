@@ -169,8 +169,10 @@ def _type_of(kind: Any, collector: SourceCollector) -> Type:
     return Items(tuple(_type_of(kind, collector) for _, kind in members(kind)))
 
 
-_row_class: Callable[[str, tuple[str, ...]], Any] = lru_cache(maxsize=256)(namedtuple)
-"""Classes of rows whose fields hold expressions."""
+@lru_cache(maxsize=256)
+def _class_of_row(name: str, fields: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+    """The class of a row whose fields hold expressions; one for each name with its fields."""
+    return namedtuple(name, fields)
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,7 +239,7 @@ class _Call:
             case "call":
                 value = self.home.result(self.home.walked.functions[term.detail], parts)
             case "build" if isinstance(term.type, Row):
-                value = _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
+                value = _class_of_row(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
             case "build":
                 value = tuple(parts)
             case "field":
