@@ -13,8 +13,6 @@ from importlib.resources import files
 from types import FunctionType
 from typing import Any
 
-import numpy as np
-
 from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
@@ -27,6 +25,7 @@ from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, 
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.metrics.readable import ThermalTotals, Totals, real_totals, thermal_totals, totals
 from ppafo.model.columns import over_runs
+from ppafo.model.one_run import FOR_ONE_RUN
 from ppafo.model.plain_function import PlainFunction
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
@@ -57,21 +56,6 @@ class _ForOneRun(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
 
-    def visit_If(self, node: ast.If | ast.IfExp) -> ast.AST | list[ast.stmt]:
-        """What is done for a column is left away."""
-        self.generic_visit(node)
-        return node.orelse if self.asks_for_column(node.test) else node
-
-    visit_IfExp = visit_If  # noqa: N815 - named by the library
-
-    def asks_for_column(self, node: ast.expr) -> bool:
-        """True for a test of whether numbers are columns."""
-        if isinstance(node, ast.BoolOp):
-            return isinstance(node.op, ast.Or) and all(map(self.asks_for_column, node.values))
-        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or node.func.id != "isinstance":
-            return False
-        return self.value_of(node.args[1]) is np.ndarray
-
     def value_of(self, node: ast.expr) -> Any:
         """What a name, an attribute of one or a text stands for; None for anything else."""
         if isinstance(node, ast.Constant):
@@ -79,6 +63,11 @@ class _ForOneRun(ast.NodeTransformer):
         if isinstance(node, ast.Name):
             return self.scope.get(node.id)
         return getattr(self.value_of(node.value), node.attr, None) if isinstance(node, ast.Attribute) else None
+
+
+def _collector() -> SourceCollector:
+    """A collector that also takes functions which Python applies to columns: they are called for one run."""
+    return SourceCollector(INLINE, for_one_run, links=dict(FOR_ONE_RUN))
 
 
 LOOP_TYPES: tuple[Type, ...] = (
@@ -106,7 +95,7 @@ def c_text_of_run(
     from ppafo.translation.c99 import Reading, c_source, documents_of, is_free
     from ppafo.translation.walk import walk_module
 
-    collector = SourceCollector(INLINE, for_one_run)
+    collector = _collector()
     program, structs = exported.program, Structs()
     link_program(program, collector)
     entries = [metrics_entry(exported, collector, structs)] if exported.metrics else []
@@ -188,8 +177,7 @@ def c_text(
     from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.walk import walk_module
 
-    # A collector that also takes functions that Python applies to columns.
-    collector = SourceCollector(INLINE, for_one_run)
+    collector = _collector()
     composed = _composed_text(exported, collector, further, together)
     state = list(places_of(exported.program.state_rows()).values())
     parameter = list(places_of(exported.program.parameter_rows()).values())
@@ -226,7 +214,7 @@ def c_text(
 
 def outline_of(exported: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
     """All that ``c_text`` makes the same functions from but its title: the same outline, the same code."""
-    composed = _composed_text(exported, SourceCollector(INLINE, for_one_run), further, together)
+    composed = _composed_text(exported, _collector(), further, together)
     places = [places_of(exported.program.state_rows()), places_of(exported.program.parameter_rows())]
     names = [*places, [kind.name for kind in exported.metrics], list(settings)]
     return f"{names!r}\n{composed}"
