@@ -9,9 +9,6 @@ import pytest
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import (
     BenchResult,
-    OpenValveFlowSettings,
-    ValveMapSettings,
-    VaneLeakSettings,
     free_decay,
     open_valve_flow,
     static_torque,
@@ -37,13 +34,12 @@ def bench(planted: ModuleType) -> dict[str, tuple[Source, Solve]]:
     """A good recording for each procedure, and the procedure."""
     co2 = planted.CO2
     leak = planted.leak("orifice", 3.39e-8)
-    leak_settings = VaneLeakSettings(co2, VOLUME, VOLUME / 1.3, 0.113)
     return {
         "static-torque": (planted.static(), lambda source: static_torque((source,))),
         "free-decay": (planted.decay(), lambda source: free_decay((source,))),
-        "open-valve-flow": (planted.flow(), lambda source: open_valve_flow((source,), OpenValveFlowSettings(co2))),
-        "valve-map": (planted.sweep(), lambda source: valve_map((source,), ValveMapSettings(co2))),
-        "vane-leak": (leak, lambda source: vane_leak((source,), leak_settings)),
+        "open-valve-flow": (planted.flow(), lambda source: open_valve_flow((source,), co2)),
+        "valve-map": (planted.sweep(), lambda source: valve_map((source,), co2)),
+        "vane-leak": (leak, lambda source: vane_leak((source,), co2, VOLUME, VOLUME / 1.3, 0.113)),
     }
 
 

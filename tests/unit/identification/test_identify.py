@@ -359,16 +359,17 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     experiment = Experiment("step", scenario, simulate(scenario).recording)
     stated = stated_by(chosen.parameter_set, scenario)
     held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
-    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg").settings(chosen)
-    decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",)).settings(chosen)
-    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2").settings(chosen)
-    assert decay.inertia_deviation == held["foot_plate.inertia"] == told.inertia_deviation
-    assert leak.gas.temperature_deviation == held["gas.temperature"]
+    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg")
+    decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
+    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2")
+    assert decay.inertia_of(chosen)[1] == held["foot_plate.inertia"] == told.inertia_of(chosen)[1]
+    assert chosen.gas(leak).temperature_deviation == held["gas.temperature"]
     # The displacement is known as well as the torque constant, which it follows.
     swept = math.radians(60.0) - device.actuator.angle_min
     volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.torque_constant"])
-    assert leak.volume_1 is not None
-    assert leak.volume_deviation == pytest.approx(volume / leak.volume_1)
+    first, _, deviation = leak.volumes_of(chosen)
+    assert first is not None
+    assert deviation == pytest.approx(volume / first)
 
 
 def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) -> None:

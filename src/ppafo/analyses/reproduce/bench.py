@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from ppafo.errors import DataError, SimulationError
-from ppafo.identification.bench import BenchResult, FreeDecaySettings, free_decay, static_torque
+from ppafo.identification.bench import BenchResult, free_decay, static_torque
 from ppafo.identification.source import Source
 from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters import load_device, load_parameter_set
@@ -145,9 +145,9 @@ def synthetic_evidence(
 def bench_figure() -> tuple[BenchResult, BenchResult]:
     """Identify torque constant and damping as figure 3 does, from synthetic recordings; SimulationError."""
     # Kept: it takes seconds, and no override reaches it.
-    inertia = FreeDecaySettings(inertia=load_device(PLANTED_SET).foot_plate.inertia)
+    inertia = load_device(PLANTED_SET).foot_plate.inertia
     torque, decay = (
         Source(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)
         for experiment in ("static-torque", "free-decay")
     )
-    return static_torque((torque,)), free_decay((decay,), inertia)
+    return static_torque((torque,)), free_decay((decay,), inertia=inertia)

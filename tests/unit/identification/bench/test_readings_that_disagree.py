@@ -10,10 +10,6 @@ import pytest
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import (
     BenchResult,
-    FreeDecaySettings,
-    OpenValveFlowSettings,
-    ValveMapSettings,
-    VaneLeakSettings,
     free_decay,
     open_valve_flow,
     static_torque,
@@ -37,13 +33,13 @@ RESPONSES = {
 @pytest.fixture
 def solved(planted: ModuleType) -> dict[str, Solve]:
     """The procedure for each kind of recording."""
-    leaking = VaneLeakSettings(planted.CO2, 60e-6, 60e-6 / 1.3, 0.113)
+    leaking = planted.CO2, 60e-6, 60e-6 / 1.3, 0.113
     return {
-        "decay": lambda sources: free_decay(sources, FreeDecaySettings(rise=0.0)),
-        "flow": lambda sources: open_valve_flow(sources, OpenValveFlowSettings(planted.CO2)),
-        "sweep": lambda sources: valve_map(sources, ValveMapSettings(planted.CO2)),
-        "leak": lambda sources: vane_leak(sources, leaking),
-        "steady": lambda sources: vane_leak(sources, leaking),
+        "decay": lambda sources: free_decay(sources, rise=0.0),
+        "flow": lambda sources: open_valve_flow(sources, planted.CO2),
+        "sweep": lambda sources: valve_map(sources, planted.CO2),
+        "leak": lambda sources: vane_leak(sources, *leaking),
+        "steady": lambda sources: vane_leak(sources, *leaking),
         "static": static_torque,
     }
 

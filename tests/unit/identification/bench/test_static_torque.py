@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import StaticTorqueSettings, Tolerances, static_torque
+from ppafo.identification.bench import Tolerances, static_torque
 from ppafo.identification.source import Source
 
 GROWTH = "effects.seal_friction.static_per_pressure"
@@ -38,8 +38,11 @@ def test_intervals_hold_friction_and_its_growth_in_about_the_stated_share_of_rec
 
 
 def test_the_gains_of_the_sensors_widen_the_torque_constant_and_are_named(planted: ModuleType) -> None:
-    known = StaticTorqueSettings(tolerances=Tolerances(gain=0.0))
-    usual, exact = (static_torque((planted.static(),), item)["actuator.torque_constant"] for item in (None, known))
+    known = Tolerances(gain=0.0)
+    usual, exact = (
+        static_torque((planted.static(),), tolerances=item)["actuator.torque_constant"]
+        for item in (Tolerances(), known)
+    )
     assert usual.half_width > 1.2 * exact.half_width
     assert "gain of the pressure sensor" in usual.explanation
     assert "gain" not in exact.explanation
