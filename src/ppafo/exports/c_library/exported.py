@@ -39,8 +39,8 @@ class ExportedProgram:
     def loops(self) -> dict[str, Program]:
         """Programs of its lane loops, by their names in C.
 
-        A locked joint with rigid chambers and without lines has two: its settings decide whether the error decides about
-        the parts of a step.
+        A locked joint with rigid chambers and without lines has two: its settings decide whether the error decides
+        about the parts of a step.
         """
         if not self.chooses_parts:
             return {WHOLE: self.program}
