@@ -24,7 +24,7 @@ class Totals(NamedTuple):
 
 
 class ThermalTotals(NamedTuple):
-    """The same of gas with an energy balance, with its true masses [kg], and its energies [J]."""
+    """Totals of gas with an energy balance since the start of a run: true masses [kg], and its energies [J]."""
 
     supplied_mass: float
     vented_mass: float

@@ -179,7 +179,7 @@ class CCompiler:
         return repr((_file_identity(self.command[0]), self.flags, described_processor(), translator_hash()))
 
     def described(self) -> str:
-        """Its name and version, as it says them."""
+        """Name and version of the compiler, as it says them."""
         from ppafo.translation.compiling import LONGEST_ANSWER, asked  # a run asks no compiler
 
         try:
