@@ -8,6 +8,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind
 from ppafo.model.gas import energy_per_content
+from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
@@ -77,6 +78,26 @@ def thermal_totals(
         wall_heat=per_content * masses.heat_content,
         gas_work=masses.gas_work,
     )
+
+
+class TotalsKind(NamedTuple):
+    """How the totals of a program's gas are made: the row, the function, and the groups that it takes after the state.
+
+    ``states`` are groups of states that it is given, ``parameters`` groups of parameters after those.
+    """
+
+    row: type[Totals] | type[ThermalTotals]
+    function: PlainFunction
+    states: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+
+
+def totals_kind(program: Program) -> TotalsKind:
+    """How the totals of the gas of a program are made."""
+    if program.is_thermal:
+        return TotalsKind(ThermalTotals, thermal_totals, ("masses",), ("plant", "thermal"))
+    # Totals of a gas that is not ideal count true masses.
+    return TotalsKind(Totals, real_totals, ("masses",)) if program.has_true_masses else TotalsKind(Totals, totals)
 
 
 def has_channels(program: Program, kind: MetricKind) -> bool:
