@@ -48,7 +48,7 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.simulation.torque_loop import PERIOD_PATH, loop_terms
+from ppafo.simulation.torque_loop import IN_WALK, PERIOD_PATH, loop_terms
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
@@ -286,7 +286,7 @@ def _control(
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
     if rate is not None:
         seconds = 1.0 / reading.number("controller.rate", RATE)
-    terms = _terms(device.valve) | nominal_terms(device, lines) | loop_terms(device, law, walks=True)
+    terms = _terms(device.valve) | nominal_terms(device, lines) | loop_terms(device, law, IN_WALK)
     present = numbers_of_sensors(sensors) | numbers_of_lines(lines) | {PERIOD_PATH: seconds}
     sections = {"controller": law.quantities, "timing": timing.quantities}
     found, links = read_followers(reading, sections, terms, device, present)
