@@ -96,7 +96,9 @@ def list_walks() -> tuple[str, ...]:
 
 def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None:
     """Raise ScenarioError for a duration that an override sets beside ``minutes``."""
-    if minutes is not None and any(split_override(one, ScenarioError)[0] == "run.duration" for one in overrides):
+    if minutes is not None and any(
+        split_override(override, ScenarioError)[0] == "run.duration" for override in overrides
+    ):
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
 

@@ -256,7 +256,7 @@ def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
 def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str]) -> str:
     if not isinstance(read, ReadAt):
         return f"{add(read)}(readings)"
-    numbers = ", ".join(f"readings.{place}" for place in read.places)
+    numbers = ", ".join(f"readings.{path}" for path in read.places)
     return numbers if read.function is None else f"{add(read.function)}({numbers})"
 
 
