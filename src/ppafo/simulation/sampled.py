@@ -64,12 +64,12 @@ class SampledRun:
 
     def result(self) -> BatchResult:
         """States and record so far: of the samples that were taken, and the one that they led to."""
-        clock, found = self._batch.clock, self._block.result()
+        clock, outcome = self._batch.clock, self._block.result()
         steps = min(self.taken * clock.steps_per_sample, clock.step_count)
         kept = samples_in(steps, clock.record_every) if clock.record_every else None
         # The record at the end of a step is taken when the next one begins, but for the last of the run.
         late = 1 if kept is not None and steps < clock.step_count and (kept - 1) * clock.record_every >= steps else 0
-        return BatchResult(found.states, found.record[: None if kept is None else kept - late])
+        return BatchResult(outcome.states, outcome.record[: None if kept is None else kept - late])
 
 
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
@@ -125,7 +125,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
                 pressure_2=pressure_2,
                 torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
-        seen = measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
+        seen = measure(sensors, angle, pressure_1, pressure_2, plant, sample)
         return measurement_of(actuator, plant, seen)
 
     return see
@@ -160,7 +160,7 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
                 toe_force=toe,
             )
         seen, last = measure_gait(
-            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant.torque_constant, sample * period, sample
+            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, sample * period, sample
         )
         return measurement_of(actuator, plant, seen)
 

@@ -41,7 +41,8 @@ class AssumedValue:
 
     def sentence(self) -> str:
         """Return the value and its reason on one line."""
-        return f"{self.path} = {self.value}: {self.reason}{f' ({self.source})' if self.source else ''}"
+        source = f" ({self.source})" if self.source else ""
+        return f"{self.path} = {self.value}: {self.reason}{source}"
 
 
 def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...]:
@@ -56,10 +57,18 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         own = [
-            AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, "", (name,))
-            for item in scenario.assumptions
+            AssumedValue(
+                assumption.path,
+                summaries.get(assumption.path, ""),
+                assumption.value,
+                "assumed",
+                assumption.note,
+                "",
+                (name,),
+            )
+            for assumption in scenario.assumptions
         ]
-        settled = {item.path for item in own}
+        settled = {assumption.path for assumption in own}
         # Reported results are what a run is compared with; of two valves one is in the device.
         settled |= {path for path in in_force.numbers if path.startswith("reported.")}
         valve = f"valves.{origin.valve}."

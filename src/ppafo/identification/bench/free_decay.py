@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, count_of
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.residuals import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, count_of
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.source import (
     Source,
     check_moves,

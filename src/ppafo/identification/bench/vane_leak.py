@@ -18,7 +18,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, count_of
 from ppafo.identification.bench.flow import (
     GAS_LAW,
     NEXT_LAW,
@@ -32,7 +32,7 @@ from ppafo.identification.bench.flow import (
     solve_flow,
 )
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.residuals import Free
 from ppafo.identification.source import (
     Source,
