@@ -54,8 +54,11 @@ THERMAL = (
 SLOW = ("valve.spool_frequency=30 Hz", "valve.slew_limit=20 1/s", "timing.kind=estimated")
 EVERYTHING = (*SEEN, *FAULTY, *THERMAL, *SLOW, "controller.rate=330 Hz", "run.step=0.4 ms")
 ACTUATORS = Path(__file__).parents[2] / "actuators"
-OF_ANOTHER_KIND = ("device.set=cylinder-lever",), (f"device.set={ACTUATORS / 'measured-bladder.toml'}", *SEEN)
-"""A cylinder, whose chambers no pressure widens, and a bladder, with noise."""
+OF_ANOTHER_KIND = (
+    ("device.set=cylinder-lever", *THERMAL),
+    (f"device.set={ACTUATORS / 'measured-bladder.toml'}", *SEEN),
+)
+"""A cylinder, whose chambers no pressure widens, with gas that warms, and a bladder, with noise."""
 VARIED: tuple[tuple[str, tuple[str, ...]], ...] = (
     *((name, ()) for name in list_walks()),
     ("proportional-regulators", EVERYTHING),
