@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -29,6 +28,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import to_si
+from tests.unit.identification import planted
 
 HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
 STATIC = '[[procedure]]\nkind = "static-torque"\nrecordings = ["static.csv"]\n'
@@ -43,7 +43,7 @@ Solve = Callable[[str], Identification]
 
 
 @pytest.fixture
-def bench(tmp_path: Path, planted: ModuleType) -> Path:
+def bench(tmp_path: Path) -> Path:
     """A folder with one recording for each procedure."""
     leak = planted.leak("orifice", 0.3e-6 * 0.113)
     growing = planted.static(growth=8.0e-7)
@@ -71,7 +71,7 @@ def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(
     assert names == ["static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"]
 
 
-def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solved: Solve, planted: ModuleType) -> None:
+def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solved: Solve) -> None:
     outcome = solved(ALL)
     new = outcome.new_set.parameter_set
     assert set(outcome.new_set.written) == {
@@ -122,9 +122,7 @@ def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -
     assert outcome.is_good
 
 
-def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(
-    solved: Solve, bench: Path, planted: ModuleType
-) -> None:
+def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(solved: Solve, bench: Path) -> None:
     bent = planted.static().recording
     pressure = bent["pressure_difference"]
     write_csv(bench / "bent.csv", bent.with_channel("torque", bent["torque"] + 2.0 * (pressure / 6.5e5) ** 2, "N m"))
