@@ -95,9 +95,13 @@ class TotalsKind(NamedTuple):
 def totals_kind(program: Program) -> TotalsKind:
     """How the totals of the gas of a program are made."""
     if program.is_thermal:
-        return TotalsKind(ThermalTotals, thermal_totals, ("masses",), ("plant", "thermal"))
+        return TotalsKind(
+            row=ThermalTotals, function=thermal_totals, states=("masses",), parameters=("plant", "thermal")
+        )
     # Totals of a gas that is not ideal count true masses.
-    return TotalsKind(Totals, real_totals, ("masses",)) if program.has_true_masses else TotalsKind(Totals, totals)
+    if program.has_true_masses:
+        return TotalsKind(row=Totals, function=real_totals, states=("masses",))
+    return TotalsKind(row=Totals, function=totals)
 
 
 def has_channels(program: Program, kind: MetricKind) -> bool:

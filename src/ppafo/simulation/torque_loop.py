@@ -340,9 +340,9 @@ class LoopFrames(NamedTuple):
 
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
 _ANGLE = (*_PRESSURES, "sensors.delay", "sensors.angle_bandwidth", *_OF_DEVICE)
-IN_WALK = Seen(SignalsOfWalk, time_in_walk, _PRESSURES)
+IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES)
 """The torque in a walk."""
-IN_SCENARIO = Seen(Signals, time_in_scenario, (*_PRESSURES, "sensors.delay"))
+IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"))
 """A torque or a pressure of a vane alone."""
 
 
@@ -351,8 +351,9 @@ def seen_in_scenario(controlled: str, has_leg: bool) -> Seen:
     if controlled != ANGLE:
         return IN_SCENARIO
     if has_leg:
-        return Seen(OfLeg, time_with_angle, (*_ANGLE, *LEG_PATHS), turning_with_foot)
-    return Seen(OfJoint, time_with_angle, _ANGLE, turning_alone)
+        paths = (*_ANGLE, *LEG_PATHS)
+        return Seen(signals=OfLeg, late=time_with_angle, paths=paths, turning=turning_with_foot)
+    return Seen(signals=OfJoint, late=time_with_angle, paths=_ANGLE, turning=turning_alone)
 
 
 def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFrames:
