@@ -99,11 +99,16 @@ def raise_noted(found: Sequence[PpafoError]) -> None:
         raise several
 
 
+def count_of(number: int, noun: str) -> str:
+    """Return a number with its noun, ``1 decay`` or ``3 decays``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def said_missing(names: Sequence[str]) -> str:
     """Return a statement that all of these are missing: ``'a', 'b' and 'c' are missing``."""
     quoted = [f"'{name}'" for name in names]
     listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
-    return f"{listed} {'is' if len(quoted) == 1 else 'are'} missing"
+    return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
 
 
 RENAMED_KEYS: Mapping[str, str] = {

@@ -187,15 +187,6 @@ def kind_at(place: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
-def late(place: str) -> Callable[..., Any]:
-    """Return the function at ``module:NAME``, a place in this package, whose module is loaded with the first call."""
-
-    def called(*given: Any) -> Any:
-        return kind_at(place)(*given)
-
-    return called
-
-
 def _installed_path() -> tuple[str, ...]:
     return tuple(folder for folder in sys.path if not is_working_folder(folder))
 

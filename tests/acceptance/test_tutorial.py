@@ -40,7 +40,6 @@ def test_the_page_has_its_steps_each_with_a_question() -> None:
     assert [step.split("\n")[0] for step in steps if not ("**What to see.**" in step and "**Question.**" in step)] == []
 
 
-@pytest.mark.short
 def test_the_valves_differ_as_the_page_says(names: Mapping[str, Any]) -> None:
     import ppafo
 

@@ -1,6 +1,7 @@
-"""Every fault of a recording, through both commands and with or without a column map: refused or flagged, and named.
+"""Faults of a recording, through both commands and with or without a column map: refused or flagged, and named.
 
 A refusal is one line with the file, the column and the line or sample, exit code 2. A flag is a note or a failed check.
+Every fault of a file is in tests/unit/validation/test_bad_recordings.py and tests/unit/identification.
 """
 
 import re
@@ -81,19 +82,10 @@ def with_earlier_time(back: int) -> Callable[[Table], Table]:
     return spoil
 
 
-def clock_that_ends(table: Table) -> Table:
-    time = table.columns["time"]
-    return changed(table, "time", np.minimum(time, time[AT - 1]))
-
-
 def gap(table: Table) -> Table:
     time = table.columns["time"].copy()
     time[AT:] += 90.0
     return changed(table, "time", time)
-
-
-def stuck(table: Table) -> Table:
-    return changed(table, "angle", np.full(400, 60.0))
 
 
 def saturated(table: Table) -> Table:
@@ -179,25 +171,13 @@ REFUSED = {
     "missing command": ("validate", without("pressure_2"), ["pressure_2"]),
     "unit": ("identify", in_unit("angle", "N m"), ["UNIT angle N m", "an angle is needed"]),
     "unit of a pressure": ("validate", in_unit("pressure_1", "psi"), ["UNIT pressure_1 psi", "psi_g"]),
-    "unit of an angle": ("validate", in_unit("angle", "kg"), ["UNIT angle kg", "an angle is needed"]),
     "gap": ("identify", gap, ["gap of 90.01 s", f"sample {AT}"]),
-    "gap in a step": ("validate", gap, ["gap of 90 s", f"sample {AT}"]),
-    "NaN": ("identify", with_value("angle", np.nan), ["LINE", "column", "'nan'"]),
     "NaN in a command": ("validate", with_value("command", np.nan), ["LINE", "column", "'nan'"]),
-    "infinite": ("validate", with_value("pressure_1", np.inf), ["LINE", "column", "'inf'"]),
     "clock back": ("identify", with_earlier_time(2), ["LINE", "column 'time'", "goes backwards"]),
-    "clock back in a step": ("validate", with_earlier_time(2), ["LINE", "column 'time'", "goes backwards"]),
-    "duplicate time": ("identify", with_earlier_time(1), ["LINE", "column 'time'", "stands still"]),
     "duplicate time in a step": ("validate", with_earlier_time(1), ["LINE", "column 'time'", "stands still"]),
-    "clipped time": ("identify", clock_that_ends, ["LINE", "column 'time'", "stands still"]),
-    "clipped time in a step": ("validate", clock_that_ends, ["LINE", "column 'time'", "stands still"]),
-    "constant": ("identify", stuck, ["'angle' is 60 deg throughout"]),
     "saturated": ("identify", saturated, ["'angle' stays at exactly", "from sample", "saturated"]),
-    "too short": ("identify", short, ["at least 20 samples, it has 7"]),
     "too short a step": ("validate", short, ["has 7 samples; at least 10"]),
-    "no excitation": ("identify", quiet, ["angle", "nothing moves"]),
     "no excitation in a step": ("validate", quiet, ["nothing happens in it: angle, pressure_1, pressure_2"]),
-    "spike": ("validate", with_value("angle", 1e7), ["'angle' is", f"sample {AT + 1}"]),
 }
 
 
@@ -219,25 +199,7 @@ def test_a_fault_is_refused_in_one_line_that_names_its_place(run: Run, fault: st
     assert not (through_map and "UNIT" in words[0]) or ".toml" in lines[0]
 
 
-@pytest.mark.parametrize("through_map", BOTH, ids=["header", "column map"])
-@pytest.mark.parametrize(
-    ("spoil", "words"),
-    [
-        (saturated, "nearest: angle is clipped: 280 samples are exactly its largest value"),
-        (stuck, "nearest: angle never changes: "),
-    ],
-    ids=["saturated", "constant"],
-)
-def test_what_a_step_response_may_have_is_flagged(
-    run: Run, spoil: Callable[[Table], Table], words: str, through_map: bool
-) -> None:
-    ran = run("validate", spoil(step()), through_map)
-    assert ran.code == 0, ran.err
-    assert words in ran.out
-
-
-@pytest.mark.parametrize("through_map", BOTH, ids=["header", "column map"])
-@pytest.mark.parametrize("command", ["identify", "validate"])
+@pytest.mark.parametrize(("command", "through_map"), [("identify", False), ("identify", True), ("validate", True)])
 def test_the_same_recording_without_a_fault_is_taken_without_a_remark(
     run: Run, command: str, through_map: bool
 ) -> None:

@@ -74,7 +74,7 @@ def called(bare: Path, folder: Path, *arguments: str) -> subprocess.CompletedPro
         ["design", "BARE/profile.toml"],
         ["export", "c", "torque-task-proportional", "--out", "c"],
         ["export", "fmu", "torque-task-proportional", "--out", "fmu"],
-        ["reproduce", "--out", "paper"],
+        pytest.param(["reproduce", "--out", "paper"], marks=pytest.mark.thorough),
     ],
     ids=lambda arguments: " ".join(arguments[:2]),
 )

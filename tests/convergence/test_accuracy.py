@@ -2,13 +2,13 @@
 
 import dataclasses
 from collections.abc import Callable
-from types import ModuleType
 
 import pytest
 
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from tests.convergence.draws import random_scenario
 from tests.reference.reference_solver import Agreement, compare_with_reference
 
 LARGEST_ANGLE = 2.0e-4
@@ -71,6 +71,6 @@ def test_several_switchings_inside_one_step_are_within_the_limits(
     "first",
     [first if first == 0 else pytest.param(first, marks=THOROUGH) for first in range(0, len(SEEDS), SEEDS_PER_TEST)],
 )
-def test_random_devices_are_within_the_limits(draws: ModuleType, first: int) -> None:
+def test_random_devices_are_within_the_limits(first: int) -> None:
     for seed in SEEDS[first : first + SEEDS_PER_TEST]:
-        assert_within_limits(compare_with_reference(plan_run(draws.random_scenario(seed))), f"seed {seed}")
+        assert_within_limits(compare_with_reference(plan_run(random_scenario(seed))), f"seed {seed}")

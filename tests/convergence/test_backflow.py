@@ -1,7 +1,6 @@
 """Chambers pushed above the pressure of their supply: against the reference solver, with both kinds of supply."""
 
 import dataclasses
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, GasModel, PrescribedMotion, ProfileChoice, Scenario
+from tests.convergence.draws import random_scenario
 from tests.reference.reference_solver import measure_agreement, plant_states, solve_reference
 
 LARGEST_ANGLE = 2.0e-4
@@ -105,10 +105,10 @@ def pushed_about(scenario: Scenario, seed: int) -> Scenario:
 
 
 @pytest.mark.parametrize("first", [0, 10])
-def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(draws: ModuleType, first: int) -> None:
+def test_drawn_gas_never_falls_with_random_devices_that_are_pushed_about(first: int) -> None:
     fallen = 0
     for seed in range(first, first + 10):
-        scenario = pushed_about(draws.random_scenario(seed), seed)
+        scenario = pushed_about(random_scenario(seed), seed)
         thermal = GasModel(200.0, 300.0) if seed % 3 == 0 else None
         relieving = dataclasses.replace(scenario.device.supply, relieving=True)
         device = dataclasses.replace(scenario.device, supply=relieving)

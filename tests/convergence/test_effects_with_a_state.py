@@ -22,27 +22,6 @@ VENTING = (
 )
 
 
-@pytest.mark.parametrize(
-    ("name", "texts"),
-    [
-        ("step-response", ICE),
-        ("step-response", (*ICE, "effects.silencer.sonic_conductance=1e-8 m^3/(s Pa)")),
-        ("torque-task-solenoid", (*ICE, "motion.kind=free", "run.duration=0.5 s")),
-        (
-            "step-response",
-            (
-                *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)", *ICE),
-                *("gas_model.wall_area_per_volume=100 1/m", "run.duration=0.3 s"),
-            ),
-        ),
-    ],
-)
-def test_ice_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
-    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
-    assert agreement.angle < 2e-4
-    assert agreement.worst_pressure < 1e-3
-
-
 def test_a_state_that_acts_on_the_gas_leaves_the_step_its_second_order() -> None:
     reference, errors = None, []
     for step in ("2 ms", "0.25 ms"):

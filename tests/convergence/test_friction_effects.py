@@ -1,4 +1,4 @@
-"""Friction with pressure and near standstill: lanes and reference solver agree, formulas are what they name."""
+"""Friction with pressure and near standstill: formulas are what they name; the lanes are in ``test_effects.py``."""
 
 import pytest
 
@@ -6,28 +6,11 @@ from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pre
 from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.plan import plan_run
-from tests.reference.reference_solver import compare_with_reference
 
 SEALS = (
     "effects.seal_friction.static_per_pressure=2e-6 N m/Pa",
     "effects.seal_friction.dynamic_per_pressure=1e-6 N m/Pa",
 )
-STRIBECK = ("effects.stribeck.velocity=2 rad/s",)
-
-
-@pytest.mark.parametrize(
-    ("name", "texts"),
-    [
-        ("step-response", SEALS),
-        ("step-response", STRIBECK),
-        ("torque-task-solenoid", (*SEALS, *STRIBECK, "motion.kind=free", "run.duration=0.3 s")),
-    ],
-)
-def test_friction_in_the_lanes_is_that_of_the_reference_solver(name: str, texts: tuple[str, ...]) -> None:
-    agreement = compare_with_reference(plan_run(load_scenario(name, texts)))
-    assert agreement.angle < 2e-4
-    assert agreement.worst_pressure < 1e-3
 
 
 def test_seals_that_the_gas_presses_hold_the_vane_for_longer() -> None:

@@ -4,7 +4,6 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from ppafo.engine.run import NEVER_FAILED, Run, batch_of, run_together, state_ro
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
+from tests.convergence.draws import random_scenario
 from tests.reference.reference_solver import Agreement, measure_agreement, solve_reference
 
 MANY = 10_000
@@ -93,12 +93,12 @@ def test_mass_balance_closes_to_rounding_and_agrees_with_the_reference(
     assert state["leaked_mass"] == pytest.approx(reference[6], rel=2e-4)
 
 
-def test_ten_thousand_random_devices_give_numbers_and_none_fails(draws: ModuleType) -> None:
+def test_ten_thousand_random_devices_give_numbers_and_none_fails() -> None:
     runs = [
         dataclasses.replace(
             plan_run(dataclasses.replace(scenario, run=dataclasses.replace(scenario.run, duration=0.3))), record_every=0
         )
-        for scenario in map(draws.random_scenario, range(MANY))
+        for scenario in map(random_scenario, range(MANY))
     ]
     rows = [state_row_numbers(run) for run in runs]
     for seed, (run, row, result) in enumerate(zip(runs, rows, run_together(runs), strict=True)):

@@ -1,7 +1,6 @@
 """Gas with an energy balance: against closed forms, against the isothermal gas, and against the reference solver."""
 
 import dataclasses
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import GasModel, PrescribedMotion, ProfileChoice, Scenario
+from tests.convergence.draws import random_scenario
 from tests.reference.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
 
 LARGEST_ANGLE = 2.0e-4
@@ -112,10 +112,10 @@ def test_energy_balance_is_within_the_limits(name: str, coefficient: float) -> N
 
 
 @pytest.mark.parametrize("first", [0, 4, 8])
-def test_energy_balance_of_random_devices_is_within_the_limits(draws: ModuleType, first: int) -> None:
+def test_energy_balance_of_random_devices_is_within_the_limits(first: int) -> None:
     for seed in range(first, first + 4):
         coefficient = (0.0, 50.0, 2.0e3)[seed % 3]
-        assert_within_limits(with_walls(draws.random_scenario(seed), coefficient), f"seed {seed}")
+        assert_within_limits(with_walls(random_scenario(seed), coefficient), f"seed {seed}")
 
 
 def test_gas_is_neither_made_nor_lost() -> None:

@@ -9,9 +9,6 @@ from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
 from ppafo.identification.bench import (
-    OpenValveFlowSettings,
-    ValveMapSettings,
-    VaneLeakSettings,
     free_decay,
     open_valve_flow,
     static_torque,
@@ -28,9 +25,9 @@ CO2 = GasAt(0.044, 1.3, 298.0)
 RUNS = {
     "static-torque": static_torque,
     "free-decay": free_decay,
-    "open-valve-flow": lambda sources: open_valve_flow(sources, OpenValveFlowSettings(CO2)),
-    "valve-map": lambda sources: valve_map(sources, ValveMapSettings(CO2)),
-    "vane-leak": lambda sources: vane_leak(sources, VaneLeakSettings(CO2, 4e-5, 4e-5, 0.1)),
+    "open-valve-flow": lambda sources: open_valve_flow(sources, CO2),
+    "valve-map": lambda sources: valve_map(sources, CO2),
+    "vane-leak": lambda sources: vane_leak(sources, CO2, 4e-5, 4e-5, 0.1),
 }
 UNITS = {
     "static-torque": {"time": "s", "torque": "N m", "pressure_difference": "psi_d", "direction": "-"},

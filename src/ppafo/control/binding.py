@@ -1,25 +1,27 @@
 """Frames: functions in which some names stand for components that are put in their place."""
 
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
+
+from ppafo.model.plain_function import PlainFunction
 
 
 class Frame(NamedTuple):
     """What a function was bound from: the function, and what some names of its module stand for in it, by name."""
 
-    function: Callable[..., Any]
+    function: PlainFunction
     components: tuple[tuple[str, Any], ...]
 
 
-def frame_of(function: Callable[..., Any]) -> Frame | None:
+def frame_of(function: PlainFunction) -> Frame | None:
     """Return the frame of a function that ``bind`` made; None for any other."""
     found: Frame | None = vars(function).get("frame")
     return found
 
 
-def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) -> Callable[..., Any]:
+def bind(frame: PlainFunction, name: str, components: Mapping[str, Any]) -> PlainFunction:
     """Return the function of a frame in which some names of its module stand for other components.
 
     The code is the same and only those names differ, so that the engine compiles it as any other function. Equal
@@ -31,8 +33,7 @@ def bind(frame: Callable[..., Any], name: str, components: Mapping[str, Any]) ->
 
 # Far more than the laws, valves and actuators of a process; a table is part of what its actuator is bound to.
 @lru_cache(maxsize=512)
-def _bound(frame: Callable[..., Any], name: str, components: tuple[tuple[str, Any], ...]) -> Callable[..., Any]:
-    assert isinstance(frame, types.FunctionType), "a frame is a plain function"
+def _bound(frame: PlainFunction, name: str, components: tuple[tuple[str, Any], ...]) -> PlainFunction:
     made = types.FunctionType(frame.__code__, {**frame.__globals__, **dict(components)}, name)
     made.__qualname__ = name
     # The name and module decide the name in the composed text, where two laws must not share one.

@@ -44,8 +44,8 @@ class ControllerKind:
     quantities: tuple[Quantity, ...]
     parameters: type
     initial: Any
-    update: Callable[..., Any]
-    restart: Callable[..., Any] | None = None
+    update: Callable[[Any, Any, float, Any, float], tuple[Any, Any]]
+    restart: Callable[[Any, float, float], Any] | None = None
     only_switches: bool = False
     needs_reference: bool = True
     plan: Plan | None = None
@@ -69,12 +69,12 @@ class ProfileKind:
     summary: str
     quantities: tuple[Quantity, ...]
     parameters: type
-    value: Callable[..., Any]
-    bounds: Callable[..., tuple[float, float]]
+    value: Callable[[Any, float], Any]
+    bounds: Callable[[Any], tuple[float, float]]
     differences: tuple[str, ...] = ()
     is_monotone: bool = False
     is_smooth: bool = False
-    until_jump: Callable[..., float] | None = None
+    until_jump: Callable[[Any, float], float] | None = None
 
 
 class PythonController(Protocol):

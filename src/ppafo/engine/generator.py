@@ -2,7 +2,7 @@
 
 import ast
 from collections import namedtuple
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
@@ -19,6 +19,7 @@ from ppafo.engine.source_text import (
     is_step_function,
 )
 from ppafo.errors import ProgramError
+from ppafo.model.plain_function import PlainFunction
 
 
 @dataclass(slots=True)
@@ -71,7 +72,7 @@ class StepText:
         """Classes of the groups that have rows."""
         return {**self.parameters, **self.states, **self.of_step, **self.further}
 
-    def phase(self, function: Callable[..., Any], known: Mapping[str, Any] | None = None) -> Composed:
+    def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> Composed:
         """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
         assert isinstance(function, FunctionType), "it is no other callable"
         return self._composed(function, known or {}, is_phase=True)
@@ -84,7 +85,7 @@ class StepText:
 
     def effects_of(self, name: str) -> Effects:
         """What a function of the step reads and sets."""
-        return next(item.effects for item in self.composed.values() if item.name == name)
+        return next(composed.effects for composed in self.composed.values() if composed.name == name)
 
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Names that a function of the module is handed before its own arguments."""
@@ -108,16 +109,16 @@ class StepText:
         """What replaces names from outside a function of the step that was reduced."""
         return Composer(
             function,
-            lambda item: self._name_inside(function, item),
+            lambda called: self._name_inside(function, called),
             self.collector.note_read,
             self.handed_to,
             self.collector.stands_for,
             names,
         )
 
-    def _name_inside(self, function: FunctionType, item: Any) -> str:
+    def _name_inside(self, function: FunctionType, called: Any) -> str:
         """The name in the module of what a function of the step calls."""
-        return self.composed[item].name if item in self.composed else self.collector.add_inside(function, item)
+        return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
 
     def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
         done = self.composed.get(function)
@@ -141,11 +142,11 @@ class StepText:
         if not returns and len(effects.results) > 1:
             row = self._result_row(function, tuple(effects.results))
         if not returns:
-            given: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
-            value = given[0] if len(given) == 1 else ast.Tuple(given, ast.Load())
-            whole = value if row is None else ast.Call(ast.Name(self.keep(row), ast.Load()), given, [])
+            results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
+            value = results[0] if len(results) == 1 else ast.Tuple(results, ast.Load())
+            whole = value if row is None else ast.Call(ast.Name(self.keep(row), ast.Load()), results, [])
             tree.body = [*tree.body, ast.copy_location(ast.Return(whole), tree)]
-        handed = tuple(item.arg for item in tree.args.args)
+        handed = tuple(argument.arg for argument in tree.args.args)
         handed = handed[: len([name for name in handed if name in effects.reads or name == NUMBER])]
         name = self._written(function, tree, handed)
         return Composed(
@@ -165,12 +166,12 @@ class StepText:
         ast.fix_missing_locations(tree)
         check_grammar(tree, file)
         local = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-        local |= {item.arg for item in tree.args.args}
+        local |= {argument.arg for argument in tree.args.args}
         check_flow(tree, file, local)
         rows = {name: kind for name, kind in self.rows.items() if name in local}
         composer = self.composer(function, Names(frozenset(local), self.kept, rows))
         tree.returns, tree.decorator_list = None, []
-        tree.body = [composer.visit(item) for item in tree.body]
+        tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)
         tree.name = emitted_name(function)
         text = self.collector.decorated(tree, file)

@@ -19,6 +19,7 @@ import numpy as np
 from ppafo.engine.entries import entry_types
 from ppafo.engine.going_on import MATH, power, quotient, whole_part
 from ppafo.engine.plain_python import parse_module, place_in, refusal
+from ppafo.model.plain_function import PlainFunction
 
 
 @lru_cache(maxsize=64)
@@ -55,27 +56,27 @@ class _AsCompiled(ast.NodeTransformer):
         return ast.copy_location(ast.Call(ast.Name(called, ast.Load()), [node.left, node.right], []), node)
 
 
-def _as_it_is(function: Callable[..., Any]) -> Callable[..., Any]:
+def _as_it_is(function: PlainFunction) -> PlainFunction:
     return function
 
 
-def _entry(_types: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _entry(_types: str) -> Callable[[PlainFunction], PlainFunction]:
     return _as_it_is
 
 
 def _with_views(entry: Callable[..., None], path: str, lines: list[str]) -> Callable[..., None]:
     """An entry that goes through its arrays as views; what a law does wrong is a ProgramError about its file."""
 
-    def called(*given: Any) -> None:
-        views: Any = (memoryview(item) if hasattr(item, "shape") else item for item in given)
+    def called(*arguments: Any) -> None:
+        views: Any = (memoryview(argument) if hasattr(argument, "shape") else argument for argument in arguments)
         try:
             entry(*views)
         except (AttributeError, IndexError, NameError, TypeError) as error:
             numbers = [at.lineno for at in traceback.extract_tb(error.__traceback__) if at.filename == path]
-            place = place_in(lines, numbers[-1] or 0) if numbers else None
-            if place is None:
+            origin = place_in(lines, numbers[-1] or 0) if numbers else None
+            if origin is None:
                 raise
-            raise refusal(place.file, place.line, str(error)) from error
+            raise refusal(origin.file, origin.line, str(error)) from error
 
     return called
 

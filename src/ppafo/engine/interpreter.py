@@ -10,7 +10,7 @@ import ast
 import inspect
 import math
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
@@ -26,6 +26,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
+from ppafo.model.plain_function import PlainFunction
 
 Floats = NDArray[np.float64]
 OWN = "ppafo."
@@ -166,9 +167,9 @@ class Linked:
         if isinstance(value, FunctionType | ModuleType):
             return self.of(value)
         if isinstance(value, Mapping):
-            return {key: self._part(item) for key, item in value.items()}
+            return {key: self._part(part) for key, part in value.items()}
         if is_dataclass(value) and not isinstance(value, type):
-            changed = {item.name: self._part(getattr(value, item.name)) for item in fields(value) if item.init}
+            changed = {part.name: self._part(getattr(value, part.name)) for part in fields(value) if part.init}
             return replace(value, **changed)
         return value
 
@@ -209,21 +210,21 @@ class Linked:
                 scope |= {"_quotient": quotient, "int": whole_part}
         return self._made[function]
 
-    def _law(self, function: FunctionType, rows: tuple[str, ...]) -> Callable[..., Any]:
+    def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """The law of an effect, called as its port is; its own rows are those of the lane that is gone through."""
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         own = [name for name in names if name not in rows]
 
-        def called(*given: Any) -> Any:
-            return function(**dict(zip(own, given, strict=True)), **{row: self._lanes.now[row] for row in rows})
+        def called(*arguments: Any) -> Any:
+            return function(**dict(zip(own, arguments, strict=True)), **{row: self._lanes.now[row] for row in rows})
 
         return called
 
 
 def _names_of(code: CodeType) -> set[str]:
     """Names that a code reads, with those of the code in it."""
-    found = set(code.co_names)
-    return found.union(*(_names_of(item) for item in code.co_consts if isinstance(item, CodeType)))
+    names = set(code.co_names)
+    return names.union(*(_names_of(constant) for constant in code.co_consts if isinstance(constant, CodeType)))
 
 
 class _GoingOn(ast.NodeTransformer):
@@ -241,4 +242,6 @@ def going_on(function: FunctionType) -> CodeType:
     text = textwrap.dedent(inspect.getsource(function))
     tree = _GoingOn().visit(parse_module("\n" * (code.co_firstlineno - 1) + text))
     whole = compile(ast.fix_missing_locations(tree), code.co_filename, "exec", dont_inherit=True)
-    return next(item for item in whole.co_consts if isinstance(item, CodeType) and item.co_name == code.co_name)
+    return next(
+        constant for constant in whole.co_consts if isinstance(constant, CodeType) and constant.co_name == code.co_name
+    )

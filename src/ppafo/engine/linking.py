@@ -2,7 +2,7 @@
 
 import math
 from collections import namedtuple
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
@@ -14,6 +14,7 @@ from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
+from ppafo.model.plain_function import PlainFunction
 
 
 class Linked(Protocol):
@@ -79,12 +80,12 @@ class Composed(NamedTuple):
     ``of_columns`` is the same over columns of samples, None where it has no such form.
     """
 
-    function: Callable[..., Any]
+    function: PlainFunction
     needed: tuple[str, ...]
-    of_columns: Callable[..., Any] | None
+    of_columns: PlainFunction | None
 
 
-def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Composed | None:
+def composed_with(function: PlainFunction, effects: Sequence[Effect]) -> Composed | None:
     """Return a function of the model with the laws of effects in it; None where no effect acts in it."""
     if not effects:
         return None
@@ -96,9 +97,7 @@ def composed_with(function: Callable[..., Any], effects: Sequence[Effect]) -> Co
 
 
 @lru_cache(maxsize=64)
-def _composed_with(
-    function: Callable[..., Any], effects: tuple[Effect, ...]
-) -> tuple[SourceCollector, Composed | None]:
+def _composed_with(function: PlainFunction, effects: tuple[Effect, ...]) -> tuple[SourceCollector, Composed | None]:
     collector = SourceCollector("")
     link_effects(effects, collector)
     name = collector.add(function)
@@ -111,35 +110,31 @@ def _composed_with(
     return collector, Composed(scope[name], tuple(collector.needs[name]), in_columns(text, name))
 
 
-def python_place(
-    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
-) -> Callable[..., Any] | None:
+def python_place(port: PlainFunction, effects: Sequence[Effect], rows: Sequence[Any]) -> PlainFunction | None:
     """Return a port as Python calls it with effects and their parameters; None where no effect acts there.
 
     Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
     """
-    composed = composed_with(place, effects)
+    composed = composed_with(port, effects)
     if composed is None:
         return None
-    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+    parameters = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
 
     def called(states: Mapping[str, Any], *own: float) -> Any:
-        return composed.function(*((given | dict(states))[row] for row in composed.needed), *own)
+        return composed.function(*((parameters | dict(states))[row] for row in composed.needed), *own)
 
     return called
 
 
-def place_over_samples(
-    place: Callable[..., Any], effects: Sequence[Effect], rows: Sequence[Any]
-) -> Callable[..., Any] | None:
+def place_over_samples(port: PlainFunction, effects: Sequence[Effect], rows: Sequence[Any]) -> PlainFunction | None:
     """Return what ``python_place`` does, for states and arguments whose numbers are columns (samples,)."""
-    composed = composed_with(place, effects)
+    composed = composed_with(port, effects)
     if composed is None:
         return None
-    given = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
+    parameters = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
 
     def called(states: Mapping[str, Any], *own: Any) -> Any:
-        of_effects = ((given | dict(states))[row] for row in composed.needed)
+        of_effects = ((parameters | dict(states))[row] for row in composed.needed)
         return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
 
     return called

@@ -54,15 +54,15 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
         allowed = (ANY_OF_C, *OFFERED, PYTHON)
         hint = nearest_name(name, allowed)
         raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is none of {', '.join(allowed)}{hint}")
-    found: list[Compiler] = []
+    compilers: list[Compiler] = []
     for make in OFFERED.values():
         with contextlib.suppress(SimulationError):
-            found.append(make())
-    working = tuple(compiler for compiler in found if not _has_failed(compiler, folder))
-    if name and not found:
+            compilers.append(make())
+    working = tuple(compiler for compiler in compilers if not _has_failed(compiler, folder))
+    if name and not compilers:
         raise SimulationError(f"{BACKEND_VARIABLE}={name}: there is no compiler on this computer: {HOW_TO_INSTALL}")
     # The last one is kept even if it failed, so that its own error is what the user reads.
-    return working or (tuple(found[-1:]) if name else ())
+    return working or (tuple(compilers[-1:]) if name else ())
 
 
 def backend_described() -> str:
@@ -110,9 +110,9 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType | None:
         return load_generated(source, compiler)
     except CompilerError as failure:
         # One reason, such as missing headers, often stops several compilers.
-        failed = [item for item in compilers if item is compiler or item.name in failure.names]
+        failed = [other for other in compilers if other is compiler or other.name in failure.names]
         # The next compiler that the same reason does not stop.
-        left = tuple(item for item in others if item not in failed)
+        left = tuple(other for other in others if other not in failed)
         if not left and os.environ.get(BACKEND_VARIABLE):
             raise SimulationError(f"{failure}; {WITHOUT_C}") from failure
         with _LEAVING_OUT:

@@ -40,8 +40,8 @@ class Call(NamedTuple):
 
     def places(self, slot: Slot) -> list[str]:
         """Where in its history the phase sets a number, but for the lane."""
-        given = {name: ast.parse(text, mode="eval").body for name, text in self.given.items()}
-        return [ast.unparse(with_arguments(place, given)) for place in slot.places]
+        arguments = {name: ast.parse(text, mode="eval").body for name, text in self.given.items()}
+        return [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
 
 
 class Rows(Protocol):
@@ -92,12 +92,12 @@ class LoopText:
 
     def expression(self, node: ast.expr) -> ast.expr:
         """An expression of the loop, whose ``lanes`` are arrays of the module."""
-        found: ast.expr = self.composer.visit(_OfLanes(self.rows).visit(self.reduction.visit(node)))
-        return found
+        written: ast.expr = self.composer.visit(_OfLanes(self.rows).visit(self.reduction.visit(node)))
+        return written
 
     def block(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
         """Some statements."""
-        return [line for item in statements for line in self.statement(item)]
+        return [line for statement in statements for line in self.statement(statement)]
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
         """What a statement becomes."""
@@ -157,7 +157,7 @@ class LoopText:
 
     def phases(self, node: ast.For) -> list[ast.stmt]:
         """A loop over lanes."""
-        own = _parsed(self.rows.over_lanes([self.phase(item) for item in node.body]))
+        own = _parsed(self.rows.over_lanes([self.phase(phase) for phase in node.body]))
         return own if self.other is None else self.either(own, self.other.phases(node))
 
     def phase(self, node: ast.stmt) -> Call:
@@ -166,24 +166,26 @@ class LoopText:
             raise self.reduction.refuse(node, "in a loop over lanes phases are called")
         called: FunctionType = self.reduction.outside(node.value.func)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
-        given = list(zip(names, node.value.args, strict=True))[2:]
-        known = {name: self.reduction.value_of(item) for name, item in given}
+        arguments = list(zip(names, node.value.args, strict=True))[2:]
+        known = {name: self.reduction.value_of(value) for name, value in arguments}
         known = {name: value for name, value in known.items() if is_known_part(value)}
-        own = {name: ast.unparse(self.expression(item)) for name, item in given if name not in known}
+        own = {name: ast.unparse(self.expression(value)) for name, value in arguments if name not in known}
         return Call(self.step.phase(called, known), own)
 
     def called(self, node: ast.Call) -> list[ast.stmt]:
         """The lines of a function of the loop, or what one of ``lanes`` does."""
         function = node.func
         if isinstance(function, ast.Attribute) and _is_lanes(function.value):
-            return _parsed(self.rows.acted(function.attr, [ast.unparse(self.expression(item)) for item in node.args]))
+            return _parsed(
+                self.rows.acted(function.attr, [ast.unparse(self.expression(argument)) for argument in node.args])
+            )
         called: FunctionType = self.reduction.outside(function)
         inner = LoopText(self.steps, called)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
-        given = zip(names[2:], map(self.expression, node.args[2:]), strict=True)
+        arguments = zip(names[2:], map(self.expression, node.args[2:]), strict=True)
         begin: list[ast.stmt] = [
             ast.Assign([ast.Name(name, ast.Store())], value)
-            for name, value in given
+            for name, value in arguments
             if not isinstance(value, ast.Name) or value.id != name
         ]
         return [*begin, *self.rows.noted(called), *inner.lines()]
@@ -201,10 +203,10 @@ class _OfLanes(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         if isinstance(node.func, ast.Attribute) and _is_lanes(node.func.value):
-            given = [ast.unparse(self.visit(item)) for item in node.args]
-            (found,) = _parsed([self.rows.asked(node.func.attr, given)])
-            assert isinstance(found, ast.Expr)
-            return found.value
+            arguments = [ast.unparse(self.visit(argument)) for argument in node.args]
+            (asked,) = _parsed([self.rows.asked(node.func.attr, arguments)])
+            assert isinstance(asked, ast.Expr)
+            return asked.value
         self.generic_visit(node)
         return node
 
@@ -309,7 +311,7 @@ class RowsOfLanes:
                 f"    for lane in range({lanes}):",
                 f"        record[{given[0]}, row, lane] = x[row, lane]",
             ]
-        further = [(self.cells[path], f"x[{self.aside + place}, lane]") for place, path in enumerate(self.kept)][count:]
+        further = [(self.cells[path], f"x[{self.aside + index}, lane]") for index, path in enumerate(self.kept)][count:]
         if method == "set_aside":
             lines = [f"{own} = {cell}" for cell, own in further]
             rows = over_rows(count, f"x[{self.aside} + row, lane] = x[row, lane]")
@@ -423,8 +425,8 @@ def run_loop(step: StepText, outputs: str, in_parts: StepText | None) -> str:
     whole = _unparsed(LoopText(steps, loop.advance).lines())
     # A group without numbers is not in the row of all.
     taken = [
-        f"{name} = {f'{given}.{name}' if leaf_paths(row, name) else '()'}"
-        for given, groups in (("parameters", step.parameters), ("states", step.states))
+        f"{name} = {f'{group}.{name}' if leaf_paths(row, name) else '()'}"
+        for group, groups in (("parameters", step.parameters), ("states", step.states))
         for name, row in groups.items()
     ]
     left = [f"states.{name} = {name}" for name, row in step.states.items() if leaf_paths(row, name)]

@@ -18,45 +18,46 @@ from ppafo.engine.plain_python import parse_module
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.source_text import COMPILED_BUILTINS, SourceCollector
 from ppafo.errors import ProgramError
+from ppafo.model.plain_function import PlainFunction
 
 
-def over_samples(function: Callable[..., Any], *given: Any) -> Any:
+def over_samples(function: PlainFunction, *arguments: Any) -> Any:
     """Value of a function of the model, in its own units, of rows and numbers any of which may be columns (samples,).
 
     What is the same for all samples may stay one number.
     """
     # A form that was made from a function that has changed since is made anew.
-    found = _composed(function)
-    if found is not None and not found[0].made_from.is_current():
+    composed = _composed(function)
+    if composed is not None and not composed[0].made_from.is_current():
         _composed.cache_clear()
-        found = _composed(function)
-    return called_over_samples(function, (None if found is None else found[1]), *given)
+        composed = _composed(function)
+    return called_over_samples(function, (None if composed is None else composed[1]), *arguments)
 
 
-def called_over_samples(function: Callable[..., Any], of_columns: Callable[..., Any] | None, *given: Any) -> Any:
-    """As ``over_samples``, of a function whose form for columns is known; None where it has none."""
+def called_over_samples(function: PlainFunction, of_columns: PlainFunction | None, *arguments: Any) -> Any:
+    """Value of a function over samples whose form for columns is known; None where it has none."""
     if of_columns is not None:
         # A choice works out what no sample takes, too.
         with np.errstate(all="ignore"):
-            return of_columns(*given)
+            return of_columns(*arguments)
     # Sample by sample.
-    flat = [leaves(item) if isinstance(item, tuple) else [item] for item in given]
+    flat = [leaves(argument) if isinstance(argument, tuple) else [argument] for argument in arguments]
     columns = [value for row in flat for value in row if isinstance(value, np.ndarray)]
     if not columns:
-        return function(*given)
+        return function(*arguments)
     results = []
     for sample in range(columns[0].size):
         numbers = [[value[sample] if isinstance(value, np.ndarray) else value for value in row] for row in flat]
         parts = (
-            rebuilt(type(item), map(float, row)) if isinstance(item, tuple) else float(row[0])
-            for item, row in zip(given, numbers, strict=True)
+            rebuilt(type(argument), map(float, row)) if isinstance(argument, tuple) else float(row[0])
+            for argument, row in zip(arguments, numbers, strict=True)
         )
         results.append(function(*parts))
     return _gathered(results)
 
 
 @lru_cache(maxsize=64)
-def _composed(function: Callable[..., Any]) -> tuple[SourceCollector, Callable[..., Any] | None] | None:
+def _composed(function: PlainFunction) -> tuple[SourceCollector, PlainFunction | None] | None:
     collector = SourceCollector("")
     try:
         name = collector.add(function)
@@ -65,7 +66,7 @@ def _composed(function: Callable[..., Any]) -> tuple[SourceCollector, Callable[.
     return collector, in_columns(collector.text(), name)
 
 
-def in_columns(text: str, name: str) -> Callable[..., Any] | None:
+def in_columns(text: str, name: str) -> PlainFunction | None:
     """A function of a composed text for columns; None where it has no such form."""
     try:
         tree = _Columns().visit(parse_module(text))
@@ -73,15 +74,15 @@ def in_columns(text: str, name: str) -> Callable[..., Any] | None:
         return None
     scope: dict[str, Any] = {"namedtuple": namedtuple, **_OPERATIONS}
     exec(compile(ast.fix_missing_locations(tree), "<columns>", "exec"), scope)
-    found: Callable[..., Any] = scope[name]
-    return found
+    function: PlainFunction = scope[name]
+    return function
 
 
 def _gathered(results: list[Any]) -> Any:
     first = results[0]
     if not isinstance(first, tuple):
         return np.array(results, dtype=np.float64)
-    parts = [_gathered([result[place] for result in results]) for place in range(len(first))]
+    parts = [_gathered([result[index] for result in results]) for index in range(len(first))]
     return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
 
 
@@ -117,7 +118,7 @@ def _as_float(number: Any) -> Any:
     return number.astype(np.float64) if isinstance(number, np.ndarray) else float(number)
 
 
-_OPERATIONS: dict[str, Callable[..., Any]] = {
+_OPERATIONS: dict[str, Callable[..., Any]] = {  # of one number, of two, or of any
     "_chosen": _chosen,
     "_all": np.logical_and,
     "_any": np.logical_or,
@@ -138,15 +139,15 @@ def _is_elementwise(node: ast.AST) -> bool:
     if isinstance(node, ast.Compare):
         return len(node.ops) == 1
     if isinstance(node, ast.For) and isinstance(node.iter, ast.Call):
-        return all(isinstance(item, ast.Constant) for item in node.iter.args)
+        return all(isinstance(argument, ast.Constant) for argument in node.iter.args)
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         return node.func.id not in COMPILED_BUILTINS - _SAME_IN_COLUMNS
     # NumPy's other functions differ from ``math`` in the last bits.
     return not isinstance(node, ast.Call) or ast.unparse(node.func) == "math.sqrt"
 
 
-def _call(name: str, *given: ast.expr) -> ast.expr:
-    return ast.Call(ast.Name(name, ast.Load()), list(given), [])
+def _call(name: str, *arguments: ast.expr) -> ast.expr:
+    return ast.Call(ast.Name(name, ast.Load()), list(arguments), [])
 
 
 def _later(value: ast.expr) -> ast.Lambda:
@@ -169,11 +170,11 @@ class _Columns(ast.NodeTransformer):
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
         # Both sides are computed: columns have no short circuit.
         name = "_all" if isinstance(node.op, ast.And) else "_any"
-        found: ast.expr
-        found, *others = (self.visit(part) for part in node.values)
+        joined: ast.expr
+        joined, *others = (self.visit(part) for part in node.values)
         for other in others:
-            found = _call(name, found, other)
-        return found
+            joined = _call(name, joined, other)
+        return joined
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
         inner = self.visit(node.operand)

@@ -58,22 +58,22 @@ class _ElsewhereError(Exception):
 @cache
 def _hash_of_files(folders: tuple[str, ...]) -> str:
     """The bytes of the files, and Python, which writes the text of a syntax tree in its own way."""
-    found = hashlib.sha256(sys.version.encode())
+    digest = hashlib.sha256(sys.version.encode())
     root = str(_PACKAGE)
     # Names as texts: paths of hundreds of files take longer than their bytes.
     files = [
-        f"{place}{os.sep}{name}"
+        f"{directory}{os.sep}{name}"
         for folder in folders
-        for place, _, names in os.walk(f"{root}{os.sep}{folder}")
+        for directory, _, names in os.walk(f"{root}{os.sep}{folder}")
         for name in names
         if name.endswith(_SUFFIXES)
     ]
     for file in sorted(files):
         with open(file, "rb") as opened:  # noqa: PTH123
             content = opened.read()
-        found.update(f"{file[len(root) :]} {len(content)} ".encode())
-        found.update(content)
-    return found.hexdigest()
+        digest.update(f"{file[len(root) :]} {len(content)} ".encode())
+        digest.update(content)
+    return digest.hexdigest()
 
 
 def _names_in(folders: tuple[str, ...]) -> Iterator[Read]:
@@ -113,35 +113,35 @@ def _described(value: Any) -> str:
     if isinstance(value, FunctionType | type | ModuleType):
         return _named(value)
     if isinstance(value, Mapping):
-        return f"{{{', '.join(f'{_described(key)}: {_described(item)}' for key, item in value.items())}}}"
+        return f"{{{', '.join(f'{_described(key)}: {_described(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, tuple | list):
         kind = _named(type(value)) if hasattr(value, "_fields") else type(value).__name__
         return f"{kind}({', '.join(map(_described, value))})"
     if is_dataclass(value):
-        held = (f"{item.name}={_described(getattr(value, item.name))}" for item in fields(value))
+        held = (f"{part.name}={_described(getattr(value, part.name))}" for part in fields(value))
         return f"{_named(type(value))}({', '.join(held)})"
     raise _ElsewhereError
 
 
-def _named(item: Any) -> str:
+def _named(value: Any) -> str:
     """Where a function, a class or a module of the package stands."""
-    module = item.__name__ if isinstance(item, ModuleType) else item.__module__
-    if isinstance(item, type) and module == "builtins":
-        return item.__qualname__
+    module = value.__name__ if isinstance(value, ModuleType) else value.__module__
+    if isinstance(value, type) and module == "builtins":
+        return value.__qualname__
     if not module.startswith("ppafo."):
         raise _ElsewhereError
-    if isinstance(item, ModuleType):
+    if isinstance(value, ModuleType):
         return module
-    names = [module, *item.__qualname__.split(".")]
+    names = [module, *value.__qualname__.split(".")]
     stands: Any = reduce(lambda owner, name: getattr(owner, name, None), names[1:], sys.modules.get(names[0]))
-    if stands is item:
+    if stands is value:
         return ".".join(names)
-    frame = frame_of(item) if isinstance(item, FunctionType) else None
+    frame = frame_of(value) if isinstance(value, FunctionType) else None
     if frame is not None:
         components = ", ".join(f"{name}: {_described(component)}" for name, component in frame.components)
         return f"{'.'.join(names)}({_named(frame.function)}; {components})"
-    if is_row(item):
+    if is_row(value):
         # Made of others, such as the settings of a law with those of its estimator: its fields are all of it.
-        kinds = (_named(kind) if is_row(kind) else repr(kind) for kind in item.__annotations__.values())
-        return f"{'.'.join(names)}({', '.join(item._fields)}: {', '.join(kinds)}; {_described(item._field_defaults)})"
+        kinds = (_named(kind) if is_row(kind) else repr(kind) for kind in value.__annotations__.values())
+        return f"{'.'.join(names)}({', '.join(value._fields)}: {', '.join(kinds)}; {_described(value._field_defaults)})"
     raise _ElsewhereError

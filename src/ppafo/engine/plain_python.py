@@ -91,9 +91,9 @@ def check_grammar(tree: ast.FunctionDef, file: str) -> None:
             left_away.add(node.value)
         elif isinstance(node, ast.stmt | ast.expr | ast.keyword) and node not in left_away:
             problems.append((node, _problem(node)))
-    found = [(where, problem) for where, problem in problems if problem]
-    if found:
-        where, problem = min(found, key=lambda item: (item[0].lineno, item[0].col_offset))
+    present = [(where, problem) for where, problem in problems if problem]
+    if present:
+        where, problem = min(present, key=lambda problem: (problem[0].lineno, problem[0].col_offset))
         raise refusal(file, where, problem)
 
 
@@ -118,8 +118,8 @@ def check_flow(tree: ast.FunctionDef, file: str, local: Iterable[str]) -> None:
     ProgramError names the file and the line.
     """
     arguments = tree.args
-    given = {item.arg for item in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
-    if _Flow(file, set(local)).end_of(tree.body, given) is not None:
+    parameters = {argument.arg for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs)}
+    if _Flow(file, set(local)).end_of(tree.body, parameters) is not None:
         raise refusal(file, tree, f"'{tree.name}' can end without 'return'; every path through it must return a value")
 
 
@@ -153,13 +153,15 @@ class _Flow:
             raise refusal(self.file, statement, "'return' gives no value")
         if isinstance(statement, ast.AugAssign) and _assigned_names(statement.target) - bound:
             raise self.unbound(statement, ast.unparse(statement.target))
-        given = getattr(statement, "value", None)
-        if isinstance(given, ast.expr):
-            self.read(given, bound)
+        value = getattr(statement, "value", None)
+        if isinstance(value, ast.expr):
+            self.read(value, bound)
         ends_here = isinstance(statement, ast.Return | ast.Break | ast.Continue)
         targets = statement.targets if isinstance(statement, ast.Assign) else [getattr(statement, "target", None)]
         stored = (
-            set() if given is None else {name for item in targets if item is not None for name in _assigned_names(item)}
+            set()
+            if value is None
+            else {name for target in targets if target is not None for name in _assigned_names(target)}
         )
         return None if ends_here else bound | stored
 
@@ -180,9 +182,9 @@ class _Flow:
     def read(self, node: ast.AST, bound: set[str]) -> None:
         """Refuse the reading of a local name that may have no value yet."""
         missing = self.local - bound
-        for item in ast.walk(node) if missing else ():
-            if isinstance(item, ast.Name) and item.id in missing:
-                raise self.unbound(item, item.id)
+        for inner in ast.walk(node) if missing else ():
+            if isinstance(inner, ast.Name) and inner.id in missing:
+                raise self.unbound(inner, inner.id)
 
     def unbound(self, where: ast.AST, name: str) -> ProgramError:
         """The error for a name without a value."""
@@ -190,7 +192,7 @@ class _Flow:
 
 
 def _assigned_names(target: ast.AST) -> set[str]:
-    return {item.id for item in ast.walk(target) if isinstance(item, ast.Name)}
+    return {inner.id for inner in ast.walk(target) if isinstance(inner, ast.Name)}
 
 
 _ORIGIN = re.compile(rf"{re.escape(ORIGIN)} (?P<file>.*): (?P<lines>[\d ]+)$")
@@ -212,7 +214,7 @@ def place_in(lines: list[str], number: int) -> Place | None:
             if lines[start].startswith("@entry(") and start + 1 < number and not lines[start - 1].startswith(ORIGIN):
                 return None
             continue
-        at = [int(item) for item in origin["lines"].split()]
+        at = [int(line) for line in origin["lines"].split()]
         # Two lines stand before the first of a function: its decorator and its def.
         index = number - 1 - (start + 2)
         if not 0 <= index < len(at) - 1:

@@ -45,7 +45,7 @@ class GasPhases(Protocol):
         """What a step adds to the state."""
 
     @property
-    def START(self) -> Callable[..., Any] | None:  # noqa: N802
+    def START(self) -> Callable[[Any, PlantState], Any] | None:  # noqa: N802
         """``START(plant, initial)`` makes the only group of states; None where there is none."""
 
     def stage(self, parts: "Program") -> Rows:

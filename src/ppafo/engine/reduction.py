@@ -114,7 +114,7 @@ class Definition:
             else:
                 known = frozenset().union(*map(self.read_in, ast.iter_child_nodes(node)))
                 if isinstance(node, ast.GeneratorExp):
-                    known -= {item.id for loop in node.generators for item in names_in(loop.target)}
+                    known -= {name.id for loop in node.generators for name in names_in(loop.target)}
             self.names[id(node)] = known
         return known
 
@@ -122,7 +122,7 @@ class Definition:
         """The value of an expression."""
         if id(node) not in self.codes:
             whole = ast.fix_missing_locations(ast.Expression(node))
-            is_nested = any(isinstance(item, ast.GeneratorExp) for item in ast.walk(node))
+            is_nested = any(isinstance(inner, ast.GeneratorExp) for inner in ast.walk(node))
             self.codes[id(node)] = compile(whole, "<parts>", "eval"), is_nested
         code, is_nested = self.codes[id(node)]
         # What stands in a generator sees no local names.
@@ -131,17 +131,17 @@ class Definition:
 
 def names_in(node: ast.AST) -> list[ast.Name]:
     """All names in a tree."""
-    return [item for item in ast.walk(node) if isinstance(item, ast.Name)]
+    return [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
 
 
 @lru_cache(maxsize=256)
 def definition_of(function: FunctionType) -> Definition:
     """The definition of a function of the step. ProgramError where its source cannot be read."""
     file = sys.modules[function.__module__].__file__ if function.__module__ in sys.modules else None
-    found = _definitions(file or "").get(function.__code__.co_firstlineno)
-    if found is None:
+    definition = _definitions(file or "").get(function.__code__.co_firstlineno)
+    if definition is None:
         raise ProgramError(f"cannot compile {function.__qualname__}: its source text is not available")
-    return Definition(found)
+    return Definition(definition)
 
 
 @lru_cache(maxsize=64)
@@ -151,7 +151,7 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
         tree = parse_module(Path(file).read_text(encoding="utf-8"), file)
     except (OSError, SyntaxError):
         return {}
-    return {item.lineno: item for item in tree.body if isinstance(item, ast.FunctionDef)}
+    return {statement.lineno: statement for statement in tree.body if isinstance(statement, ast.FunctionDef)}
 
 
 class Reduction:
@@ -164,11 +164,11 @@ class Reduction:
         self.known: dict[str, Any] = {"parts": collector.parts, **known}
         # A name that a generator asks is no plain local one.
         self.running = {*function.__code__.co_varnames, *function.__code__.co_cellvars} - self.known.keys()
-        stored = [item.id for item in names_in(self.definition.tree) if isinstance(item.ctx, ast.Store)]
+        stored = [name.id for name in names_in(self.definition.tree) if isinstance(name.ctx, ast.Store)]
         self.times_set = {name: stored.count(name) for name in stored}
         self.effects = Effects()
         self.assigned: set[str] = set()
-        self.parameters = [item.arg for item in self.definition.tree.args.args]
+        self.parameters = [argument.arg for argument in self.definition.tree.args.args]
         self.renamed: dict[str, str] = {}
 
     def refuse(self, where: ast.AST, problem: str) -> ProgramError:
@@ -180,12 +180,12 @@ class Reduction:
         tree = copy(self.definition.tree)
         tree.body = self.block(tree.body)
         taken = {*self.effects.reads, *self.effects.results}
-        asked = {item.id for line in tree.body for item in names_in(line)}
+        asked = {name.id for line in tree.body for name in names_in(line)}
         own = [name for name in self.parameters if name != "lane" and name not in self.known and name in asked]
         self.effects.takes = tuple(own)
         # A local name that is also a group's has another spelling.
         names = _Names({name for name in _bound(tree.body) | set(own) if name in taken})
-        tree.body = [names.visit(item) for item in tree.body]
+        tree.body = [names.visit(line) for line in tree.body]
         handed = [NUMBER, *self.effects.reads] if HISTORIES & self.effects.reads.keys() else [*self.effects.reads]
         tree.args = ast.arguments(
             [], [ast.arg(name) for name in [*dict.fromkeys(handed), *map(names.spelling, own)]], None, [], [], None, []
@@ -242,7 +242,7 @@ class Reduction:
             if isinstance(value, ast.expr):
                 setattr(made, name, self.visit(value))
             elif isinstance(value, list):
-                setattr(made, name, [self.part(item) for item in value])
+                setattr(made, name, [self.part(part) for part in value])
         return made
 
     def part(self, node: ast.AST) -> ast.AST:
@@ -298,13 +298,13 @@ class Reduction:
         name = self.group(node)
         if name:
             group, *way = name.split(".")
-            found: ast.expr = self.read(group)
-            for item in way:
-                found = ast.Attribute(found, item, ast.Load())
-            return found
+            read: ast.expr = self.read(group)
+            for step in way:
+                read = ast.Attribute(read, step, ast.Load())
+            return read
         history = self.group(node.value)
         if history in HISTORIES:
-            places = [self.visit(item) for item in _places(node)]
+            places = [self.visit(index) for index in _places(node)]
             return ast.Subscript(
                 self.read(history), ast.Tuple([*places, ast.Name(NUMBER, ast.Load())], ast.Load()), ast.Load()
             )
@@ -335,24 +335,24 @@ class Reduction:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
         if is_step_function(called):
-            name, given = self.called(called, node)
+            name, arguments = self.called(called, node)
             if self.collector.effects_of(name).results:
                 raise self.refuse(node, f"'{called.__name__}' sets groups of its lane, so that it gives no value")
-            return ast.Call(ast.Name(self.collector.keep(called), ast.Load()), given, [])
+            return ast.Call(ast.Name(self.collector.keep(called), ast.Load()), arguments, [])
         if isinstance(called, FunctionType):
             for row in self.collector.handed_to(self.collector.add_called(self.function, called, {})):
                 self.read(row)
         if called is _UNKNOWN:
             return self.whole(node)
         # Arguments that a generator makes are written out.
-        given = [part for item in node.args for part in self.arguments(item)]
-        named = [ast.keyword(item.arg, self.visit(item.value)) for item in node.keywords]
+        arguments = [part for argument in node.args for part in self.arguments(argument)]
+        named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
         function = (
             ast.Name(self.collector.keep(called), ast.Load())
             if isinstance(called, FunctionType) or is_row(called)
             else self.visit(node.func)
         )
-        return ast.Call(function, given, named)
+        return ast.Call(function, arguments, named)
 
     def called(self, called: FunctionType, node: ast.Call) -> tuple[str, list[ast.expr]]:
         """Name in the module of a function of the step that is called, and its own arguments."""
@@ -360,13 +360,13 @@ class Reduction:
         if len(node.args) != len(names) or node.keywords:
             raise self.refuse(node, f"{called.__name__}({', '.join(names)}): its arguments are given in their order")
         own = list(zip(names, node.args, strict=True))[2:]
-        known = {name: self.value_of(item) for name, item in own}
+        known = {name: self.value_of(value) for name, value in own}
         known = {name: value for name, value in known.items() if is_known_part(value)}
         name = self.collector.add_called(self.function, called, known)
         effects = self.collector.effects_of(name)
         for row in effects.reads:
             self.read(row)
-        return name, [self.visit(item) for own_name, item in own if own_name in effects.takes]
+        return name, [self.visit(value) for own_name, value in own if own_name in effects.takes]
 
     def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
         """An argument, or those that ``*(... for ... in ...)`` stands for."""
@@ -375,8 +375,8 @@ class Reduction:
             return
         (loop,) = node.value.generators
         assert isinstance(loop.target, ast.Name)
-        for item in self.items_of(loop.iter):
-            yield self.with_known({loop.target.id: item}, node.value.elt)
+        for element in self.items_of(loop.iter):
+            yield self.with_known({loop.target.id: element}, node.value.elt)
 
     def with_known(self, more: Mapping[str, Any], node: ast.expr) -> ast.expr:
         """An expression with some more names known."""
@@ -397,8 +397,8 @@ class Reduction:
     def block(self, statements: Iterable[ast.stmt]) -> list[ast.stmt]:
         """Some statements; what stands behind a ``return`` that is decided on is never reached."""
         made: list[ast.stmt] = []
-        for item in statements:
-            made += [ast.copy_location(line, item) for line in self.statement(item)]
+        for statement in statements:
+            made += [ast.copy_location(line, statement) for line in self.statement(statement)]
             if made and isinstance(made[-1], ast.Return):
                 break
         return made
@@ -440,11 +440,11 @@ class Reduction:
         """A loop over what is known, written out."""
         made: list[ast.stmt] = []
         # Names that live in one turn have another spelling in each: what they stand for may have another class.
-        begun = {item.id for item in names_in(self.definition.tree) if item.lineno < node.lineno}
-        own = [item for item in _bound(node.body) if item not in begun]
-        for number, item in enumerate(self.items_of(node.iter)):
+        begun = {name.id for name in names_in(self.definition.tree) if name.lineno < node.lineno}
+        own = [name for name in _bound(node.body) if name not in begun]
+        for number, element in enumerate(self.items_of(node.iter)):
             targets = node.target.elts if isinstance(node.target, ast.Tuple) else [node.target]
-            values = item if isinstance(node.target, ast.Tuple) else (item,)
+            values = element if isinstance(node.target, ast.Tuple) else (element,)
             for target, value in zip(targets, values, strict=True):
                 assert isinstance(target, ast.Name)
                 self.known[target.id] = value
@@ -466,40 +466,40 @@ class Reduction:
                 return []
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and not self.crosses(target, value):
             pairs = zip(target.elts, value.elts, strict=True)
-            return [line for one, other in pairs for line in self.assignment(one, other)]
+            return [line for target_part, other in pairs for line in self.assignment(target_part, other)]
         fields = self.fields_changed(target, value)
-        given = self.visit(value)
+        written = self.visit(value)
         targets = target.elts if isinstance(target, ast.Tuple) else [target]
-        left = [self.set_target(item, fields) for item in targets]
+        left = [self.set_target(target, fields) for target in targets]
         row = self.collector.rows.get(left[0].id.removeprefix(_GROUP)) if left[0].id.startswith(_GROUP) else None
-        if len(left) == 1 and isinstance(given, ast.IfExp) and row is not None and not is_number(row):
-            given = self.number_by_number(row, given)
-        if len(left) == 1 and isinstance(given, ast.Name) and given.id == left[0].id:
+        if len(left) == 1 and isinstance(written, ast.IfExp) and row is not None and not is_number(row):
+            written = self.number_by_number(row, written)
+        if len(left) == 1 and isinstance(written, ast.Name) and written.id == left[0].id:
             return []
-        return [ast.Assign([ast.Tuple([*left], ast.Store()) if isinstance(target, ast.Tuple) else left[0]], given)]
+        return [ast.Assign([ast.Tuple([*left], ast.Store()) if isinstance(target, ast.Tuple) else left[0]], written)]
 
     def crosses(self, target: ast.Tuple, value: ast.Tuple) -> bool:
         """True where one of several values reads what another sets."""
-        names = {ast.unparse(item) for item in target.elts}
-        return any(ast.unparse(item) in names for part in value.elts for item in ast.walk(part))
+        names = {ast.unparse(element) for element in target.elts}
+        return any(ast.unparse(element) in names for part in value.elts for element in ast.walk(part))
 
-    def set_target(self, item: ast.expr, fields: Fields) -> ast.Name:
+    def set_target(self, target: ast.expr, fields: Fields) -> ast.Name:
         """A name for what is set."""
-        name = self.group(item)
+        name = self.group(target)
         if name:
             self.note_set(name, fields)
             return ast.Name(_GROUP + name, ast.Store())
-        if isinstance(item, ast.Subscript) and self.group(item.value) in HISTORIES:
-            history, places = self.group(item.value), tuple(map(self.visit, _places(item)))
-            known = [place.value for place in places if isinstance(place, ast.Constant)]
+        if isinstance(target, ast.Subscript) and self.group(target.value) in HISTORIES:
+            history, places = self.group(target.value), tuple(map(self.visit, _places(target)))
+            known = [index.value for index in places if isinstance(index, ast.Constant)]
             # A trace has the names of its channels.
-            words = [self.collector.parts.traced[place] if history == "trace" else str(place) for place in known]
+            words = [self.collector.parts.traced[index] if history == "trace" else str(index) for index in known]
             name = "_".join(["new", history.removesuffix("_history"), *words]).replace(".", "_")
-            self.note_slot(name, Slot(history, places), item)
+            self.note_slot(name, Slot(history, places), target)
             return ast.Name(_GROUP + name, ast.Store())
-        if not isinstance(item, ast.Name):
-            raise self.refuse(item, f"'{ast.unparse(item)}' cannot be set in a phase")
-        return ast.Name(self.renamed.get(item.id, item.id), ast.Store())
+        if not isinstance(target, ast.Name):
+            raise self.refuse(target, f"'{ast.unparse(target)}' cannot be set in a phase")
+        return ast.Name(self.renamed.get(target.id, target.id), ast.Store())
 
     def note_set(self, name: str, fields: Fields) -> None:
         """Note a group that is set, and which of its fields change."""
@@ -509,7 +509,7 @@ class Reduction:
 
     def note_slot(self, name: str, slot: Slot, where: ast.AST) -> None:
         """Note a number of a history that is set. ProgramError for a place that the loop over steps does not know."""
-        if any(item.id not in self.parameters for place in slot.places for item in names_in(place)):
+        if any(name.id not in self.parameters for index in slot.places for name in names_in(index)):
             raise self.refuse(where, "where a history is set must be a parameter, or a field of one")
         self.effects.slots[name] = slot
         self.assigned.add(name)
@@ -519,31 +519,31 @@ class Reduction:
         if not isinstance(value, ast.Call) or not isinstance(value.func, ast.Attribute):
             return None
         is_part = value.func.attr == "_replace" and self.group(target) == self.group(value.func.value) != ""
-        return frozenset(item.arg for item in value.keywords if item.arg is not None) if is_part else None
+        return frozenset(keyword.arg for keyword in value.keywords if keyword.arg is not None) if is_part else None
 
     def number_by_number(self, row: Any, choice: ast.IfExp) -> ast.expr:
         """A choice between two rows as the row of the choices between their numbers: no branch, by any compiler."""
 
-        def chosen(kind: Any, one: ast.expr, other: ast.expr) -> ast.expr:
+        def chosen(kind: Any, yes: ast.expr, other: ast.expr) -> ast.expr:
             if is_number(kind):
-                return ast.IfExp(choice.test, one, other)
-            inner = [chosen(inside, part_of(one, way), part_of(other, way)) for way, inside in members(kind)]
+                return ast.IfExp(choice.test, yes, other)
+            inner = [chosen(inside, part_of(yes, way), part_of(other, way)) for way, inside in members(kind)]
             if not is_row(kind) or not inner:
                 return ast.Tuple([*inner], ast.Load())
             return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
 
-        def part_of(item: ast.expr, way: str) -> ast.expr:
-            place = int(way[1:-1]) if way[0] == "[" else way[1:]
-            if isinstance(item, ast.Name):
+        def part_of(owner: ast.expr, way: str) -> ast.expr:
+            key = int(way[1:-1]) if way[0] == "[" else way[1:]
+            if isinstance(owner, ast.Name):
                 try:
-                    value = self.collector.value_kept(item.id)
+                    value = self.collector.value_kept(owner.id)
                 except KeyError:
                     pass
                 else:
-                    return self.written(value[place] if isinstance(place, int) else getattr(value, place))
-            if isinstance(place, int):
-                return ast.Subscript(item, ast.Constant(place), ast.Load())
-            return ast.Attribute(item, place, ast.Load())
+                    return self.written(value[key] if isinstance(key, int) else getattr(value, key))
+            if isinstance(key, int):
+                return ast.Subscript(owner, ast.Constant(key), ast.Load())
+            return ast.Attribute(owner, key, ast.Load())
 
         return chosen(row, choice.body, choice.orelse)
 
@@ -552,19 +552,19 @@ class Reduction:
         called = self.outside(node.func)
         if not is_step_function(called):
             raise self.refuse(node, f"'{ast.unparse(node)}' throws away what it returns")
-        name, given = self.called(called, node)
+        name, arguments = self.called(called, node)
         effects = self.collector.effects_of(name)
         if not effects.results:
             return []
         for group, fields in effects.groups.items():
             self.note_set(group, fields)
         names = called.__code__.co_varnames[: called.__code__.co_argcount]
-        own = [(key, item) for key, item in zip(names, node.args, strict=True) if key not in ("parts", "lane")]
-        given_by_name = {key: self.visit(item) for key, item in own} if effects.slots else {}
+        own = [(key, value) for key, value in zip(names, node.args, strict=True) if key not in ("parts", "lane")]
+        given_by_name = {key: self.visit(value) for key, value in own} if effects.slots else {}
         for result, slot in effects.slots.items():
-            places = tuple(with_arguments(place, given_by_name) for place in slot.places)
+            places = tuple(with_arguments(index, given_by_name) for index in slot.places)
             self.note_slot(result, Slot(slot.history, places), node)
-        call = ast.Call(ast.Name(self.collector.keep(called), ast.Load()), given, [])
+        call = ast.Call(ast.Name(self.collector.keep(called), ast.Load()), arguments, [])
         groups = [ast.Name(_GROUP + result, ast.Store()) for result in effects.results]
         if len(groups) == 1:
             return [ast.Assign([groups[0]], call)]
@@ -583,18 +583,18 @@ def _places(node: ast.Subscript) -> Sequence[ast.expr]:
 
 def _bound(body: Iterable[ast.stmt]) -> set[str]:
     """Names that some statements give values."""
-    return {item.id for statement in body for item in names_in(statement) if isinstance(item.ctx, ast.Store)}
+    return {name.id for statement in body for name in names_in(statement) if isinstance(name.ctx, ast.Store)}
 
 
-def with_arguments(place: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
+def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
     """A place in terms of a caller's arguments."""
 
     class Replacing(ast.NodeTransformer):
         def visit_Name(self, node: ast.Name) -> ast.expr:
             return arguments.get(node.id, node)
 
-    found: ast.expr = Replacing().visit(deepcopy(place))
-    return found
+    replaced: ast.expr = Replacing().visit(deepcopy(expression))
+    return replaced
 
 
 @dataclass(slots=True)

@@ -227,15 +227,15 @@ def gas_at_start(run: Run) -> Any:
         return start(run.plant, run.initial)
     rows = dict(zip((effect.name for effect in program.effects), run.effects, strict=True))
     types = [*(program.effect_rows[name] for name in composed.needed), program.actuator.plant, PlantState]
-    given = [*(rows[name] for name in composed.needed), run.plant, run.initial]
-    counts = [len(leaves(row)) for row in given]
+    arguments = [*(rows[name] for name in composed.needed), run.plant, run.initial]
+    counts = [len(leaves(row)) for row in arguments]
 
     def alone(*values: float) -> Any:
         rest = iter(values)
         parts = [rebuilt(kind, [next(rest) for _ in range(count)]) for kind, count in zip(types, counts, strict=True)]
         return composed.function(*parts)
 
-    return over_runs(alone, *(number for row in given for number in leaves(row)))
+    return over_runs(alone, *(number for row in arguments for number in leaves(row)))
 
 
 def states_at_start(run: Run) -> list[Any]:
@@ -253,14 +253,14 @@ def states_at_start(run: Run) -> list[Any]:
 
 
 def _started(state: State, parameters: type, row: Any, now: Moment) -> Any:
-    start, given = state.start, leaves(row)
+    start, numbers = state.start, leaves(row)
     if start is None:
         return state.row()
 
     def alone(*values: float) -> Any:
-        return start(rebuilt(parameters, values[: len(given)]), rebuilt(Moment, values[len(given) :]))
+        return start(rebuilt(parameters, values[: len(numbers)]), rebuilt(Moment, values[len(numbers) :]))
 
-    return over_runs(alone, *given, *now)
+    return over_runs(alone, *numbers, *now)
 
 
 def moment_at_start(plant: PlantParameters, initial: PlantState) -> Moment:
@@ -294,10 +294,10 @@ def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchR
         parameters = np.concatenate([batches[index].parameters for index in members], axis=1)
         states = np.concatenate([batches[index].states for index in members], axis=1)
 
-        def take(block: slice, found: BatchResult, members: list[int] = members) -> None:
+        def take(block: slice, outcome: BatchResult, members: list[int] = members) -> None:
             for column, index in enumerate(members[block]):
                 one = slice(column, column + 1)
-                results[index] = BatchResult(found.states[:, one], found.record[:, :, one])
+                results[index] = BatchResult(outcome.states[:, one], outcome.record[:, :, one])
 
         run_blocks(Batch(program, clock, parameters, states), take, threads)
     return [results[index] for index in range(len(runs))]

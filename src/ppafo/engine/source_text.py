@@ -27,6 +27,7 @@ from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError, nearest_name, one_line
+from ppafo.model.plain_function import PlainFunction
 
 COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
@@ -42,8 +43,8 @@ def each(convert: Callable[[float], float], row: Row) -> Row:
     The engine writes it out number by number, by the class that the row is declared to be.
     """
     make: Any = type(row)
-    found: Row = make(*(each(convert, item) if isinstance(item, tuple) else convert(item) for item in row))
-    return found
+    made_row: Row = make(*(each(convert, value) if isinstance(value, tuple) else convert(value) for value in row))
+    return made_row
 
 
 def is_step_function(function: object) -> bool:
@@ -105,10 +106,10 @@ class Composer(ast.NodeTransformer):
         kind, target = self.kind_of(node.value), node.targets[0]
         parts = getattr(kind, "__args__", ())
         named = zip(target.elts, parts, strict=False) if isinstance(target, ast.Tuple) else ((target, kind),)
-        for item, found in named:
+        for item, value in named:
             if isinstance(item, ast.Name) and item.id not in self.rows:
                 # A name that stands for two kinds stands for none: nothing may then be written out for it.
-                self.kinds[item.id] = found if self.kinds.get(item.id, found) is found else None
+                self.kinds[item.id] = value if self.kinds.get(item.id, value) is value else None
         return ast.copy_location(ast.Assign(node.targets, self.visit(node.value)), node)
 
     def visit_Expr(self, node: ast.Expr) -> ast.stmt:
@@ -151,9 +152,9 @@ class Composer(ast.NodeTransformer):
         if isinstance(called, types.FunctionType) or is_row(called):
             own = self.own_arguments(called, node)
         function = self.stand_in(called, node.func)
-        arguments = [*self.rows_for(function, node), *(self.visit(item) for item in node.args)]
+        arguments = [*self.rows_for(function, node), *(self.visit(argument) for argument in node.args)]
         if not own:
-            named = [ast.keyword(item.arg, self.visit(item.value)) for item in node.keywords]
+            named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
             return ast.Call(function, arguments, named)
         return ast.Call(function, [*arguments, *own], [])
 
@@ -168,33 +169,33 @@ class Composer(ast.NodeTransformer):
 
     def handed_over(self, value: Any, node: ast.expr) -> ast.expr:
         """What is written for a value that is not called. ProgramError for a function that needs rows of effects."""
-        found = self.stand_in(value, node)
-        if isinstance(found, ast.Name) and self.rows_of(found.id):
+        stand_in = self.stand_in(value, node)
+        if isinstance(stand_in, ast.Name) and self.rows_of(stand_in.id):
             raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
-        return found
+        return stand_in
 
     def own_arguments(self, called: Any, node: ast.Call) -> list[ast.expr]:
         """Fields of a NamedTuple after those given by place, where some have the defaults of its class; else none.
 
         ProgramError where they do not fit.
         """
-        if is_step_function(called) or any(isinstance(item, ast.Starred) for item in node.args):
+        if is_step_function(called) or any(isinstance(argument, ast.Starred) for argument in node.args):
             return []  # its groups are handed over by name; how many there are is known only to the compiler
         is_function = isinstance(called, types.FunctionType)
         takes: tuple[str, ...] = _parameters(called.__code__) if is_function else called._fields
         if len(node.args) == len(takes) and not node.keywords and not (is_function and called.__kwdefaults__):
             return []
-        given = {item.arg: item.value for item in node.keywords if item.arg is not None}
+        named = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
         try:
-            inspect.signature(called).bind(*node.args, **given)
+            inspect.signature(called).bind(*node.args, **named)
         except TypeError as error:
-            unknown = next((name for name in given if name not in takes), None)
+            unknown = next((name for name in named if name not in takes), None)
             problem = f"has no '{unknown}'{nearest_name(unknown, takes)}" if unknown else str(error)
             raise self.refuse(node, f"{called.__name__}({', '.join(takes)}): {problem}") from error
-        if is_function or len(node.args) + len(given) == len(takes):
+        if is_function or len(node.args) + len(named) == len(takes):
             return []
         return [
-            self.visit(given[name]) if name in given else self.literal(called._field_defaults[name], node, name)
+            self.visit(named[name]) if name in named else self.literal(called._field_defaults[name], node, name)
             for name in takes[len(node.args) :]
         ]
 
@@ -214,8 +215,8 @@ class Composer(ast.NodeTransformer):
     def row_of(self, node: ast.expr) -> Any:
         """The NamedTuple class that a value is declared to be, as its name stands now; None where it is none."""
         kind = self.kind_of(node)
-        found = self.function.__globals__.get(kind if isinstance(kind, str) else getattr(kind, "__name__", ""), kind)
-        return found if is_row(found) else None
+        row = self.function.__globals__.get(kind if isinstance(kind, str) else getattr(kind, "__name__", ""), kind)
+        return row if is_row(row) else None
 
     def fields_of(self, node: ast.expr) -> tuple[Any, list[ast.Attribute]]:
         """The class of a row and an expression for each of its fields. ProgramError where the class is not declared."""
@@ -232,23 +233,23 @@ class Composer(ast.NodeTransformer):
     def replaced(self, node: ast.Call, changed: ast.expr) -> ast.expr:
         """``row._replace(field=...)`` as the row that it makes. ProgramError where there is no such field."""
         row, fields = self.fields_of(changed)
-        given = {item.arg: item.value for item in node.keywords if item.arg is not None}
+        given = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
         unknown = sorted(given.keys() - set(row._fields))
         if unknown or node.args:
             hint = nearest_name(unknown[0], row._fields) if unknown else ""
             problem = f"has no '{unknown[0]}'{hint}" if unknown else "'_replace' takes fields by name"
             raise self.refuse(node, f"{row.__name__}({', '.join(row._fields)}): {problem}")
-        values = [self.visit(given.get(item.attr, item)) for item in fields]
+        values = [self.visit(given.get(field_read.attr, field_read)) for field_read in fields]
         return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
     def each_number(self, convert: ast.expr, node: ast.expr) -> ast.expr:
         """``each(convert, row)`` as the row that it makes, number by number."""
         row, fields = self.fields_of(node)
         values = [
-            self.each_number(convert, item)
-            if is_row(row.__annotations__[item.attr])
-            else ast.Call(self.visit(convert), [self.visit(item)], [])
-            for item in fields
+            self.each_number(convert, field_read)
+            if is_row(row.__annotations__[field_read.attr])
+            else ast.Call(self.visit(convert), [self.visit(field_read)], [])
+            for field_read in fields
         ]
         return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
@@ -322,9 +323,9 @@ class Composer(ast.NodeTransformer):
         if type(value) in (bool, int):
             return ast.Constant(value)
         if type(value) is tuple:
-            return ast.Tuple([self.literal(item, where, name) for item in value], ast.Load())
+            return ast.Tuple([self.literal(inner, where, name) for inner in value], ast.Load())
         if is_row(type(value)):
-            fields = [self.literal(item, where, name) for item in value]
+            fields = [self.literal(inner, where, name) for inner in value]
             return ast.Call(ast.Name(self.add(type(value)), ast.Load()), fields, [])
         if isinstance(value, types.FunctionType):
             return ast.Name(self.add(value), ast.Load())
@@ -411,9 +412,9 @@ class SourceCollector:
     effects: dict[Any, tuple[str, ...]] = field(default_factory=dict)
     needs: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
-    def add(self, item: Callable[..., Any] | type) -> str:
+    def add(self, function: PlainFunction | type) -> str:
         """Add a function or NamedTuple class and all that it needs; return the name it has in the module."""
-        return self._add(self.links.get(item, item))
+        return self._add(self.links.get(function, function))
 
     def _add(self, item: Any) -> str:
         if not is_row(item):
@@ -470,7 +471,7 @@ class SourceCollector:
         self.made_from.functions.append(made)
         composer = Composer(
             function,
-            lambda item: self.add_inside(function, item),
+            lambda called: self.add_inside(function, called),
             self.note_read,
             lambda callee: self.needs.get(callee, ()),
             self.stands_for,
@@ -480,16 +481,16 @@ class SourceCollector:
         if asked:
             # Structs of effects come first, in every function: callers can then hand them over without knowing the
             # rest.
-            arguments.args = sorted(arguments.args, key=lambda item: item.arg not in asked)
+            arguments.args = sorted(arguments.args, key=lambda argument: argument.arg not in asked)
         for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
             argument.annotation = None
         # What Python calls the function with, whatever the text of the default stands for by now.
         arguments.defaults = [composer.literal(value, tree, "a default") for value in made.defaults or ()]
         arguments.kw_defaults = [
-            composer.literal(made.named_defaults[item.arg], tree, "a default")
-            if item.arg in made.named_defaults
+            composer.literal(made.named_defaults[argument.arg], tree, "a default")
+            if argument.arg in made.named_defaults
             else None
-            for item in arguments.kwonlyargs
+            for argument in arguments.kwonlyargs
         ]
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         tree.name, tree.returns = name, None
@@ -497,19 +498,19 @@ class SourceCollector:
         handed = sorted(composer.needed)
         arguments.args = [*map(ast.arg, handed), *arguments.args]
         if asked or handed:
-            own = [item.arg for item in arguments.args if item.arg in asked]
+            own = [argument.arg for argument in arguments.args if argument.arg in asked]
             self.needs[name] = (*handed, *own)
         return self.decorated(tree, file)
 
-    def add_inside(self, function: Any, item: Any) -> str:
+    def add_inside(self, function: Any, called: Any) -> str:
         """Add what a function calls; a law of an effect that calls its own port gets what was there before it."""
-        if (function, item) in self.links:
-            return self._add(self.links[function, item])
-        if item in self.effects and isinstance(item, FunctionType):
+        if (function, called) in self.links:
+            return self._add(self.links[function, called])
+        if called in self.effects and isinstance(called, FunctionType):
             raise ProgramError(
-                f"{place_of(function)}: '{item.__name__}' is the law of an effect: call its port instead"
+                f"{place_of(function)}: '{called.__name__}' is the law of an effect: call its port instead"
             )
-        return self.add(item)
+        return self.add(called)
 
 
 def check_is_plain(function: Any) -> None:
@@ -527,7 +528,7 @@ def check_is_plain(function: Any) -> None:
         )
     if function.__closure__:
         # A closure's value may change without a change of the function, and no text would show it.
-        names = ", ".join(f"'{item}'" for item in function.__code__.co_freevars)
+        names = ", ".join(f"'{name}'" for name in function.__code__.co_freevars)
         raise ProgramError(
             f"{place_of(function)}: '{name}' uses {names} of the function around it, which cannot be compiled; "
             "make it a parameter"
@@ -563,7 +564,7 @@ def parse_definition(function: FunctionType, adapt: Adaptation | None = None) ->
     # A copy, since the tree is compared with what Python runs below.
     adapted = tree if adapt is None else adapt(function, deepcopy(tree))
     check_grammar(adapted, file)
-    if _shape(code) not in (_shape(item) for item in _code_of(tree, function)):
+    if _shape(code) not in (_shape(other) for other in _code_of(tree, function)):
         changed = "is not what its source text says; the file has changed since it was loaded: start again"
         raise refusal(file, tree, f"'{name}' {changed}")
     check_flow(adapted, file, code.co_varnames)
@@ -578,13 +579,17 @@ def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType
     # Python compiles a call through a module name otherwise where it has seen the import.
     for before in (imports, []):
         module = compile(ast.Module([*before, tree], []), "<source>", "exec", dont_inherit=True)
-        yield next(item for item in module.co_consts if isinstance(item, CodeType) and item.co_name == tree.name)
+        yield next(
+            constant
+            for constant in module.co_consts
+            if isinstance(constant, CodeType) and constant.co_name == tree.name
+        )
 
 
 def _shape(code: CodeType) -> tuple[Any, ...]:
     """What a code object computes, without the places of its lines and its docstring."""
     # Texts are left out: a docstring may have changed without a change of what runs.
-    constants = [(type(item), repr(item)) for item in code.co_consts if not isinstance(item, str)]
+    constants = [(type(constant), repr(constant)) for constant in code.co_consts if not isinstance(constant, str)]
     return code.co_code, code.co_names, code.co_varnames, code.co_argcount, code.co_kwonlyargcount, constants
 
 
@@ -596,12 +601,12 @@ def _row_text(row: Any, name: str) -> str:
         raise ProgramError(
             f"{row.__module__}.{row.__qualname__} must be a NamedTuple itself, not a class made from one"
         )
-    meanings = {item for item, value in own.items() if item.startswith("__") and isinstance(value, FunctionType)}
+    meanings = {name for name, value in own.items() if name.startswith("__") and isinstance(value, FunctionType)}
     meanings -= set(vars(Read)) | {"__str__", "__format__"}
     if meanings:
-        given = ", ".join(sorted(meanings))
+        names = ", ".join(sorted(meanings))
         raise ProgramError(
-            f"{row.__module__}.{row.__qualname__} gives {given} a meaning of its own, which cannot be compiled"
+            f"{row.__module__}.{row.__qualname__} gives {names} a meaning of its own, which cannot be compiled"
         )
     return f"{name} = namedtuple({name!r}, {list(row._fields)!r})"
 

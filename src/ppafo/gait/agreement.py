@@ -72,12 +72,12 @@ def _lag(walk: MeanStride, usual: Gait, name: str) -> tuple[float, float, float]
     """Return by how many strides a curve is behind the usual one, and the correlations there and without a shift."""
     # Stance on stance and swing on swing: a toe-off that comes early or late is no delay.
     at = np.interp(_FINE, (0.0, walk.stance_share, 1.0), (0.0, usual.stance_share, 1.0))
-    found, expected = (
+    lags, expected = (
         values - np.mean(values) for values in (_smooth(walk.curves[name], name), usual.curve(name).values_at(at))
     )
     # Correlation at all 1000 shifts at once.
-    spectrum = np.fft.rfft(found) * np.conj(np.fft.rfft(expected))
-    scale = float(np.sqrt(np.sum(found**2) * np.sum(expected**2)))
+    spectrum = np.fft.rfft(lags) * np.conj(np.fft.rfft(expected))
+    scale = float(np.sqrt(np.sum(lags**2) * np.sum(expected**2)))
     alike = np.fft.irfft(spectrum, _FINE.size) / scale
     return float(_FINE[np.argmax(alike)]), float(np.max(alike)), float(alike[0])
 
@@ -94,12 +94,12 @@ def delays(walk: MeanStride) -> dict[str, float]:
     shank = _peak(-_smooth(walk.curves["shank_angle"], "shank_angle"), share) - _USUALLY["shank_angle"]
     ankle = _peak(_smooth(walk.curves["ankle_angle"], "ankle_angle"), share) - _USUALLY["ankle_angle"]
     has_force = "vertical_force" in walk.curves
-    found = {"shank_angle": shank, "ankle_angle": ankle} if has_force else {"ankle_angle": ankle - shank}
+    delays_by_curve = {"shank_angle": shank, "ankle_angle": ankle} if has_force else {"ankle_angle": ankle - shank}
     if "ankle_moment" in walk.curves:
         moment = _end(_smooth(walk.curves["ankle_moment"], "ankle_moment")) - _USUALLY["ankle_moment"]
         force = _end(_smooth(walk.curves["vertical_force"], "vertical_force")) if has_force else share + _FORCE_ENDS
-        found["ankle_moment"] = moment - force - (0.0 if has_force else shank)
-    return {name: walk.stride_time * strides for name, strides in found.items()}
+        delays_by_curve["ankle_moment"] = moment - force - (0.0 if has_force else shank)
+    return {name: walk.stride_time * strides for name, strides in delays_by_curve.items()}
 
 
 def _peak(values: Floats, share: float) -> float:

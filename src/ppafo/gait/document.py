@@ -150,20 +150,20 @@ def _number(document: dict[str, Any], path: str, file: str) -> float | None:
     return value
 
 
-def _curve(given: dict[str, Any], name: str, file: str) -> Curve:
+def _curve(table: dict[str, Any], name: str, file: str) -> Curve:
     # The schema checks each list by itself; that both agree is said here.
-    if len(given["cosine"]) != len(given["sine"]):
-        counts = f"{len(given['cosine'])} numbers in cosine and {len(given['sine'])} in sine"
+    if len(table["cosine"]) != len(table["sine"]):
+        counts = f"{len(table['cosine'])} numbers in cosine and {len(table['sine'])} in sine"
         raise DataError(f"{file}: {name} has {counts}; a series has as many of both")
 
     def si(value: float) -> float:
-        return to_si(float(value), plain_unit(given["unit"]), plain_unit(CURVES[name]))
+        return to_si(float(value), plain_unit(table["unit"]), plain_unit(CURVES[name]))
 
     return Curve(
-        si(given["mean"]),
-        tuple(map(si, given["cosine"])),
-        tuple(map(si, given["sine"])),
-        si(given.get("deviation", 0.0)),
+        si(table["mean"]),
+        tuple(map(si, table["cosine"])),
+        tuple(map(si, table["sine"])),
+        si(table.get("deviation", 0.0)),
     )
 
 

@@ -71,18 +71,18 @@ class GaitFound:
             document["imported"] = {
                 "files": list(imported.files),
                 "events": imported.events,
-                "strides": [_stride(item) for item in imported.strides],
-                "left_out": [_stride(item) for item in imported.left_out],
+                "strides": [_stride(stride) for stride in imported.strides],
+                "left_out": [_stride(stride) for stride in imported.left_out],
                 "remarks": list(imported.remarks),
                 "curves": {
                     name: {
-                        "strides": len(item.strides),
-                        "mean": item.mean.tolist(),
-                        "deviation": item.deviation.tolist(),
+                        "strides": len(curve.strides),
+                        "mean": curve.mean.tolist(),
+                        "deviation": curve.deviation.tolist(),
                         "fit_root_mean_square": imported.fit_errors[name].root_mean_square,
                         "fit_largest": imported.fit_errors[name].largest,
                     }
-                    for name, item in imported.curves.items()
+                    for name, curve in imported.curves.items()
                 },
             }
         return document

@@ -123,25 +123,25 @@ foot further than 20: a shoe with a heel of 6 cm on a foot of 17 cm from heel to
 def check_shank(walk: MeanStride) -> None:
     """Raise DataError for a shank angle that no leg has."""
     phi = np.degrees(walk.curves["shank_angle"])
-    place = f"{walk.file['shank_angle']}: shank_angle"
+    where = f"{walk.file['shank_angle']}: shank_angle"
     # The range is free of the zero, so that a wrong unit shows before a wrong zero.
     travel = float(np.ptp(phi))
     low, high = SHANK_RANGE
     if not low <= travel <= high:
         raise DataError(
-            f"{place} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
+            f"{where} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
             f"{_unit_hint(travel, low, high)}"
         )
     # Means of five samples at both ends: a single one may lie on a tremor.
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
     if growth > _TURNED_BACK * travel:
         raise DataError(
-            f"{place} grows by {growth:.2g} deg while the foot stands: the shank would rotate backwards over it; "
+            f"{where} grows by {growth:.2g} deg while the foot stands: the shank would rotate backwards over it; "
             f"{other_sign(walk.signs_from, 'shank_angle.positive')}{_other_foot(walk)}"
         )
     if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
         raise DataError(
-            f"{place} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is above "
+            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is above "
             "-10 and -50 to 10 deg (0 is vertical, above 0 the ankle is in front); its zero or its columns are wrong"
             f"{_other_foot(walk)}"
         )
@@ -161,18 +161,18 @@ def check_ankle_range(walk: MeanStride) -> None:
 def check_ankle(walk: MeanStride) -> None:
     """Raise DataError for an ankle angle that no leg has with this shank."""
     theta = np.degrees(walk.curves["ankle_angle"])
-    place = f"{walk.file['ankle_angle']}: ankle_angle"
+    where = f"{walk.file['ankle_angle']}: ankle_angle"
     turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if turned > _CLEARLY_BETTER * reversed_turned and turned > _TURNS:
         raise DataError(
-            f"{place} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
+            f"{where} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
             f"turn by {turned:.2g} deg (RMS), and by {reversed_turned:.2g} deg with the other sign: its sign is "
             f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the other sign about 90 deg')}"
         )
     foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
     if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
         raise DataError(
-            f"{place} would tilt the standing foot by {foot:.0f} deg, plausible is within {REFUSED_TILT:g} deg "
+            f"{where} would tilt the standing foot by {foot:.0f} deg, plausible is within {REFUSED_TILT:g} deg "
             f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
         )
 
@@ -294,16 +294,16 @@ def check_moment(walk: MeanStride) -> None:
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
-    place = f"{walk.file['ankle_moment']}: ankle_moment"
+    where = f"{walk.file['ankle_moment']}: ankle_moment"
     if float(np.mean(moment)) < 0.0 and float(-np.min(moment)) > _CLEARLY_BETTER * float(np.max(moment)):
         raise DataError(
-            f"{place} is {np.min(moment):.3g} N m/kg at its largest, into dorsiflexion: its sign is reversed; "
+            f"{where} is {np.min(moment):.3g} N m/kg at its largest, into dorsiflexion: its sign is reversed; "
             f"{other_sign(walk.signs_from, 'ankle_moment.positive')}"
         )
     peak, (low, high) = float(np.max(moment)), MOMENT_PEAK
     if not low <= peak <= high:
         raise DataError(
-            f"{place} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; is the unit right "
+            f"{where} reaches {peak:.3g} N m/kg, plausible is {low:g} to {high:g} N m/kg; is the unit right "
             "(N m, N m/kg, N mm/kg) and the body mass?"
         )
 
@@ -352,11 +352,11 @@ def check_force(walk: MeanStride) -> None:
     if "vertical_force" not in walk.curves:
         return
     force = walk.curves["vertical_force"]
-    place = f"{walk.file['vertical_force']}: vertical_force"
+    where = f"{walk.file['vertical_force']}: vertical_force"
     peak, mean = float(np.max(force)), float(np.mean(force))
     if not FORCE_PEAK[0] <= peak <= FORCE_PEAK[1] or not FORCE_MEAN[0] <= mean <= FORCE_MEAN[1]:
         raise DataError(
-            f"{place} is {mean:.3g} body weights on average and {peak:.3g} at its peak, plausible is "
+            f"{where} is {mean:.3g} body weights on average and {peak:.3g} at its peak, plausible is "
             f"{FORCE_MEAN[0]:g} to {FORCE_MEAN[1]:g} and {FORCE_PEAK[0]:g} to {FORCE_PEAK[1]:g}; "
             "is the body mass right, and the unit (N, '-')?"
         )
@@ -449,17 +449,17 @@ _WHERE: dict[SignSource, str] = {
 
 def check_turning(walk: MeanStride) -> None:
     """Raise DataError where the knee turns about the standing ankle only with a mistake corrected, and name it."""
-    found = _mistaken_turning(walk)
-    if found is not None and found.left < _LEFT_BY_ONE * found.missed:
+    mistake = _mistaken_turning(walk)
+    if mistake is not None and mistake.left < _LEFT_BY_ONE * mistake.missed:
         raise DataError(
-            f"{walk.file['knee_forward']}: {found.statement}; {found.mistake.remedy} {_WHERE[walk.signs_from]}"
+            f"{walk.file['knee_forward']}: {mistake.statement}; {mistake.mistake.remedy} {_WHERE[walk.signs_from]}"
         )
 
 
 def turning_remarks(walk: MeanStride) -> list[str]:
     """Return a remark where a mistake would explain a part of how the knee misses the standing ankle."""
-    found = _mistaken_turning(walk)
-    return [] if found is None else [f"{found.statement}, which may be the walk itself"]
+    mistake = _mistaken_turning(walk)
+    return [] if mistake is None else [f"{mistake.statement}, which may be the walk itself"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -485,12 +485,12 @@ def _mistaken_turning(walk: MeanStride) -> _Mistaken | None:
     expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
     # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
     forward, up = (walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE)
-    given = np.stack([forward, up])[:, FOOT_FLAT]
-    missed = _misfit(given, expected)
+    turned = np.stack([forward, up])[:, FOOT_FLAT]
+    missed = _misfit(turned, expected)
     for mistake in _MISTAKES:
         if walk.is_knee_one_marker and mistake.is_of_one_alone:
             continue
-        left = _misfit(np.array([mistake.forward, mistake.up]) @ given, expected)
+        left = _misfit(np.array([mistake.forward, mistake.up]) @ turned, expected)
         if left < _FITS and left < _LEFT_BY_MISTAKE * missed:
             return _Mistaken(mistake, missed, left)
     return None
@@ -504,7 +504,7 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
     curve, _ = fit_curve(shank, HARMONICS["shank_angle"])
     percent = np.linspace(0.0, 1.0, shank.size)[FOOT_FLAT]
     rates = curve.derivative(stride_time)
-    phi, rate, acceleration = (item.values_at(percent) for item in (curve, rates, rates.derivative(stride_time)))
+    phi, rate, acceleration = (series.values_at(percent) for series in (curve, rates, rates.derivative(stride_time)))
     sine, cosine = np.sin(phi), np.cos(phi)
     forward = sine * rate**2 - cosine * acceleration
     # Centripetal and tangential acceleration of a point that turns about the ankle.
@@ -512,14 +512,14 @@ def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
     return np.stack([forward, up])
 
 
-def _misfit(given: Floats, expected: Floats) -> float:
+def _misfit(measured: Floats, expected: Floats) -> float:
     """Return the misfit of the best shank as a fraction of its turning; infinite for a shank at rest."""
     square = float(np.sum(expected**2))
     if square == 0.0:
         return float("inf")
     # Least squares for the one unknown, the length of the shank.
-    length = float(np.clip(np.sum(given * expected) / square, *SHANK_LENGTHS))
-    return float(np.sqrt(np.sum((given - length * expected) ** 2) / square)) / length
+    length = float(np.clip(np.sum(measured * expected) / square, *SHANK_LENGTHS))
+    return float(np.sqrt(np.sum((measured - length * expected) ** 2) / square)) / length
 
 
 KNEE_TRAVEL = (0.5, 80.0)
@@ -562,11 +562,11 @@ def check_knee_means(walk: MeanStride) -> None:
 
 
 def _check_knee_curve(walk: MeanStride, name: str) -> None:
-    values, place = walk.curves[name], f"{walk.file[name]}: {name}"
+    values, where = walk.curves[name], f"{walk.file[name]}: {name}"
     travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
     if not low <= travel <= high:
         raise DataError(
-            f"{place} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
+            f"{where} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
             "is the unit right (m/s^2, or m for a position)?"
         )
     # Gait phase of the swing, below 0 before toe-off.
@@ -574,7 +574,7 @@ def _check_knee_curve(walk: MeanStride, name: str) -> None:
     driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
     if held - driven > _HELD_BACK * travel:
         raise DataError(
-            f"{place} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
+            f"{where} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
             "is the other way round in walking: its sign is reversed, or it is of the other knee; "
             f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
         )

@@ -196,16 +196,16 @@ class World:
 
         Rewards are added up. SimulationError for an action that is no finite number.
         """
-        given = lanes.actions
+        taken = lanes.actions
         if self.is_continuous:
-            given[:] = np.reshape(actions, given.shape)
+            taken[:] = np.reshape(actions, taken.shape)
         else:
             # Vent valve first: where there is none, the last column is the command, which the next line sets.
-            given[:, -1] = 0.0
-            given[:, 0] = np.subtract(actions, 1)
-        if not np.isfinite(given).all():
-            bad = int(np.flatnonzero(~np.isfinite(given).all(axis=1))[0])
-            raise SimulationError(f"the action of environment {bad} is {given[bad]}; it must be finite")
+            taken[:, -1] = 0.0
+            taken[:, 0] = np.subtract(actions, 1)
+        if not np.isfinite(taken).all():
+            bad = int(np.flatnonzero(~np.isfinite(taken).all(axis=1))[0])
+            raise SimulationError(f"the action of environment {bad} is {taken[bad]}; it must be finite")
         seen = lanes.step()
         for _ in range(self.settings.frame_skip - 1):
             seen = seen.then(lanes.step())
@@ -385,14 +385,14 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         mask = (options or {}).get("reset_mask", np.ones(self.num_envs, dtype=np.bool_))
         if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (self.num_envs,):
             raise ScenarioError(f"reset_mask must be {self.num_envs} truth values in an array")
-        seeds = [seed + place for place in range(self.num_envs)] if isinstance(seed, int) else seed
+        seeds = [seed + number for number in range(self.num_envs)] if isinstance(seed, int) else seed
         if seeds is not None and len(seeds) != self.num_envs:
             raise ScenarioError(f"{len(seeds)} seeds for {self.num_envs} environments; give one for each, or a number")
         places = np.flatnonzero(mask)
-        for place in places.tolist():
-            own = None if seeds is None else seeds[place]
-            if own is not None or self._generators[place] is None:
-                self._generators[place] = seeding.np_random(own)[0]
+        for number in places.tolist():
+            own = None if seeds is None else seeds[number]
+            if own is not None or self._generators[number] is None:
+                self._generators[number] = seeding.np_random(own)[0]
         observations = self._begin(places).observations
         if places.size < self.num_envs:
             observations = np.where(mask[:, None], observations, self._last)
@@ -422,9 +422,9 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
             reset = self._ended
             # What environments that begin again at once showed at their end.
             last = np.full(self.num_envs, None, dtype=object)
-            for place in np.flatnonzero(reset):
+            for number in np.flatnonzero(reset):
                 # A copy, because the observations of the new episode overwrite this row below.
-                last[place] = seen.observations[place].copy()
+                last[number] = seen.observations[number].copy()
             info = _masked({"error": seen.errors, "supplied_mass": seen.supplied}, reset)
             infos |= {"final_obs": last, "_final_obs": reset.copy(), "final_info": info, "_final_info": reset.copy()}
         if reset.any():
@@ -439,7 +439,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         return self._lanes.numbers(place)
 
     def _begin(self, places: Places) -> Seen:
-        drawn = [self._generators[place] for place in places]
+        drawn = [self._generators[number] for number in places]
         return self.world.begin(self._lanes, places, [generator for generator in drawn if generator is not None])[0]
 
 
@@ -447,5 +447,5 @@ def _masked(values: Mapping[str, Floats], there: Flags) -> dict[str, Any]:
     """Return numbers (environments,) with the mask of those that have them, as Gymnasium has infos."""
     if not there.any():
         return {}
-    found = {name: np.where(there, column, 0.0) for name, column in values.items()}
-    return found | {f"_{name}": there.copy() for name in values}
+    kept = {name: np.where(there, column, 0.0) for name, column in values.items()}
+    return kept | {f"_{name}": there.copy() for name in values}

@@ -400,15 +400,15 @@ class ScenarioEpisodes:
             return columns, values
         left, reason = np.arange(count), ""
         for _ in range(MOST_DRAWS):
-            for place in left.tolist():
-                generator = generators[place]
+            for number in left.tolist():
+                generator = generators[number]
                 drawn = (generator.uniform(*ends) for ends in self.ranges.values())
                 # A seed is drawn as all numbers are, and has to be whole.
-                values[:, place] = [
+                values[:, number] = [
                     float(np.floor(value)) if path == _SEED else value
                     for path, value in zip(self.ranges, drawn, strict=True)
                 ]
-                columns.goals[0, place] = generator.uniform(*self.targets)
+                columns.goals[0, number] = generator.uniform(*self.targets)
             left, reason = self._plan(columns, values, left)
             if not left.size:
                 return columns, values
@@ -416,8 +416,8 @@ class ScenarioEpisodes:
 
     def shown(self, drawn: Floats) -> Scenario:
         """Return the scenario of what was drawn of one episode (numbers,) in SI."""
-        given = dict(zip(self.ranges, drawn.tolist(), strict=True))
-        return with_numbers(self.base, absolute(self.base, given, self.gauge))
+        numbers = dict(zip(self.ranges, drawn.tolist(), strict=True))
+        return with_numbers(self.base, absolute(self.base, numbers, self.gauge))
 
     def _plan(self, columns: Columns, values: Floats, left: Places) -> tuple[Places, str]:
         """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
@@ -450,8 +450,8 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
         gauge = gauge - set(vary) if varies else set()
         ranges |= {path: (ranges[path][0] - atmosphere, ranges[path][1] - atmosphere) for path in gauge}
         for path, ends in vary.items():
-            place, ranges[path] = _range(base, path, ends, varies)
-            gauge |= {path} if place.is_gauge else set()
+            varied, ranges[path] = _range(base, path, ends, varies)
+            gauge |= {path} if varied.is_gauge else set()
         # Each episode has noise of its own, unless the caller says how the seed varies.
         ranges.setdefault(_SEED, (0.0, float(LARGEST_SEED)))
     batch = batch_of(plan_run(base))
@@ -470,31 +470,31 @@ def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[st
     folder = Path() if origin.file is None else Path(origin.file).parent
     parameter_set = load_parameter_set(set_name(origin.parameter_set, folder))
     atmosphere, declared = atmospheric_pressure(parameter_set), parameter_set.declarations()
-    known, found, gauge = declared_numbers(base), {}, set()
+    known, ranges, gauge = declared_numbers(base), {}, set()
     for path, entry in parameter_set.numbers.items():
         own = chosen_path(path, base)
         if entry.uncertainty and own in known:
             # The upper end in the unit of the entry, so that a gauge pressure is converted as its value is.
             above = entry.model_copy(update={"value": entry.value + entry.uncertainty})
-            ends = [entry_in_si(item, declared[path], atmosphere) for item in (entry, above)]
+            ends = [entry_in_si(text, declared[path], atmosphere) for text in (entry, above)]
             value, half = number_at(base, own), ends[1] - ends[0]
-            found[own] = (value - half, value + half)
+            ranges[own] = (value - half, value + half)
             gauge |= {own} if gauge_link(own, entry.value, entry.unit) else set()
-    return found, gauge
+    return ranges, gauge
 
 
 def _range(
     base: Scenario, path: str, ends: tuple[str | float, str | float], atmosphere_varies: bool
 ) -> tuple[VariedPath, tuple[float, float]]:
-    place = varied_path(path, base)
+    varied = varied_path(path, base)
     try:
-        place = in_its_unit(place, ends) if atmosphere_varies else place
-        lowest, highest = (place.level(end) for end in ends)
+        varied = in_its_unit(varied, ends) if atmosphere_varies else varied
+        lowest, highest = (varied.level(end) for end in ends)
     except (UnitError, ValueError) as error:
         raise ScenarioError(f"vary: {path} = {ends!r}: {error}; give the lowest and the highest value") from error
     if lowest > highest:
         raise ScenarioError(f"vary: {path} = {ends!r}: give the lowest value before the highest")
-    return place, (lowest, highest)
+    return varied, (lowest, highest)
 
 
 def _repeated(columns: Columns, count: int) -> Columns:
@@ -516,14 +516,14 @@ class WalkEpisodes:
     def draw(self, generators: Generators) -> tuple[Columns, Floats]:
         """Return an episode for each generator, and no drawn numbers: a wearer is not a list of numbers."""
         columns = _repeated(self.plain, len(generators))
-        for place, generator in enumerate(generators if self.randomise else ()):
+        for number, generator in enumerate(generators if self.randomise else ()):
             # Person 0 of a population is always the one of the configuration; the second one is drawn.
             seed = float(generator.integers(0, LARGEST_SEED))
             drawn = replace(self.commanded, sensors=replace(self.commanded.sensors, seed=int(seed)))
             build = draw_builds(2, generator)
             gaits = draw_gaits(walk_of(self.base).gait, build.stature, generator)
             batch = batch_of_many(drawn, build, gaits, generator)
-            columns.parameters[:, place], columns.states[:, place] = batch.parameters[:, 1], batch.states[:, 1]
+            columns.parameters[:, number], columns.states[:, number] = batch.parameters[:, 1], batch.states[:, 1]
         return columns, np.zeros((0, len(generators)))
 
     def shown(self, drawn: Floats) -> Scenario:  # noqa: ARG002 - a wearer is no list of numbers

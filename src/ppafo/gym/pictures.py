@@ -34,9 +34,10 @@ def picture(trail: Sequence[tuple[float, float, float]], unit: str, period: floa
         vane.set_aspect("equal")
         vane.set_axis_off()
         vane.set_title(f"Vane at {np.degrees(angle):.0f} deg")
+        shown, shown_unit = (np.degrees(errors), "deg") if unit == "rad" else (errors, unit)
         for name, values, label in (
             ("angle", np.degrees(angles), "Angle (deg)"),
-            ("error", np.degrees(errors) if unit == "rad" else errors, f"Error ({'deg' if unit == 'rad' else unit})"),
+            ("error", shown, f"Error ({shown_unit})"),
         ):
             axes = grid[name]
             axes.plot(times, values, color=BLUE if name == "angle" else VERMILION)

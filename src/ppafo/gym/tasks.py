@@ -193,9 +193,9 @@ class Task:
 
     name: str
     view: type
-    observed: Callable[..., Any]
-    error: Callable[..., float]
-    kept: Callable[..., Memory]
+    observed: Callable[[Any, Goal, Memory, Requested, float, float], Any]
+    error: Callable[[Goal, Requested, float, float, float], float]
+    kept: Callable[[Memory, float, Any, float], Memory]
     unit: str
     error_weight: float
     gas_weight: float

@@ -6,7 +6,6 @@ flow of the open valve before its map, and the leak last, since its chambers mus
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
@@ -18,12 +17,12 @@ from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, 
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.flow import GasAt, Law
-from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
-from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
+from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.open_valve_flow import open_valve_flow
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
-from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
-from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
+from ppafo.identification.bench.static_torque import static_torque
+from ppafo.identification.bench.valve_map import valve_map
+from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import Source
@@ -107,9 +106,9 @@ class StaticTorqueProblem(StrictTable):
     columns: Columns = None
     confidence: Confidence = 0.95
 
-    def settings(self, setting: Setting) -> StaticTorqueSettings:
-        """Return the settings of the procedure."""
-        return StaticTorqueSettings(self.confidence, setting.tolerances)
+    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+        """Return what the procedure makes of recordings."""
+        return static_torque(sources, self.confidence, setting.tolerances)
 
 
 class FreeDecayProblem(StrictTable):
@@ -123,21 +122,31 @@ class FreeDecayProblem(StrictTable):
     end: _End = None
     inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
 
-    def settings(self, setting: Setting) -> FreeDecaySettings:
-        """Return the settings of the procedure [SI]; the inertia is the set's where none is named, if it has one."""
-        start, end = (quantity_in(self, name, "s", setting.place) for name in ("start", "end"))
-        is_known, path, deviation = self.inertia != UNKNOWN, "foot_plate.inertia", 0.0
-        inertia = positive_in(self, "inertia", "kg m^2", setting.place) if is_known else None
-        if self.inertia is None:
-            inertia = number_in_si(setting.parameter_set, path)
-            deviation = 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
-        elif inertia is not None:
-            deviation = setting.tolerances.deviation_of(path, inertia, 0.0)
+    def inertia_of(self, setting: Setting) -> tuple[float | None, float]:
+        """Return the inertia and its standard deviation [kg m^2]: the set's where none is named, if it has one."""
+        path = "foot_plate.inertia"
+        if self.inertia == UNKNOWN:
+            return None, 0.0
+        inertia = positive_in(self, "inertia", "kg m^2", setting.place)
+        if inertia is not None:
+            return inertia, setting.tolerances.deviation_of(path, inertia, 0.0)
+        inertia = number_in_si(setting.parameter_set, path)
+        return inertia, 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
+
+    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+        """Return what the procedure makes of recordings."""
         paths = ("friction.static_torque", "friction.dynamic_torque")
         static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)
         # Near standstill a seal grips as hard as at rest at most.
         rise = max(static / dynamic - 1.0, 0.0) if static and dynamic else 1.0
-        return FreeDecaySettings(start, end, inertia, deviation, rise, self.confidence, setting.tolerances)
+        return free_decay(
+            sources,
+            *times_of(self, setting.place),
+            *self.inertia_of(setting),
+            rise,
+            confidence=self.confidence,
+            tolerances=setting.tolerances,
+        )
 
 
 class OpenValveFlowProblem(StrictTable):
@@ -152,13 +161,13 @@ class OpenValveFlowProblem(StrictTable):
     valve: _Valve = None
     law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
 
-    def settings(self, setting: Setting) -> OpenValveFlowSettings:
-        """Return the settings of the procedure [SI]."""
+    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+        """Return what the procedure makes of recordings."""
         path = setting.valve_path(self.valve)
         area = number_in_si(setting.parameter_set, f"{path}.area")
         ratio = number_in_si(setting.parameter_set, f"{path}.critical_ratio")
-        gas = setting.gas(self)
-        return OpenValveFlowSettings(gas, self.law, area, path, ratio, self.confidence, setting.tolerances)
+        gas, known = setting.gas(self), (self.confidence, setting.tolerances)
+        return open_valve_flow(sources, gas, self.law, area, path, ratio, *known)
 
 
 class VaneLeakProblem(StrictTable):
@@ -179,17 +188,14 @@ class VaneLeakProblem(StrictTable):
     volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
-    def settings(self, setting: Setting) -> VaneLeakSettings:
-        """Return the settings of the procedure [SI]; volumes as given, else from the angle.
+    def volumes_of(self, setting: Setting) -> tuple[float | None, float | None, float]:
+        """Return both volumes [m^3], as given, else from the angle, and the standard deviation of one over it [-].
 
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
         displacement per radian [m^3/rad].
         """
-        start, end, angle = (
-            quantity_in(self, name, unit, setting.place)
-            for name, unit in (("start", "s"), ("end", "s"), ("angle", "rad"))
-        )
-        volumes = {name: positive_in(self, name, "m^3", setting.place) for name in ("volume_1", "volume_2")}
+        first, second = (positive_in(self, name, "m^3", setting.place) for name in ("volume_1", "volume_2"))
+        angle = quantity_in(self, "angle", "rad", setting.place)
         deviation = setting.tolerances.deviation_of("actuator.dead_volume_1", 1.0, 0.0)
         if angle is not None:
             if setting.parameter_set.actuator_kind != VANE:
@@ -202,24 +208,32 @@ class VaneLeakProblem(StrictTable):
             if not lower <= angle <= upper:
                 raise IdentificationError(f"{setting.place}: angle = {self.angle!r} lies beyond the stops of the set")
             # A volume that is given counts before one from the angle: its line may be another one.
-            volumes["volume_1"] = volumes["volume_1"] or dead_1 + per_angle * (angle - lower)
-            volumes["volume_2"] = volumes["volume_2"] or dead_2 + per_angle * (upper - angle)
+            first = first or dead_1 + per_angle * (angle - lower)
+            second = second or dead_2 + per_angle * (upper - angle)
             of_volume = setting.deviation("actuator.dead_volume_1", dead_1, "m^3")
             of_angle = (angle - lower) * setting.deviation("actuator.displacement_per_radian", per_angle, "m^3/rad")
             deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
+        return first, second, deviation
+
+    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+        """Return what the procedure makes of recordings."""
+        first, second, deviation = self.volumes_of(setting)
+        start, end = times_of(self, setting.place)
         forms = ("discharge_coefficient", "critical_ratio")
         coefficient, ratio = (number_in_si(setting.parameter_set, f"actuator.leak.{name}") for name in forms)
-        return VaneLeakSettings(
-            gas=setting.gas(self),
-            discharge_coefficient=coefficient,
-            start=start,
-            end=end,
-            confidence=self.confidence,
-            critical_ratio=ratio,
-            law=self.law,
-            tolerances=setting.tolerances,
-            volume_deviation=deviation,
-            **volumes,
+        return vane_leak(
+            sources,
+            setting.gas(self),
+            first,
+            second,
+            coefficient,
+            start,
+            end,
+            self.confidence,
+            ratio,
+            self.law,
+            setting.tolerances,
+            deviation,
         )
 
 
@@ -234,10 +248,15 @@ class ValveMapProblem(StrictTable):
     temperature: _Temperature = None
     valve: _Valve = None
 
-    def settings(self, setting: Setting) -> ValveMapSettings:
-        """Return the settings of the procedure [SI]."""
+    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+        """Return what the procedure makes of recordings."""
         gas = setting.gas(self)
-        return ValveMapSettings(gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
+        return valve_map(sources, gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
+
+
+def times_of(problem: FreeDecayProblem | VaneLeakProblem, place: str) -> tuple[float | None, float | None]:
+    """Return first and last time [s] to use, None where the recording's own is; ``place`` is what messages call it."""
+    return quantity_in(problem, "start", "s", place), quantity_in(problem, "end", "s", place)
 
 
 class DeviceProblem(StrictTable):
@@ -251,14 +270,7 @@ class DeviceProblem(StrictTable):
 ProcedureProblem = StaticTorqueProblem | FreeDecayProblem | OpenValveFlowProblem | VaneLeakProblem | ValveMapProblem
 
 
-_PROCEDURES: dict[str, Callable[..., BenchResult]] = {
-    "static-torque": static_torque,
-    "free-decay": free_decay,
-    "open-valve-flow": open_valve_flow,
-    "valve-map": valve_map,
-    "vane-leak": vane_leak,
-}
-PROCEDURES = tuple(_PROCEDURES)
+PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"
 """Kinds of procedures in the recommended order."""
 
 
@@ -267,12 +279,11 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
 
     The line of an IdentificationError begins with the recording, else with the place of the procedure.
     """
-    settings = problem.settings(setting)
     try:
-        found = _PROCEDURES[problem.kind](sources, settings)
+        found = problem.run(sources, setting)
     except IdentificationError as error:
         # What is wrong with a file is told by its name, what is wrong with a procedure by its place in the problem.
-        if any(str(error).startswith(source.name) for source in sources):
+        if str(error).startswith((setting.place, *(source.name for source in sources))):
             raise
         raise IdentificationError(f"{setting.place}: {error}") from error
     acting = ("zero",) if problem.kind == "static-torque" else ()
@@ -291,7 +302,7 @@ def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float
     # Steady readings have no window: each counts by itself.
     if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):
         return -math.inf, math.inf
-    first, last = (quantity_in(problem, name, "s", setting.place) for name in ("start", "end"))
+    first, last = times_of(problem, setting.place)
     return -math.inf if first is None else first, math.inf if last is None else last
 
 

@@ -2,7 +2,8 @@
 
 import math
 
-from ppafo.identification.fit import SMOOTH, STATED, Fit
+from ppafo.identification.conflict import SMOOTH, STATED
+from ppafo.identification.fit import Fit
 from ppafo.units import from_si, percentage
 from ppafo.units.shown import shown_unit
 

@@ -31,12 +31,12 @@ METRICS: Kinds[MetricKind] = Kinds(
 
 def evaluate(recording: Recording) -> dict[str, Metric]:
     """Return every metric that the channels of the recording allow; one sample alone allows none."""
-    found: dict[str, Metric] = {}
+    metrics: dict[str, Metric] = {}
     names = frozenset(recording.names)
     for kind in METRICS.values():
         if kind.compute is None or len(recording) < 2 or not names.issuperset(kind.channels):
             continue
         value = kind.compute(recording)
         if value is not None:
-            found[kind.name] = Metric(value, kind.unit, kind.summary)
-    return found
+            metrics[kind.name] = Metric(value, kind.unit, kind.summary)
+    return metrics

@@ -1,19 +1,19 @@
 """Gas and work: what a task costs, and what it gives."""
 
 import math
-from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt
 from ppafo.model.columns import Number, choose
+from ppafo.model.plain_function import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 
 
-def gained(recording: Recording, channels: tuple[str, ...], function: Callable[..., Any] | None = None) -> float:
+def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
     """What a total, a channel, grows by from the first sample to the last, in its unit, or a function of several."""
     # A total counts from the start of the run, and a recording may be a part of one.
     gains = [float(recording[channel][-1] - recording[channel][0]) for channel in channels]
@@ -138,7 +138,7 @@ _EFFORT = ("torque", "angle", "supplied_mass")
 
 
 def _of_gains(
-    name: str, unit: str, summary: str, channels: tuple[str, ...], function: Callable[..., Any] | None = None
+    name: str, unit: str, summary: str, channels: tuple[str, ...], function: PlainFunction | None = None
 ) -> MetricKind:
     """What a total has grown by, or a function of what several have."""
     compute = partial(gained, channels=channels, function=function)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
 from ppafo.model.controlled import CONTROLLED, TORQUE, Controlled
+from ppafo.model.plain_function import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
 
@@ -74,7 +75,7 @@ class ReadAt:
     """
 
     places: tuple[str, ...]
-    function: Callable[..., Floats] | None = None
+    function: PlainFunction | None = None
 
     def __call__(self, readings: Readings) -> Floats:
         """The metric of metered runs (runs,)."""

@@ -200,9 +200,9 @@ def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats]
 
 def _mean(name: str, *needs: str) -> MetricKind:
     """A mean over the strides with help, without the first ones; in a task sequence it would be over other strides."""
-    item = PER_STRIDE[name]
+    quantity = PER_STRIDE[name]
     read = ReadAt((f"meters.strides.counted.sums.{name}", "meters.strides.counted.counted"), mean_of)
-    return _kind(name, item.unit, f"{item.summary}, mean", read, STEADY, *needs)
+    return _kind(name, quantity.unit, f"{quantity.summary}, mean", read, STEADY, *needs)
 
 
 METRICS = (

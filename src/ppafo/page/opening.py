@@ -34,23 +34,23 @@ _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", 
 
 
 def opening_of(
-    scenario: Scenario, module: WasmModule, given: Mapping[str, float], claims: Sequence[str]
+    scenario: Scenario, module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]
 ) -> dict[str, Any]:
     """Return ``changes`` by setting and the ``courses`` of the first panel, of a scenario with some values in SI.
 
     A change is a list of fractions: of each claim, and of the span of the first panel.
     """
-    key = _key(module, given, claims)
+    key = _key(module, changes, claims)
     known = _known().get(scenario.name, {})
     if known.get("key") == key:
         return dict(known)
     numbers = [[entry["key"], entry["value"]] for entry in module.description["settings"]]
     made_from = json.dumps([key, hashlib.sha256(module.wasm).hexdigest(), numbers])
     made = kept_bytes(
-        "opening", made_from, lambda: json.dumps(computed_opening(scenario, module, given, claims)).encode()
+        "opening", made_from, lambda: json.dumps(computed_opening(scenario, module, changes, claims)).encode()
     )
-    found: dict[str, Any] = json.loads(made)
-    return found
+    opening: dict[str, Any] = json.loads(made)
+    return opening
 
 
 def opening_like(module: WasmModule) -> dict[str, Any]:
@@ -58,19 +58,19 @@ def opening_like(module: WasmModule) -> dict[str, Any]:
     keys = {entry["key"] for entry in module.description["settings"]}
     known = _known()
     named = known.get(module.description["name"])
-    return dict(named or max(known.values(), key=lambda one: len(keys & set(one["changes"]))))
+    return dict(named or max(known.values(), key=lambda opening: len(keys & set(opening["changes"]))))
 
 
-def _key(module: WasmModule, given: Mapping[str, float], claims: Sequence[str]) -> str:
+def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]) -> str:
     """What names a scenario as its file and overrides have it, with what a page changes of it."""
-    told = [module.description["document"], module.description["overrides"], sorted(given.items()), list(claims)]
+    told = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
     return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
 
 
 @cache
 def _known() -> dict[str, Any]:
-    found: dict[str, Any] = json.loads(files("ppafo.page").joinpath("opening.json").read_text(encoding="utf-8"))
-    return found
+    openings: dict[str, Any] = json.loads(files("ppafo.page").joinpath("opening.json").read_text(encoding="utf-8"))
+    return openings
 
 
 def computed_opening(
@@ -79,9 +79,9 @@ def computed_opening(
     """Return what a page shows of a scenario before it has simulated anything: runs and bands, computed now."""
     from ppafo.simulation.ensemble import run_ensemble  # a report computes nothing
 
-    known = [one["name"] for one in module.description["metrics"]]
+    known = [metric["name"] for metric in module.description["metrics"]]
     named, claims = claims, [name for name in claims if name in known]
-    channels = [one["name"] for one in module.description["channels"]]
+    channels = [channel["name"] for channel in module.description["channels"]]
     # The first panel shows what is controlled, else the motion of the vane.
     followed = next((kind for kind in CONTROLLED.values() if kind.reference in channels), None)
     lead = "angle" if followed is None else followed.channel if followed.channel in TRACED else "pressure_1"
@@ -108,12 +108,12 @@ def computed_opening(
         if entry["key"].startswith(_NATURE) or entry["kept"] == "zero" or not low < high:
             continue
         try:
-            found = runs({entry["key"]: np.array([low, high])}, (lead,))
+            outcomes = runs({entry["key"]: np.array([low, high])}, (lead,))
         except ScenarioError:
             continue  # what an ensemble does not vary, such as a time that others divide, is not a first slider
-        moved = [_share(found.metrics[name] - value, abs(value)) for name, value in zip(claims, usual, strict=True)]
+        moved = [_share(outcomes.metrics[name] - value, abs(value)) for name, value in zip(claims, usual, strict=True)]
         # Runs that failed, or whose duration is another, have no course to compare.
-        varied = found.traces[lead]
+        varied = outcomes.traces[lead]
         apart = np.sqrt(np.mean((varied - course[:, None]) ** 2, axis=0)) if len(varied) == len(course) else np.zeros(0)
         if max(all_changes := [*moved, _share(apart, span)]) > LEAST_CHANGE:
             changes[entry["key"]] = all_changes
@@ -139,13 +139,15 @@ def _share(change: Floats, of: float) -> float:
 
 def first_settings(openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return the keys of at most twelve settings of some configurations, that with the largest change first."""
-    origins = {one["key"]: one["origin"] for program in programs for one in program["settings"]}
+    origins = {setting["key"]: setting["origin"] for program in programs for setting in program["settings"]}
     rank = {origin: place for place, origin in enumerate(_RANKED)}
     largest: dict[str, float] = {}
     for opening in openings:
         # Two settings with one effect to the last digit are one slider: the better known comes first.
         same: dict[tuple[float, ...], str] = {}
-        for key, change in sorted(opening["changes"].items(), key=lambda item: rank.get(origins.get(item[0], ""), 99)):
+        for key, change in sorted(
+            opening["changes"].items(), key=lambda change_of_key: rank.get(origins.get(change_of_key[0], ""), 99)
+        ):
             if key in origins and same.setdefault(tuple(change), key) == key:
                 largest[key] = max(largest.get(key, 0.0), *change)
     # Where nothing is known, as of a run that fails, the settings come in the order of the program.

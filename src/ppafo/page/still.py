@@ -25,16 +25,16 @@ def still_of(
     tab: Mapping[str, Any], openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]
 ) -> str:
     """Return the first panel of a tab as the text of an SVG: a curve for each configuration, and the reference."""
-    lead = next((name for name in _NAMES if all(name in one["courses"] for one in openings)), "")
+    lead = next((name for name in _NAMES if all(name in opening["courses"] for opening in openings)), "")
     if not lead:
         return ""
     quantity = quantity_of_unit(_UNITS[lead])
 
-    def course(one: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
-        both = zip(one["times"], one["courses"][name], strict=True)
+    def course(opening: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
+        both = zip(opening["times"], opening["courses"][name], strict=True)
         return [(time, display_value(value, quantity)) for time, value in both if value is not None]
 
-    curves = [(course(one, lead), colour) for one, colour in zip(openings, _colours(programs), strict=False)]
+    curves = [(course(opening, lead), colour) for opening, colour in zip(openings, _colours(programs), strict=False)]
     reference = CONTROLLED[lead].reference
     required = course(openings[0], reference) if reference in openings[0]["courses"] else []
     points = [point for curve in (required, *(points for points, _ in curves)) for point in curve]
@@ -89,11 +89,11 @@ def _colours(programs: Sequence[Mapping[str, Any]]) -> list[str]:
     """The colours that the page gives to configurations: of a valve its own, once, of others what is left."""
     looks = [program["look"] for program in programs]
     free = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
-    found = []
+    colours = []
     for place, look in enumerate(looks):
         number = look if look and looks.index(look) == place else free.pop(0)
-        found.append(PAGE_COLOURS[number - 1])
-    return found
+        colours.append(PAGE_COLOURS[number - 1])
+    return colours
 
 
 def _ticks(values: Sequence[float]) -> list[float]:

@@ -71,10 +71,13 @@ class Simulated:
     label: str
 
 
-def program_content(item: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
+def program_content(simulated: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
-    described = item.module.description
-    gauge, keys = _gauge_texts(item.scenario, described["settings"]), {one["key"] for one in described["settings"]}
+    described = simulated.module.description
+    gauge, keys = (
+        _gauge_texts(simulated.scenario, described["settings"]),
+        {setting["key"] for setting in described["settings"]},
+    )
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
     declared = OF_A_VANE
     if described["kind"] == "walk":
@@ -84,30 +87,32 @@ def program_content(item: Simulated, module: str, intervals: Mapping[str, Interv
     changed = apply_overrides(described["document"], described["overrides"], described["name"], declared)
     document, own = changed.document, changed.device
     of_file = document.get("device", {}).get("overrides", ())
-    overrides = list(over(of_file, own, valve=item.scenario.device.valve_name))
+    overrides = list(over(of_file, own, valve=simulated.scenario.device.valve_name))
     document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return {
         "name": described["name"],
         "kind": described["kind"],
-        "label": item.label,
+        "label": simulated.label,
         # With and without the device, a walk takes colours in their order, as its figures do.
-        "look": PAGE_LOOKS.get(item.scenario.device.valve.kind, 0) if not item.scenario.walks else 0,
+        "look": PAGE_LOOKS.get(simulated.scenario.device.valve.kind, 0) if not simulated.scenario.walks else 0,
         "description": " ".join(described["title"].split()),
         "document": document,
-        "usual": usual_changes(item.scenario),
+        "usual": usual_changes(simulated.scenario),
         "deviceSections": sorted(
             {entry["key"].partition(".")[0] for entry in described["settings"] if is_of_device(entry["key"])}
         ),
-        "settings": [_setting(_as_in_files(entry, item.scenario), gauge, intervals) for entry in described["settings"]],
+        "settings": [
+            _setting(_as_in_files(entry, simulated.scenario), gauge, intervals) for entry in described["settings"]
+        ],
         "relations": [
             {
-                "key": one["key"],
-                "relation": one["relation"],
-                "other": one["other"],
-                "factor": 1.0 + one["tolerance"] * one["is_share"],
-                "slack": 0.0 if one["is_share"] else one["tolerance"],
+                "key": relation["key"],
+                "relation": relation["relation"],
+                "other": relation["other"],
+                "factor": 1.0 + relation["tolerance"] * relation["is_share"],
+                "slack": 0.0 if relation["is_share"] else relation["tolerance"],
             }
-            for one in described["relations"]
+            for relation in described["relations"]
         ]
         + _relations_of_files(described),
         "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
@@ -162,12 +167,12 @@ def _relations_of_files(described: Mapping[str, Any]) -> list[dict[str, Any]]:
     ]
 
 
-def _as_in_files(entry: Mapping[str, Any], item: Scenario) -> dict[str, Any]:
+def _as_in_files(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
     """A setting with what only Python knows of a walk: its stride and length, and which pressures are absolute."""
-    if item.walks and entry["key"] in (_FIRST_STRIDE, "run.duration"):
+    if scenario.walks and entry["key"] in (_FIRST_STRIDE, "run.duration"):
         from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES, walk_of
 
-        stride = walk_of(item).gait.stride_time
+        stride = walk_of(scenario).gait.stride_time
         if entry["key"] == _FIRST_STRIDE:
             return {**entry, "minimum": 0.5 * stride, "maximum": 2.0 * stride}
         shortest = SHORTEST_STRIDES * stride
@@ -184,9 +189,9 @@ def page_content(
     """Return all that a page is made of, but its modules."""
     shown = {
         (entry["unit"], entry["shown"])
-        for one in programs
+        for program in programs
         for kind in ("settings", "channels", "metrics")
-        for entry in one[kind]
+        for entry in program[kind]
     }
     recorded = {("s", "s"), ("N m", "N m"), (_LEVEL, "psi_g"), ("rad", "deg"), ("", ""), ("kg", "g")}
     return {
@@ -242,9 +247,9 @@ def _slider(entry: Mapping[str, Any]) -> Interval:
     factor, zero = display["factor"], display["zero"]
     value = (entry["value"] - zero) / factor
     low, high = ((end - zero) / factor if end is not None else None for end in (entry["minimum"], entry["maximum"]))
-    given = words()["sliders"].get(entry["key"])
-    if given is not None:
-        begin, end = float(given[0]), float(given[1])
+    slider = words()["sliders"].get(entry["key"])
+    if slider is not None:
+        begin, end = float(slider[0]), float(slider[1])
     else:
         end = _nice(2.5 * abs(value)) if value else (high if high is not None and high <= 1.0 else 1.0)
         begin = -end if value < 0.0 else 0.0
@@ -274,11 +279,11 @@ def _shown(entry: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _gauge_texts(item: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
+def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> dict[str, str]:
     """Texts of the pressures that count from the atmosphere: they move with it, as they do in Python."""
     following = {entry["key"] for entry in settings if entry["follows"]}
     gaps = {
-        path: link.gap for path, links in item.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
+        path: link.gap for path, links in scenario.graph.items() for link in links if link.sources == (ATMOSPHERE_PATH,)
     }
     texts = {}
     for path, gap in gaps.items():
@@ -364,16 +369,19 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
     Of scenarios with one name only the first is in it.
     """
     # Backwards, so that of two with one name the first stays.
-    named = {item if isinstance(item, str) else item.name: item for item in reversed(scenarios)}
+    named = {
+        named_scenario if isinstance(named_scenario, str) else named_scenario.name: named_scenario
+        for named_scenario in reversed(scenarios)
+    }
     try:
         content, modules, _ = _content(list(reversed(named.values())), (), "block")
     except PpafoError:
         return None
     remark = ""
-    for item in named.values():
-        shorter = usual_values(item).get("run.duration") if isinstance(item, Scenario) else None
-        if isinstance(item, Scenario) and shorter is not None and shorter < item.run.duration:
-            part = f"{shorter:g} s of the {item.run.duration:g} s above"
+    for named_scenario in named.values():
+        shorter = usual_values(named_scenario).get("run.duration") if isinstance(named_scenario, Scenario) else None
+        if isinstance(named_scenario, Scenario) and shorter is not None and shorter < named_scenario.run.duration:
+            part = f"{shorter:g} s of the {named_scenario.run.duration:g} s above"
             remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
     html, policy = block_of(content, modules)
     return LivePart(policy, html, remark)
@@ -387,12 +395,12 @@ def _content(
     """Content of a page, its modules by name, where programs that are the same are there once, and a still picture."""
     if not 1 <= len(scenarios) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
-    loaded = [load_scenario(item, overrides) if isinstance(item, str) else item for item in scenarios]
-    found: dict[str, Scenario] = {}
+    loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
+    by_label: dict[str, Scenario] = {}
     for scenario in loaded:
-        if scenario.name in found:
+        if scenario.name in by_label:
             raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench distinguishes them by name")
-        found[scenario.name] = scenario
+        by_label[scenario.name] = scenario
     simulated = []
     for scenario in loaded:
         spoken = scenario.name.replace("-", " ").replace("_", " ")
@@ -401,27 +409,29 @@ def _content(
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
-    for item in simulated:
-        name = names.setdefault(packed_once(item.module.wasm), f"module-{len(names) + 1}")
-        with shown_in(item.scenario.device.shown):
-            programs.append(program_content(item, name, intervals))
+    for program in simulated:
+        name = names.setdefault(packed_once(program.module.wasm), f"module-{len(names) + 1}")
+        with shown_in(program.scenario.device.shown):
+            programs.append(program_content(program, name, intervals))
     content = page_content(TITLE, form, _tabs(simulated), programs)
-    by_name = {item.scenario.name: item for item in simulated}
+    by_name = {program.scenario.name: program for program in simulated}
     described = {program["name"]: program for program in programs}
     stills = []
     for tab in content["tabs"]:
         openings = []
-        for item in tab["start"]:
-            one = by_name[item["program"]]
+        for program in tab["start"]:
+            one = by_name[program["program"]]
             if form == "block":
                 openings.append(opening_like(one.module))
                 continue
             openings.append(opening_of(one.scenario, one.module, usual_values(one.scenario), tab["claims"]))
-        shown = [described[item["program"]] for item in tab["start"]]
+        shown = [described[entry["program"]] for entry in tab["start"]]
         tab["first"] = first_settings(openings, shown)
         # A question is asked where one of the programs has all the settings that it changes.
-        taken = [{one["key"] for one in program["settings"] if one["kept"] != "zero"} for program in shown]
-        tab["questions"] = [one for one in tab["questions"] if any(set(one["changes"]) <= keys for keys in taken)]
+        taken = [{setting["key"] for setting in program["settings"] if setting["kept"] != "zero"} for program in shown]
+        tab["questions"] = [
+            question for question in tab["questions"] if any(set(question["changes"]) <= keys for keys in taken)
+        ]
         with shown_in(by_name[tab["start"][0]["program"]].scenario.device.shown):
             stills.append(still_of(tab, openings, shown))
     return content, {name: text for text, name in names.items()}, stills[0]
@@ -429,13 +439,15 @@ def _content(
 
 def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Return what ``opening_of`` finds of shipped scenarios and walks as a page opens with them, computed anew."""
-    found = {}
+    openings = {}
     for name in names:
-        item = Simulated(load_scenario(name), module_of(load_scenario(name)), name)
-        content = page_content(TITLE, "page", _tabs([item]), [program_content(item, "", {})])
+        simulated = Simulated(load_scenario(name), module_of(load_scenario(name)), name)
+        content = page_content(TITLE, "page", _tabs([simulated]), [program_content(simulated, "", {})])
         claims = content["tabs"][0]["claims"]
-        found[name] = computed_opening(item.scenario, item.module, usual_values(item.scenario), claims)
-    return found
+        openings[name] = computed_opening(
+            simulated.scenario, simulated.module, usual_values(simulated.scenario), claims
+        )
+    return openings
 
 
 @cache
@@ -450,21 +462,21 @@ def known_intervals() -> Mapping[str, Interval]:
 
 def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
     groups: dict[str, list[Simulated]] = {}
-    for item in simulated:
-        groups.setdefault(_task(item.scenario), []).append(item)
+    for program in simulated:
+        groups.setdefault(_task(program.scenario), []).append(program)
     tabs = []
     for title, group in groups.items():
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
-        starts = [item.scenario for item in group[:_OPEN]]
-        asked = [one for one in words()["questions"] if title in one["tabs"]]
+        starts = [program.scenario for program in group[:_OPEN]]
+        asked = [question for question in words()["questions"] if title in question["tabs"]]
         tabs.append(
             {
                 "title": title,
                 "summary": alone or _SUMMARIES.get(title, ""),
-                "programs": [item.scenario.name for item in group],
+                "programs": [program.scenario.name for program in group],
                 "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
                 "claims": words()["claims_of_walks" if title == _WALK else "claims"],
-                "questions": [{"text": one["text"], "changes": one["changes"]} for one in asked],
+                "questions": [{"text": question["text"], "changes": question["changes"]} for question in asked],
             }
         )
     return tabs

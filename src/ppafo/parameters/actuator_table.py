@@ -67,8 +67,8 @@ def table_of(columns: dict[str, Floats], file: str) -> Table:
     made = []
     for number, volume in enumerate(volumes, 1):
         rises = [
-            Rise(float(lower), float(upper - lower), _curve(volume[:, place + 1] - volume[:, place], shares, bends))
-            for place, (lower, upper) in enumerate(pairwise(pressures))
+            Rise(float(lower), float(upper - lower), _curve(volume[:, index + 1] - volume[:, index], shares, bends))
+            for index, (lower, upper) in enumerate(pairwise(pressures))
         ]
         # Compiled code has room for a fixed number of stretches and bends: what is beyond is never come to.
         rises += [Rise(NEVER, 1.0, nothing)] * (RISES - len(rises))
@@ -111,13 +111,13 @@ def _columns(text: str, file: str) -> dict[str, Floats]:
     if not rows:
         raise ParameterError(f"{file}: has a header and no line of numbers")
     columns: dict[str, Floats] = {}
-    for place, (name, unit) in enumerate(zip(names, units, strict=True)):
+    for index, (name, unit) in enumerate(zip(names, units, strict=True)):
         # Over a vacuum a gauge pressure is its own SI value.
-        column = np.array([to_si(row[place], unit, COLUMNS[name], 0.0) for row in rows])
+        column = np.array([to_si(row[index], unit, COLUMNS[name], 0.0) for row in rows])
         worst = int(np.argmax(np.abs(column)))
         if abs(column[worst]) > LARGEST[name]:
             raise ParameterError(
-                f"{file}, line {lines[worst + 1][0]}: {name} = {rows[worst][place]:g} {unit} is beyond "
+                f"{file}, line {lines[worst + 1][0]}: {name} = {rows[worst][index]:g} {unit} is beyond "
                 f"{LARGEST[name]:g} {COLUMNS[name].removesuffix('_a')}"
             )
         columns[name] = column
@@ -191,11 +191,13 @@ def _place(angle: float, pressure: float) -> str:
     return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"
 
 
-def _check_places(name: str, found: Floats, most: int, least: float, file: str) -> None:
+def _check_places(name: str, places_given: Floats, most: int, least: float, file: str) -> None:
     """Refuse values of which there are too many, or that are nearer to each other than ``least``."""
-    if found.size > most:
-        raise ParameterError(f"{file}: has {found.size} values of {name}, at most {most} are taken: leave some out")
-    if found.size > 1 and float(np.diff(found).min()) < least:
+    if places_given.size > most:
+        raise ParameterError(
+            f"{file}: has {places_given.size} values of {name}, at most {most} are taken: leave some out"
+        )
+    if places_given.size > 1 and float(np.diff(places_given).min()) < least:
         raise ParameterError(f"{file}: two values of {name} are almost equal; merge or round them")
 
 
@@ -237,8 +239,8 @@ def _check_curves(chamber: Chamber, bends: Floats, angles: Floats, name: str, fi
 
 def _curve(values: Floats, shares: Floats, bends: Floats) -> Curve:
     """Return the spline through some values that is one cubic over its first two and last two stretches."""
-    found = np.linalg.solve(_basis(shares, bends)[:, : values.size], values).tolist()
-    powers, cubes = found[:4], found[4:]
+    coefficients = np.linalg.solve(_basis(shares, bends)[:, : values.size], values).tolist()
+    powers, cubes = coefficients[:4], coefficients[4:]
     return Curve((*powers, *[0.0] * (4 - len(powers))), (*cubes, *[0.0] * (BENDS - len(cubes))))
 
 

@@ -91,8 +91,8 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
         raise ParameterError(f"{parameter_set.file}: actuator: {line(0)}")
     for path, relation, other, holds in consistency(device):
         if not holds:
-            given, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
-            raise ParameterError(f"{parameter_set.file}: {path} = {given} must be {relation} {other} = {limit}")
+            number, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
+            raise ParameterError(f"{parameter_set.file}: {path} = {number} must be {relation} {other} = {limit}")
     if device.actuator.kind == VANE:
         return device
     # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
@@ -116,18 +116,18 @@ def _actuator(parameter_set: ParameterSet, read: Reader) -> Actuator:
     """Return the actuator: a vane, or one of another kind with its settings."""
     leak, kind = _orifice(parameter_set, read, "actuator.leak"), ACTUATORS[parameter_set.actuator_kind]
     quantities = declaration.actuator_quantities(parameter_set.actuator_kind)
-    given = read("actuator", quantities)
+    numbers = read("actuator", quantities)
     actuator = Actuator(
-        torque_constant=given.get("torque_constant", 0.0),
-        displacement_per_radian=given.get("displacement_per_radian", 0.0),
-        angle_min=given["angle_min"],
-        angle_max=given["angle_max"],
-        dead_volume_1=given["dead_volume_1"],
-        dead_volume_2=given["dead_volume_2"],
-        restitution=given["restitution"],
+        torque_constant=numbers.get("torque_constant", 0.0),
+        displacement_per_radian=numbers.get("displacement_per_radian", 0.0),
+        angle_min=numbers["angle_min"],
+        angle_max=numbers["angle_max"],
+        dead_volume_1=numbers["dead_volume_1"],
+        dead_volume_2=numbers["dead_volume_2"],
+        restitution=numbers["restitution"],
         leak=leak,
         kind=parameter_set.actuator_kind,
-        settings={} if kind.name == VANE else {item.name: given[item.name] for item in kind.quantities},
+        settings={} if kind.name == VANE else {quantity.name: numbers[quantity.name] for quantity in kind.quantities},
         table=parameter_set.actuator_table,
     )
     # Stops in the wrong order are refused by name later, with the other rules between two numbers.
@@ -183,19 +183,21 @@ def _reader(parameter_set: ParameterSet) -> Reader:
     atmosphere = atmospheric_pressure(parameter_set)
 
     def read(section: str, members: Iterable[Quantity]) -> dict[str, float]:
-        found: dict[str, float] = {}
+        numbers: dict[str, float] = {}
         for member in members:
             path = f"{section}.{member.name}"
             if path not in parameter_set.numbers and member.default is not None:
-                found[member.name] = float(member.default)
+                numbers[member.name] = float(member.default)
                 continue
             entry = parameter_set.numbers[path]
-            given = f"{parameter_set.file}: {path} = {number_text(entry)}"
-            with refused_as(ParameterError, given, UnitError):
-                found[member.name] = entry_in_si(entry, declared[path], atmosphere)
-            if not declaration.is_within(found[member.name], declared[path]):
-                raise ParameterError(f"{given}: {range_rule(declared[path], declaration.limits_text(declared[path]))}")
-        return found
+            written = f"{parameter_set.file}: {path} = {number_text(entry)}"
+            with refused_as(ParameterError, written, UnitError):
+                numbers[member.name] = entry_in_si(entry, declared[path], atmosphere)
+            if not declaration.is_within(numbers[member.name], declared[path]):
+                raise ParameterError(
+                    f"{written}: {range_rule(declared[path], declaration.limits_text(declared[path]))}"
+                )
+        return numbers
 
     return read
 
@@ -219,9 +221,9 @@ def _orifice(parameter_set: ParameterSet, read: Reader, section: str) -> Orifice
 
 def both_forms(parameter_set: ParameterSet, section: str) -> tuple[str, ...]:
     """Return the names by which an orifice is given in both forms at once, none where it is in one or in neither."""
-    given = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
-    found = [path for path in given if path in parameter_set.numbers]
-    return tuple(path.rpartition(".")[2] for path in found) if in_two_forms(found) else ()
+    paths = [f"{section}.{name}" for form in FORMS["valve"] for name in sorted(form)]
+    stated = [path for path in paths if path in parameter_set.numbers]
+    return tuple(path.rpartition(".")[2] for path in stated) if in_two_forms(stated) else ()
 
 
 def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
@@ -230,7 +232,7 @@ def _uses_sonic_form(parameter_set: ParameterSet, section: str) -> bool:
     if both:
         wanted = either(f"{section}.{both[0]}")
         raise ParameterError(f"{parameter_set.file}: {section} has {', '.join(both)}; {wanted}")
-    return any(f"{section}.{item.name}" in parameter_set.numbers for item in declaration.SONIC_FORM)
+    return any(f"{section}.{quantity.name}" in parameter_set.numbers for quantity in declaration.SONIC_FORM)
 
 
 def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:

@@ -111,12 +111,17 @@ def _by_path(
     for name, kind in valve_kinds:
         sections.append((f"valves.{name}", ORIFICE + VALVES[kind].quantities))
         sections.append((f"reported.valves.{name}", REPORTED_OF_A_VALVE))
-    declared = (replace(item, name=f"{section}.{item.name}") for section, items in sections for item in items)
+    declared = (
+        replace(quantity, name=f"{section}.{quantity.name}") for section, items in sections for quantity in items
+    )
     return MappingProxyType({quantity.name: quantity for quantity in declared})
 
 
 def limits_text(quantity: Quantity) -> str:
     """Return the limits of a declaration with their unit as a message states them: ``at least 0 and at most 1 m``."""
-    lower = f"{'at least' if quantity.minimum_allowed else 'more than'} {quantity.minimum:g}"
+    beyond, unit = (
+        "at least" if quantity.minimum_allowed else "more than",
+        "" if quantity.unit == "1" else quantity.unit,
+    )
     upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
-    return f"{lower}{upper} {'' if quantity.unit == '1' else quantity.unit}".rstrip()
+    return f"{beyond} {quantity.minimum:g}{upper} {unit}".rstrip()

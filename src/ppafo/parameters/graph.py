@@ -13,6 +13,7 @@ import numpy as np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import quantities_of
+from ppafo.model.plain_function import PlainFunction
 from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"
@@ -44,27 +45,27 @@ class Term:
     """
 
     sources: tuple[str, ...]
-    function: Callable[..., Any] = itself
+    function: PlainFunction = itself
     rows: tuple[type, ...] = ()
     orifice: str = ""
     in_other_form: "Term | None" = None
 
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
-        given = [present(source) for source in self.sources]
+        numbers = [present(source) for source in self.sources]
         if self.function is itself:
-            return given[0]
-        return over_runs(lambda *numbers: self.function(*self.arguments(numbers)), *given)
+            return numbers[0]
+        return over_runs(lambda *numbers: self.function(*self.arguments(numbers)), *numbers)
 
     def arguments(self, numbers: Sequence[Any], filled: Callable[[type, Sequence[Any]], Any] = fill) -> list[Any]:
         """Return the function's arguments from a number for each source; ``filled`` makes a row of its numbers."""
-        found: list[Any] = []
+        arguments: list[Any] = []
         rest = list(numbers)
         for row in self.rows:
             size = len(quantities_of(row))
-            found.append(filled(row, rest[:size]))
+            arguments.append(filled(row, rest[:size]))
             rest = rest[size:]
-        return found + rest
+        return arguments + rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,8 +92,8 @@ class Follows:
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what follows from what the sources are at ``present``."""
         first, *others = (term.number(present) for term in self.terms)
-        found = sum(others, first)
-        return found + self.gap if self.gap else found
+        total = sum(others, first)
+        return total + self.gap if self.gap else total
 
 
 def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Follows:
@@ -120,19 +121,19 @@ def gauge_link(path: str, value: float, unit: str) -> tuple[Follows, ...]:
     return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 
 
-def acting(graph: Graph, given: Collection[str], turned: Collection[str] = ()) -> dict[str, Follows]:
+def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = ()) -> dict[str, Follows]:
     """Return the links by which numbers change where those at some paths are given, in the order to resolve them.
 
     Those at the paths of ``turned`` follow by other terms than before, whatever is given.
     """
     found: dict[str, Follows] = {}
     for path, links in graph.items():
-        if path in given:
+        if path in set_paths:
             continue
         for link in links:
-            if link.sources[0] in given or (
+            if link.sources[0] in set_paths or (
                 not link.when_set
-                and (path in turned or any(source in given or source in found for source in link.sources))
+                and (path in turned or any(source in set_paths or source in found for source in link.sources))
             ):
                 found[path] = link
                 break
@@ -140,18 +141,18 @@ def acting(graph: Graph, given: Collection[str], turned: Collection[str] = ()) -
 
 
 def resolved(
-    graph: Graph, given: Mapping[str, Any], present: Callable[[str], Any], orifices: Collection[str] = ()
+    graph: Graph, replaced: Mapping[str, Any], present: Callable[[str], Any], orifices: Collection[str] = ()
 ) -> dict[str, Any]:
     """Return all numbers that are given, and all that follow them; what stays is looked up at ``present``.
 
     Some orifices, by their sections, take the form that they have not.
     """
-    found = dict(given)
+    numbers = dict(replaced)
     links = in_other_forms(graph, orifices)
     turned = [path for path in graph if links[path] != graph[path]]
-    for path, link in acting(links, given, turned).items():
-        found[path] = link.number(lambda source: found[source] if source in found else present(source))
-    return found
+    for path, link in acting(links, replaced, turned).items():
+        numbers[path] = link.number(lambda source: numbers[source] if source in numbers else present(source))
+    return numbers
 
 
 def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
@@ -169,20 +170,20 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
     }
 
 
-def left(graph: Graph, given: Collection[str]) -> dict[str, tuple[Follows, ...]]:
+def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[Follows, ...]]:
     """Return the links that remain once numbers are given: links of what is given go, as do links that it replaces."""
-    changed = acting(graph, given)
+    changed = acting(graph, replaced)
     return {
         path: (changed[path],) if path in changed and changed[path].when_set else links
         for path, links in graph.items()
-        if path not in given
+        if path not in replaced
     }
 
 
 def holding(graph: Graph, present: Callable[[str], Any]) -> dict[str, tuple[Follows, ...]]:
     """Return the links that are still true of numbers which may have been changed by other means since."""
-    found = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
-    return {path: links for path, links in found.items() if links}
+    links_held = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
+    return {path: links for path, links in links_held.items() if links}
 
 
 def _holds(path: str, link: Follows, present: Callable[[str], Any]) -> bool:
@@ -195,7 +196,7 @@ def _holds(path: str, link: Follows, present: Callable[[str], Any]) -> bool:
 
 def joined(parts: Iterable[Graph]) -> dict[str, tuple[Follows, ...]]:
     """Return several graphs as one; links of sources come first."""
-    found: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[Follows, ...]] = {}
     for part in parts:
-        found |= part
-    return found
+        links |= part
+    return links

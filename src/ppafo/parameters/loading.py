@@ -50,7 +50,7 @@ def _by_name(model: Any) -> Any:
 
 
 def _section(name: str, quantities: tuple[Quantity, ...], extra: dict[str, Any] | None = None) -> Any:
-    fields = {item.name: optional(Entry, f"{item.summary} [{item.unit or '-'}]") for item in quantities}
+    fields = {quantity.name: optional(Entry, f"{quantity.summary} [{quantity.unit or '-'}]") for quantity in quantities}
     return table(name, fields | (extra or {}))
 
 
@@ -104,7 +104,7 @@ def parameter_file() -> type[BaseModel]:
     A file that names none of a kind is compared with all of this package.
     """
     named = (VALVES.loaded_or_own(), ACTUATORS.loaded_or_own(), EFFECTS.loaded())
-    return _parameter_file(tuple(item for kinds in named for item in kinds.items()))
+    return _parameter_file(tuple(kind for kinds in named for kind in kinds.items()))
 
 
 def whole_parameter_file() -> type[BaseModel]:
@@ -128,17 +128,17 @@ _JOINT = table(
 )
 
 
-def _joint_of(given: Any, file: str) -> Joint:
+def _joint_of(words: Any, file: str) -> Joint:
     """Return the words for a joint; ParameterError for a movement whose opposite is not known and not given."""
-    if given is None:
+    if words is None:
         return ANKLE
-    negative = given.negative or OPPOSITES.get(given.positive)
+    negative = words.negative or OPPOSITES.get(words.positive)
     if negative is None:
-        hint = nearest_name(given.positive, OPPOSITES)
+        hint = nearest_name(words.positive, OPPOSITES)
         raise ParameterError(
-            f"{file}: joint.positive = '{given.positive}': its opposite is not known{hint}; give joint.negative too"
+            f"{file}: joint.positive = '{words.positive}': its opposite is not known{hint}; give joint.negative too"
         )
-    return Joint(given.name, given.positive, negative)
+    return Joint(words.name, words.positive, negative)
 
 
 @functools.lru_cache(maxsize=4)
@@ -301,7 +301,7 @@ def _flatten(parsed: Any, file: str, folder: Path) -> ParameterSet:
         numbers={path: leaf for path, leaf in leaves.items() if isinstance(leaf, Entry)},
         texts={path: leaf for path, leaf in leaves.items() if isinstance(leaf, TextEntry)},
         flags={path: leaf for path, leaf in leaves.items() if isinstance(leaf, FlagEntry)},
-        accepted={item.finding: item.reason for item in parsed.accepted},
+        accepted={finding.finding: finding.reason for finding in parsed.accepted},
         joint=_joint_of(parsed.joint, file),
     )
 

@@ -13,7 +13,7 @@ from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
 """By section the forms in which something is given, each as the names of its values."""
-_ORIFICE = tuple(tuple(item.name for item in form) for form in (AREA_FORM, SONIC_FORM))
+_ORIFICE = tuple(tuple(quantity.name for quantity in form) for form in (AREA_FORM, SONIC_FORM))
 FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("rate",), ("period",))}
 
 
@@ -49,19 +49,19 @@ def override_set(
     ``same`` maps a path to another one of the same value; ``valve`` is the name of the valve that is chosen, whose
     values have two paths. An ``error`` where a value is given twice or in two forms names both overrides.
     """
-    found: dict[str, Given] = {}
+    by_path: dict[str, Given] = {}
     # Sorted, so that of two messages the same one comes in any order.
     for override in sorted(overrides):
-        given = split_override(override, error)
-        path = one_path((same or {}).get(given.typed, given.typed), valve)
-        if path in found:
-            raise error(f"overrides '{found[path]}' and '{given}': the same value is given twice; omit one")
-        found[path] = given
-    pair = in_two_forms(found, forms)
+        read = split_override(override, error)
+        path = one_path((same or {}).get(read.typed, read.typed), valve)
+        if path in by_path:
+            raise error(f"overrides '{by_path[path]}' and '{read}': the same value is given twice; omit one")
+        by_path[path] = read
+    pair = in_two_forms(by_path, forms)
     if pair is not None:
-        first, second = (found[path] for path in pair)
+        first, second = (by_path[path] for path in pair)
         raise error(f"overrides '{first}' and '{second}': {either(pair[0], forms)}")
-    return {path: found[path] for path in sorted(found)}
+    return {path: by_path[path] for path in sorted(by_path)}
 
 
 def over(
@@ -79,7 +79,7 @@ def over(
     first, second = tuple(earlier), tuple(later)
     old, new = (override_set(layer, error, same, valve, forms) for layer in (first, second))
     replaced = {other for path in new for other in (path, *other_forms(path, forms))}
-    kept = {item for path, item in old.items() if path not in replaced}
+    kept = {text for path, text in old.items() if path not in replaced}
     return (*(text for text in first if split_override(text, error) in kept), *second)
 
 
@@ -102,9 +102,9 @@ def check_valve(
     The ``error`` names the override and the ``choice`` as it was given.
     """
     for override in sorted(overrides) if valve else ():
-        given = split_override(override, error)
-        if valve and of_another_valve(given.typed, valve):
-            raise error(f"override '{given}' and {choice}: with the latter that valve is not used; omit one")
+        read = split_override(override, error)
+        if valve and of_another_valve(read.typed, valve):
+            raise error(f"override '{read}' and {choice}: with the latter that valve is not used; omit one")
 
 
 def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:

@@ -159,18 +159,18 @@ def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
     flows = tuple(path for path in numbers if path.startswith("reported.") and path.endswith(".mass_flow"))
     conductances = tuple(path for path in numbers if path.endswith(".sonic_conductance"))
     speaking = {**_SPEAKING, "kg/s": flows, "m^3/(s Pa)": conductances}
-    found = {
+    units = {
         si_unit: unit
         for si_unit, paths in speaking.items()
         for unit in [numbers[path].unit for path in reversed(paths) if path in numbers]
         if _is_of(unit, si_unit)
     }
-    if "Pa_a" in found:
-        unit, kind = split_pressure_kind(found["Pa_a"])
-        found |= {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
-    if "rad" in found:
-        found["rad/s"] = f"{found['rad']}/s"
-    return found
+    if "Pa_a" in units:
+        unit, kind = split_pressure_kind(units["Pa_a"])
+        units |= {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
+    if "rad" in units:
+        units["rad/s"] = f"{units['rad']}/s"
+    return units
 
 
 def _is_of(unit: str, si_unit: str) -> bool:
@@ -212,7 +212,7 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 
 
 def links_of_set(
-    parameter_set: ParameterSet, given: Collection[str] = (), atmosphere: float | None = None
+    parameter_set: ParameterSet, set_paths: Collection[str] = (), atmosphere: float | None = None
 ) -> dict[str, tuple[Follows, ...]]:
     """Return how numbers of a set follow others: gauge pressures the atmosphere, the second regulator the first.
 
@@ -221,20 +221,20 @@ def links_of_set(
     a vane per radian is its torque constant, by virtual work, unless the set states another.
     """
     numbers = parameter_set.numbers
-    found = {
+    links = {
         path: gauge_link(path, numbers[path].value, numbers[path].unit)
         for path in (PRESSURE_PATH, SECOND_PRESSURE_PATH)
         if path in numbers
     }
     if SECOND_PRESSURE_PATH not in numbers:
-        found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH),)
+        links[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH),)
     elif has_one_pressure(parameter_set, atmosphere) and not (
-        SECOND_PRESSURE_PATH in given and PRESSURE_PATH not in given
+        SECOND_PRESSURE_PATH in set_paths and PRESSURE_PATH not in set_paths
     ):
-        found[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH, when_set=True), *found[SECOND_PRESSURE_PATH])
+        links[SECOND_PRESSURE_PATH] = (follows(PRESSURE_PATH, when_set=True), *links[SECOND_PRESSURE_PATH])
     if DISPLACEMENT_PATH in parameter_set.declarations() and DISPLACEMENT_PATH not in numbers:
-        found[DISPLACEMENT_PATH] = (follows(TORQUE_CONSTANT_PATH),)
-    return {path: links for path, links in found.items() if links}
+        links[DISPLACEMENT_PATH] = (follows(TORQUE_CONSTANT_PATH),)
+    return {path: links for path, links in links.items() if links}
 
 
 def has_one_pressure(parameter_set: ParameterSet, atmosphere: float | None = None) -> bool:
@@ -331,22 +331,22 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve:
     (70.0, 'psi_g')
     """
     chosen = chosen_valve(parameter_set, valve)
-    given = {
-        f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: item
-        for path, item in override_set(overrides, valve=chosen).items()
+    overrides_by_path = {
+        f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: override
+        for path, override in override_set(overrides, valve=chosen).items()
     }
-    if not given:
+    if not overrides_by_path:
         return parameter_set
     followers = {
-        path: given[link.sources[0]]
-        for path, link in acting(links_of_set(parameter_set, given), given).items()
+        path: overrides_by_path[link.sources[0]]
+        for path, link in acting(links_of_set(parameter_set, overrides_by_path), overrides_by_path).items()
         if link.when_set
     }
     # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
-    first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in given]
-    every = {**{path: given[path] for path in first}, **given, **followers}
-    for path, item in every.items():
-        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, item)
+    first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in overrides_by_path]
+    every = {**{path: overrides_by_path[path] for path in first}, **overrides_by_path, **followers}
+    for path, text in every.items():
+        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
     return parameter_set
 
 
@@ -355,7 +355,7 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
     return frozenset(path for path, entry in parameter_set.entries().items() if entry.source == SOURCE)
 
 
-def _with_number(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
+def _with_number(parameter_set: ParameterSet, path: str, override: Given) -> ParameterSet:
     find_effects([path])
     declared = parameter_set.declarations()
     if path not in declared:
@@ -363,28 +363,30 @@ def _with_number(parameter_set: ParameterSet, path: str, given: Given) -> Parame
         EFFECTS.load_own()
         declared = parameter_set.declarations()
         allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
-        if given.typed.startswith(CHOSEN_VALVE):
+        if override.typed.startswith(CHOSEN_VALVE):
             allowed = [one_path(known, path.split(".")[1]) for known in allowed]
         # Nothing is spelt alike: values of the same section stand for what there is.
-        near = [name for name in allowed if name.startswith(f"{given.typed.partition('.')[0]}.")] or allowed
-        hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6])}"
-        worked = _in_conductance(given)
-        raise ParameterError(f"override '{given}': {parameter_set.file} has no value '{given.typed}'{hint}{worked}")
+        near = [name for name in allowed if name.startswith(f"{override.typed.partition('.')[0]}.")] or allowed
+        hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(near[:6])}"
+        worked = _in_conductance(override)
+        raise ParameterError(
+            f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"
+        )
     try:
-        value, unit = split_number(given.text)
+        value, unit = split_number(override.text)
         unit = declared[path].unit if unit == SI else unit
         entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
         entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
     except UnitError as error:
-        raise ParameterError(f"override '{given}': {error}") from error
+        raise ParameterError(f"override '{override}': {error}") from error
     kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
     return replace(parameter_set, numbers={**kept, path: entry})
 
 
-def _in_conductance(given: Given) -> str:
+def _in_conductance(override: Given) -> str:
     """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
-    section, _, name = given.typed.rpartition(".")
-    conductance = conductance_of(name.lower(), given.text) if name.lower() in ("cv", "kv", "qn") else None
+    section, _, name = override.typed.rpartition(".")
+    conductance = conductance_of(name.lower(), override.text) if name.lower() in ("cv", "kv", "qn") else None
     if conductance is None:
         return ""
     return (
@@ -393,19 +395,19 @@ def _in_conductance(given: Given) -> str:
     )
 
 
-def _with_species(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
-    species = SPECIES.get(given.text)
+def _with_species(parameter_set: ParameterSet, path: str, override: Given) -> ParameterSet:
+    species = SPECIES.get(override.text)
     if species is None:
-        hint = nearest_name(given.text, SPECIES)
-        raise ParameterError(f"override '{given}': unknown gas{hint}; available: {', '.join(SPECIES)}")
-    note = f"follows from the override {path}={given.text}"
+        hint = nearest_name(override.text, SPECIES)
+        raise ParameterError(f"override '{override}': unknown gas{hint}; available: {', '.join(SPECIES)}")
+    note = f"follows from the override {path}={override.text}"
     constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
     constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")
     numbers = {
         key: Entry(value=value, unit=unit, origin="datasheet", source=species.source, note=note)
         for key, (value, unit) in constants.items()
     }
-    chosen = TextEntry(value=given.text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    chosen = TextEntry(value=override.text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
     return replace(
         parameter_set,
         numbers={**parameter_set.numbers, **numbers},
@@ -413,10 +415,10 @@ def _with_species(parameter_set: ParameterSet, path: str, given: Given) -> Param
     )
 
 
-def _with_relieving(parameter_set: ParameterSet, path: str, given: Given) -> ParameterSet:
-    if given.text not in _FLAGS:
-        raise ParameterError(f"override '{given}': must be {' or '.join(_FLAGS)}")
-    entry = FlagEntry(value=_FLAGS[given.text], origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+def _with_relieving(parameter_set: ParameterSet, path: str, override: Given) -> ParameterSet:
+    if override.text not in _FLAGS:
+        raise ParameterError(f"override '{override}': must be {' or '.join(_FLAGS)}")
+    entry = FlagEntry(value=_FLAGS[override.text], origin="assumed", source=SOURCE, note=_before(parameter_set, path))
     return replace(parameter_set, flags={**parameter_set.flags, path: entry})
 
 

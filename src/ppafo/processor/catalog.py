@@ -143,7 +143,7 @@ CORTEX_M4 = Target(
     simulator=QemuSimulator,
     machine=Machine("mps2-an386", 25.0e6),
 )
-CATALOG: dict[str, Target] = {item.name: item for item in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
+CATALOG: dict[str, Target] = {target.name: target for target in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 
 
 def target_of(name: str) -> Target:

@@ -70,11 +70,11 @@ def export_firmware(
     from ppafo.processor import words
 
     if table:
-        found = words.table(TARGETS if target is None else (target,), samples)
+        tried = words.table(TARGETS if target is None else (target,), samples)
     else:
-        found = words.tried(scenarios, target or TARGETS[0], samples, tuple(overrides))
-    code = output.EXIT_GOOD if found.agrees else output.EXIT_CHECK_FAILED
-    said = Said(found.text, found.document, "processor", code, draw=found.draw)
+        tried = words.tried(scenarios, target or TARGETS[0], samples, tuple(overrides))
+    code = output.EXIT_GOOD if tried.agrees else output.EXIT_CHECK_FAILED
+    said = Said(tried.text, tried.document, "processor", code, draw=tried.draw)
     if out is not None:
         output.write_files(out, output.said_files(said), COMMAND)
     return said

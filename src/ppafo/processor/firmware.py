@@ -42,19 +42,19 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     state = type(law.begins)
     parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, Readings))
     module = walk_module(collector.text(), {entry: parameters})
-    declared = (Interval(int(item.minimum), int(item.maximum)) for item in numbers or law.number_quantities)
+    declared = (Interval(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities)
     own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
-    given: dict[str, Range] = {
+    ranges: dict[str, Range] = {
         "numbers": _nested(law.numbers, declared),
         "state": _nested(state, (Interval(*law.state_ranges[name]) for name in own_names)),
         "readings": (Interval(0, LARGEST_READING),) * len(Readings._fields),
     }
-    found = narrowed(module, given)
-    allowed: Range = (Interval(-COMMAND_STEPS, COMMAND_STEPS), given["state"])
+    proved = narrowed(module, ranges)
+    allowed: Range = (Interval(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
     # Within it where the hull of both is no wider.
-    if hull(found.returned, allowed) != allowed:
-        raise ProgramError(f"{law.kind.name}: command and state may leave their ranges: {found.returned}")
-    return found
+    if hull(proved.returned, allowed) != allowed:
+        raise ProgramError(f"{law.kind.name}: command and state may leave their ranges: {proved.returned}")
+    return proved
 
 
 def law_source(law: FixedLaw) -> str:
@@ -65,8 +65,8 @@ def law_source(law: FixedLaw) -> str:
     title = f"The controller '{law.kind.name}' of ppafo {__version__} in fixed point. Not to be edited."
     text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
     text = _OF_NUMBERS.sub("PPAFO_CALLED", text)
-    numbers, state, readings = (collector.add(item) for item in (law.numbers, type(law.begins), Readings))
-    given = rebuilt(law.numbers, [macro(item) for item in law.number_quantities])
+    numbers, state, readings = (collector.add(row_type) for row_type in (law.numbers, type(law.begins), Readings))
+    numbers_in_c = rebuilt(law.numbers, [macro(quantity) for quantity in law.number_quantities])
     parameters = ", ".join(f"int16_t {name}" for name in Readings._fields)
     return f"""#include "controller.h"
 
@@ -83,7 +83,7 @@ void controller_begin(void)
 
 int16_t controller_sample({parameters})
 {{
-    static const {numbers} numbers = {_written(given)};
+    static const {numbers} numbers = {_written(numbers_in_c)};
     const {readings} readings = {{{", ".join(Readings._fields)}}};
     const {entry}_result result = {entry}(numbers, state, readings);
     state = result.item_1;
@@ -99,18 +99,18 @@ bool controller_is_sound(void)
 
 def _written(row: Any) -> str:
     """A NamedTuple as C initialises it, nested ones in their place."""
-    return "{" + ", ".join(_written(item) if isinstance(item, tuple) else str(item) for item in row) + "}"
+    return "{" + ", ".join(_written(part) if isinstance(part, tuple) else str(part) for part in row) + "}"
 
 
-def macro(item: Quantity) -> str:
+def macro(quantity: Quantity) -> str:
     """Name of a number in ``parameters.h``."""
-    return f"CONTROLLER_{item.name.upper()}"
+    return f"CONTROLLER_{quantity.name.upper()}"
 
 
 def parameters_header(scenario: Scenario, fixed: "FixedPointController") -> str:
     """``parameters.h``: every number of a law, its unit, meaning and origin; one beyond its range is refused in C."""
     control, law = scenario.controller, fixed.law
-    declared: dict[str, Quantity] = {item.name: item for item in CONTROLLERS[control.kind].quantities}
+    declared: dict[str, Quantity] = {quantity.name: quantity for quantity in CONTROLLERS[control.kind].quantities}
     source = scenario.origin.file or "a scenario without a file"
     settings = (
         f"{name} {value:.9g} {declared[name].unit} (controller.{name})".replace("  ", " ")
@@ -129,12 +129,14 @@ def parameters_header(scenario: Scenario, fixed: "FixedPointController") -> str:
         f"#define CONTROLLER_TICKS {fixed.ticks}u /* of 125 us in a sample period of {control.period:.9g} s */",
         f"#define CONTROLLER_BITS {int(control.settings[SETTINGS[0].name])} /* of the converter */",
     ]
-    for item in law.number_quantities:
-        number = int(fixed.numbers[item.name])
-        lines.append(f"#define {macro(item)} {number} /* {item.summary}; {item.minimum:g} to {item.maximum:g} */")
+    for quantity in law.number_quantities:
+        number = int(fixed.numbers[quantity.name])
+        lines.append(
+            f"#define {macro(quantity)} {number} /* {quantity.summary}; {quantity.minimum:g} to {quantity.maximum:g} */"
+        )
         # A user may edit this file: the proof that nothing overflows holds within these ranges only.
-        lines += [f"#if {macro(item)} < {item.minimum:.0f} || {macro(item)} > {item.maximum:.0f}"]
-        lines += [f'#error "{macro(item)} is beyond its range"', "#endif"]
+        lines += [f"#if {macro(quantity)} < {quantity.minimum:.0f} || {macro(quantity)} > {quantity.maximum:.0f}"]
+        lines += [f'#error "{macro(quantity)} is beyond its range"', "#endif"]
     return "\n".join([*lines, "", "#endif", ""])
 
 
@@ -183,7 +185,7 @@ def integer_form(scenario: Scenario) -> Scenario:
             f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
     scenario.device.check_vane("a fixed-point controller")
-    settings = {**scenario.controller.settings, **{item.name: item.default or 0.0 for item in SETTINGS}}
+    settings = {**scenario.controller.settings, **{quantity.name: quantity.default or 0.0 for quantity in SETTINGS}}
     return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))
 
 
@@ -200,7 +202,7 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
         )
     law = FIXED_LAWS[scenario.controller.kind]
     row = plan_run(scenario).controller
-    numbers = dict(zip((item.name for item in law.number_quantities), leaves(row.numbers), strict=True))
+    numbers = dict(zip((quantity.name for quantity in law.number_quantities), leaves(row.numbers), strict=True))
     converter = converter_with(row.steps, row.numbers.limits)
     return FixedPointController(law=law, numbers=numbers, converter=converter, ticks=ticks)
 

@@ -42,8 +42,8 @@ class PythonProcessor:
 
     def __init__(self, fixed: FixedPointController) -> None:
         self.law = fixed.law
-        given = [int(fixed.numbers[item.name]) for item in fixed.law.number_quantities]
-        self.numbers: Any = rebuilt(fixed.law.numbers, given)
+        numbers = [int(fixed.numbers[quantity.name]) for quantity in fixed.law.number_quantities]
+        self.numbers: Any = rebuilt(fixed.law.numbers, numbers)
         self.state: Any = fixed.law.begins
 
     def begin(self) -> None:
@@ -72,9 +72,9 @@ class SimulatedController:
     def update(self, time: float, reference: float, measurement: Any) -> float:
         """Command from -1 to 1, from what the converter shows; the processor needs no time [s], it counts samples."""
         del time
-        (found,) = self.simulator.samples((read(self.converter, reference, measurement),))
-        self.decisions.append(found)
-        return found.command / COMMAND_STEPS
+        (decision,) = self.simulator.samples((read(self.converter, reference, measurement),))
+        self.decisions.append(decision)
+        return decision.command / COMMAND_STEPS
 
 
 class Cost(NamedTuple):
@@ -155,7 +155,7 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
             wanted.append(reference.sample(readings))
         decisions += simulator.samples(asked)
         cost = cost_of(chosen, image, simulator.stack(), decisions)
-    differ = [place for place, found in enumerate(decisions) if found[:2] != wanted[place]]
+    differ = [sample for sample, decision in enumerate(decisions) if decision[:2] != wanted[sample]]
     first = ""
     if differ:
         first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the processor, {wanted[differ[0]]} in Python"
@@ -173,13 +173,13 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
         step = draw.choice((1, 3, 30, 300, top))
         at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in Readings._fields]
         breaks = draw.randrange(EPISODE) if draw.random() < 0.4 else EPISODE
-        for place in range(min(EPISODE, samples - start)):
+        for sample in range(min(EPISODE, samples - start)):
             if draw.random() < 0.02:
                 at[draw.randrange(3)] = draw.choice(edges)
             if draw.random() < 0.7:
                 at = [min(top - 1, max(1, value + draw.randint(-step, step))) for value in at]
             shown = list(at)
-            if place == breaks:
+            if sample == breaks:
                 shown[draw.randrange(3)] = draw.choice((0, top))
             yield Readings(*shown)
 
@@ -188,7 +188,7 @@ def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision])
     """What the decisions of a processor took of it. SimulationError where there are none."""
     if not decisions:
         raise SimulationError("no sample was taken on the processor")
-    work = [item.work for item in decisions]
+    work = [decision.work for decision in decisions]
     return Cost(target, image.shipped, stack, worst=max(work), mean=sum(work) / len(work))
 
 
@@ -209,8 +209,8 @@ def processor_figure(runs: Sequence[ProcessorRun]) -> "Figure":
     with house_style():
         figure, rows = figure_of_panels(size, _MARGINS, rows=len(heights), heights=heights)
         grid = [axes for (axes,) in rows]
-        for place, run in enumerate(runs):
-            _draw(grid[2 * place], grid[2 * place + 1], run)
+        for row, run in enumerate(runs):
+            _draw(grid[2 * row], grid[2 * row + 1], run)
         grid[-1].set_xlabel("Time (s)")
         grid[-1].set_xlim(0.0, max(run.processor.recording.duration for run in runs))
         mark_kind(figure, runs[0].processor.recording.kind)

@@ -34,7 +34,7 @@ class Numbers:
         self, settings: Mapping[str, Any], period: Any, torque_constant: Any, reference: tuple[Any, Any]
     ) -> tuple[dict[str, Any], tuple[Problem, ...]]:
         """Whole numbers by name, and what may be wrong."""
-        bits, pressure_range = (settings[item.name] for item in SETTINGS)
+        bits, pressure_range = (settings[quantity.name] for quantity in SETTINGS)
         converter: Converter = over_runs(converter_of, bits, pressure_range, torque_constant)
         names = tuple(settings)
 
@@ -44,14 +44,18 @@ class Numbers:
             return size, *(() if self.prepare is None else self.prepare(of_run, period, torque_step))
 
         size, *own = over_runs(own_numbers, period, converter.torque_step, *settings.values())
-        numbers = dict(zip((item.name for item in self.quantities), (*converter, *own), strict=True))
+        numbers = dict(zip((quantity.name for quantity in self.quantities), (*converter, *own), strict=True))
         broken = np.asarray(bits % 1.0 != 0.0)
         whole: Problem = (broken, lambda run: f"controller.converter_bits = {at(bits, run):g}: must be whole")
         return numbers, (whole, _too_large(size, self.name), _reference(reference, converter))
 
 
 def fixed_point_kind(
-    floats: ControllerKind, parameters: type, initial: Any, update: Callable[..., Any], plan: Numbers
+    floats: ControllerKind,
+    parameters: type,
+    initial: Any,
+    update: Callable[[Any, Any, float, Any, float], tuple[float, Any]],
+    plan: Numbers,
 ) -> ControllerKind:
     """The integer form of a law as a controller of the catalogue: its settings, and the converter's."""
     return replace(

@@ -195,31 +195,31 @@ def _sections(content: bytes) -> list[_Section]:
     # Where the section headers begin, how long each is, and how many there are (e_shoff, e_shentsize, e_shnum).
     (start,) = struct.unpack_from("<I", content, 0x20)
     length, count = struct.unpack_from("<HH", content, 0x2E)
-    return [_Section._make(_SECTION.unpack_from(content, start + length * place)) for place in range(count)]
+    return [_Section._make(_SECTION.unpack_from(content, start + length * number)) for number in range(count)]
 
 
 def sizes(image: Path, target: Target) -> Sizes:
     """Flash and RAM that a program takes of a target."""
-    loaded = [item for item in _sections(image.read_bytes()) if item.flags & _LOADED]
-    in_ram = [item for item in loaded if target.ram.holds(item.address)]
-    values = sum(item.size for item in in_ram if item.kind == _WITH_VALUES)
-    flash = sum(item.size for item in loaded if target.flash.holds(item.address))
+    loaded = [section for section in _sections(image.read_bytes()) if section.flags & _LOADED]
+    in_ram = [section for section in loaded if target.ram.holds(section.address)]
+    values = sum(section.size for section in in_ram if section.kind == _WITH_VALUES)
+    flash = sum(section.size for section in loaded if target.flash.holds(section.address))
     # Initial values of RAM lie in flash too, from where the start-up code copies them.
-    return Sizes(flash + values, sum(item.size for item in in_ram))
+    return Sizes(flash + values, sum(section.size for section in in_ram))
 
 
 def _symbols(content: bytes) -> dict[str, int]:
     """Addresses of the symbols of an ELF file, by name."""
     sections = _sections(content)
-    found = {}
-    for item in sections:
-        if item.kind == _SYMBOL_TABLE:
-            names = sections[item.link].offset
-            for at in range(item.offset, item.offset + item.size, _SYMBOL.size):
+    symbols = {}
+    for section in sections:
+        if section.kind == _SYMBOL_TABLE:
+            names = sections[section.link].offset
+            for at in range(section.offset, section.offset + section.size, _SYMBOL.size):
                 name, address, *_ = _SYMBOL.unpack_from(content, at)
                 begin = names + name
-                found[content[begin : content.index(b"\0", begin)].decode()] = address
-    return found
+                symbols[content[begin : content.index(b"\0", begin)].decode()] = address
+    return symbols
 
 
 @final
@@ -261,8 +261,8 @@ class Console:
                 raise SimulationError(f"{self._name} does not answer; {self._last()}")
             # What comes behind the mark is kept for the next question.
             self._seen += said
-        found, _, self._seen = self._seen.partition(mark)
-        return found
+        output, _, self._seen = self._seen.partition(mark)
+        return output
 
     def _last(self) -> str:
         last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
@@ -276,7 +276,7 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 def depth_of_stack(memory: bytes) -> int:
     """How deep a stack has been [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
-    return len(memory) - next((place for place, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))
+    return len(memory) - next((depth for depth, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))
 
 
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
@@ -308,8 +308,8 @@ class MspdebugSimulator:
         """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
         asked = []
         for readings in every:
-            given = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
-            asked.append(f"mw simulated_readings {given}\nrun\n{_SAID_OUTPUTS}\n")
+            sent = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
+            asked.append(f"mw simulated_readings {sent}\nrun\n{_SAID_OUTPUTS}\n")
         # mspdebug asks the system for every byte of its console, and for a file at once.
         (self._folder / _ASKED).write_text("".join(asked), encoding="ascii")
         self._say(f"read {_ASKED}")
@@ -384,14 +384,14 @@ class Debugger:
 
     def read(self, address: int, size: int) -> bytes:
         """What is in memory."""
-        found = b""
+        content = b""
         for at in range(address, address + size, _PIECE):
             count = min(_PIECE, address + size - at)
             answer = self.packet(f"m{at:x},{count:x}")
             if len(answer) != 2 * count:
                 raise SimulationError(f"QEMU cannot read {count} bytes at 0x{at:x}: {answer}")
-            found += bytes.fromhex(answer)
-        return found
+            content += bytes.fromhex(answer)
+        return content
 
     def write(self, address: int, content: bytes) -> None:
         """Put something into memory."""

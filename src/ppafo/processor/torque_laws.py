@@ -56,7 +56,7 @@ class FixedLaw:
     """
 
     kind: ControllerKind
-    sample: Callable[..., Any]
+    sample: Callable[[Any, Any, Readings], tuple[int, Any]]
     numbers: type
     number_quantities: tuple[Quantity, ...]
     begins: Any

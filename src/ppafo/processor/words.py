@@ -46,49 +46,50 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
         return _runs(scenarios, target)
     # Drawn samples on the processor and in Python.
     scenario = scenarios[0]
-    found = compare_drawn(scenario, samples, target=target)
+    comparison = compare_drawn(scenario, samples, target=target)
     lines = [
-        f"{found.samples} drawn samples of the controller of {scenario.name} on the processor's simulator",
+        f"{comparison.samples} drawn samples of the controller of {scenario.name} on the processor's simulator",
         "",
-        *_cost_lines(found.cost, scenario.controller.period),
-        f"decisions   {found.samples}, {found.differences} different from the fixed-point controller in Python",
-        *([f"the first: {found.first_difference}"] if found.differences else []),
+        *_cost_lines(comparison.cost, scenario.controller.period),
+        f"decisions   {comparison.samples}, {comparison.differences} different from the fixed-point controller in "
+        "Python",
+        *([f"the first: {comparison.first_difference}"] if comparison.differences else []),
     ]
     about = {"scenario": scenario.name, "target": target}
-    document = {**about, **_compared(found), **_cost_document(found.cost)}
-    return Tried("\n".join(lines), document, not found.differences)
+    document = {**about, **_compared(comparison), **_cost_document(comparison.cost)}
+    return Tried("\n".join(lines), document, not comparison.differences)
 
 
 def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
     """Scenarios with the processor in charge, one after the other, and their figure."""
-    found = [run_on_processor(scenario, target) for scenario in scenarios]
+    runs = [run_on_processor(scenario, target) for scenario in scenarios]
     texts, documents = [], []
-    for one in found:
-        metrics = {name: one.processor.metrics[name].value for name in _SHOWN if name in one.processor.metrics}
+    for run in runs:
+        metrics = {name: run.processor.metrics[name].value for name in _SHOWN if name in run.processor.metrics}
         lines = [
-            f"{one.scenario.name} with the controller on the processor's simulator, ppafo as the plant",
+            f"{run.scenario.name} with the controller on the processor's simulator, ppafo as the plant",
             "",
-            *_cost_lines(one.cost, one.scenario.controller.period),
-            f"decisions   {one.samples}, {one.differences} different from the fixed-point controller in the simulation",
-            f"recording   {'the same bits' if one.same_bits else 'NOT the same bits'} as without the processor",
+            *_cost_lines(run.cost, run.scenario.controller.period),
+            f"decisions   {run.samples}, {run.differences} different from the fixed-point controller in the simulation",
+            f"recording   {'the same bits' if run.same_bits else 'NOT the same bits'} as without the processor",
             *(f"{name:<12} {value * _SHOWN[name][1]:.4f} {_SHOWN[name][0]}" for name, value in metrics.items()),
         ]
         texts.append("\n".join(lines))
         documents.append(
             {
-                "scenario": one.scenario.name,
-                "target": one.cost.target.name,
-                **_compared(one),
-                "same_bits": one.same_bits,
-                **_cost_document(one.cost),
+                "scenario": run.scenario.name,
+                "target": run.cost.target.name,
+                **_compared(run),
+                "same_bits": run.same_bits,
+                **_cost_document(run.cost),
                 "metrics": metrics,
             }
         )
     return Tried(
         "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
-        all(one.same_bits and not one.differences for one in found),
-        lambda: processor_figure(found),
+        all(run.same_bits and not run.differences for run in runs),
+        lambda: processor_figure(runs),
     )
 
 
@@ -105,18 +106,18 @@ def table(targets: Sequence[str], samples: int | None) -> Tried:
             documents.append({**own, "missing": list(missing)})
             continue
         scenario = load_scenario(law.scenario, law.overrides)
-        found = compare_drawn(scenario, samples or SAMPLES_OF_TABLE, target=target.name)
-        cost = found.cost
+        comparison = compare_drawn(scenario, samples or SAMPLES_OF_TABLE, target=target.name)
+        cost = comparison.cost
         lines.append(
             f"| {target.name} | {law.said} | {cost.sizes.flash:,} | {cost.sizes.data} + {cost.stack} "
-            f"| {cost.worst:,}, {cost.mean:,.0f} {target.counted} | {found.samples:,} | {found.differences} |"
+            f"| {cost.worst:,}, {cost.mean:,.0f} {target.counted} | {comparison.samples:,} | {comparison.differences} |"
         )
-        documents.append({**own, **_compared(found), **_cost_document(cost)})
-    return Tried("\n".join(lines), {"rows": documents}, not any(item.get("differences") for item in documents))
+        documents.append({**own, **_compared(comparison), **_cost_document(cost)})
+    return Tried("\n".join(lines), {"rows": documents}, not any(document.get("differences") for document in documents))
 
 
-def _compared(found: ProcessorRun | Comparison) -> dict[str, Any]:
-    return {"samples": found.samples, "differences": found.differences}
+def _compared(run: ProcessorRun | Comparison) -> dict[str, Any]:
+    return {"samples": run.samples, "differences": run.differences}
 
 
 def _cost_lines(cost: Cost, period: float) -> list[str]:

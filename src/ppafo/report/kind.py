@@ -91,14 +91,14 @@ class Kind:
         """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
         return without_exponent(display_difference(value, self.quantity), form)
 
-    def interval(self, found: Interval, form: str = "") -> str:
+    def interval(self, interval: Interval, form: str = "") -> str:
         """Return an estimate and the ends of its interval as text without unit."""
-        value, low, high = (self.number(each, form) for each in (found.value, found.low, found.high))
+        value, low, high = (self.number(each, form) for each in (interval.value, interval.low, interval.high))
         return f"{value} [{low}, {high}]"
 
-    def change_interval(self, found: Interval, form: str = "") -> str:
+    def change_interval(self, interval: Interval, form: str = "") -> str:
         """Return a difference and the ends of its interval as text without unit."""
-        ends = (found.value, found.low, found.high)
+        ends = (interval.value, interval.low, interval.high)
         value, low, high = (self.change_number(each, form or self.form) for each in ends)
         return f"{value} [{low}, {high}]"
 

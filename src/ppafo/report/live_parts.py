@@ -20,5 +20,5 @@ def live_part(scenarios: Sequence[Any], name: str = "workbench") -> LivePart | N
         make = LIVE_PARTS[name]
     except KindError as error:
         return LivePart(remark=f"Nothing simulates on this page: the {error}.")
-    found: LivePart | None = make(scenarios)
-    return found
+    part: LivePart | None = make(scenarios)
+    return part

@@ -73,7 +73,7 @@ def _bars(axes: "Axes", mark: Mark, x: Any, _y: Any) -> None:
     axes.stairs(mark.y, x, color=mark.colour, label=mark.label, linewidth=1.2)
 
 
-SHAPES: Mapping[str, Callable[..., Any]] = {
+SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
     "line": _line,
     "reach": _reach,
     "bars": _bars,

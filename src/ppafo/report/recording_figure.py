@@ -210,8 +210,8 @@ def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> 
 
     DataError names the key that is of another form.
     """
-    given = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
-    return STANDARD_ATMOSPHERE if given is None else given
+    atmosphere = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
+    return STANDARD_ATMOSPHERE if atmosphere is None else atmosphere
 
 
 def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint:
@@ -220,11 +220,11 @@ def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint
     DataError names the key that is of another form.
     """
     words = _under(file, document, *device, "joint")
-    found = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
-    for name, word in found.items():
+    joint = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
+    for name, word in joint.items():
         if not isinstance(word, str):
             raise _other_form(file, ".".join((*device, "joint", name)), word, "a text")
-    return Joint(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in found.items()})
+    return Joint(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:
@@ -239,11 +239,11 @@ def _positive(file: Path, document: Mapping[str, Any], wanted: str, *keys: str) 
     table = _under(file, document, *keys[:-1])
     if keys[-1] not in table:
         return None
-    given = table[keys[-1]]
+    value = table[keys[-1]]
     # JSON has true and false, which Python takes for 1 and 0.
-    if isinstance(given, bool) or not isinstance(given, int | float) or not 0.0 < given < _LARGEST:
-        raise _other_form(file, ".".join(keys), given, wanted)
-    return float(given)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < _LARGEST:
+        raise _other_form(file, ".".join(keys), value, wanted)
+    return float(value)
 
 
 def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:

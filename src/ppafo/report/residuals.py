@@ -71,32 +71,32 @@ class Course:
     above: float = 0.0
 
 
-def course_panels(one: Course, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
+def course_panels(course: Course, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
     """Return samples and model over time and, half as tall below them, their residual, with ``limits`` dashed."""
     upper = [
-        readings_mark(one.names[0], one.times, one.samples - one.above, look),
-        Mark("line", one.times, one.model - one.above, (), one.names[1], one.colour, {"linewidth": 1.3}),
+        readings_mark(course.names[0], course.times, course.samples - course.above, look),
+        Mark("line", course.times, course.model - course.above, (), course.names[1], course.colour, {"linewidth": 1.3}),
     ]
     lower = [
-        Mark("line", one.times, one.samples - one.model, colour=one.colour, style={"linewidth": 0.9}),
+        Mark("line", course.times, course.samples - course.model, colour=course.colour, style={"linewidth": 0.9}),
         Mark("level", (), 0.0, colour=GREY, style={"linewidth": 0.8}),
     ]
     dashed = {"linewidth": 0.8, "linestyle": (0, (4, 3))}
     lower += [Mark("level", (), limit, colour=GREY, style=dashed) for limit in limits]
 
     def set_time(axes: "Axes") -> None:
-        axes.set_xlim(one.times[0], one.times[-1])
+        axes.set_xlim(course.times[0], course.times[-1])
 
     def set_both(axes: "Axes") -> None:
         # The lower one too: axes that are joined later take the limits of the one below them.
         set_time(axes)
         largest = max(map(abs, axes.dataLim.intervaly)) * 1.1
         # What is left by rounding alone is none.
-        largest = largest if largest > _ROUNDING * float(one.change.values(np.ptp(one.samples))) else 1.0
+        largest = largest if largest > _ROUNDING * float(course.change.values(np.ptp(course.samples))) else 1.0
         axes.set_ylim(-largest, largest)
         axes.locator_params(axis="y", nbins=3)
 
     return [
-        Panel(one.time, one.level, upper, legend=legend, then=set_time, shares_x=True),
-        Panel(one.time, one.change, lower, then=set_both, tall=0.5, shares_x=True),
+        Panel(course.time, course.level, upper, legend=legend, then=set_time, shares_x=True),
+        Panel(course.time, course.change, lower, then=set_both, tall=0.5, shares_x=True),
     ]

@@ -83,7 +83,7 @@ def read_off(
         for channel, values in true.items()
     }
     recording = Recording(name, np.arange(count, dtype=np.float64) * interval, channels, kind="synthetic")
-    offsets = {channel: item.offset for channel, item in sensors.items()}
+    offsets = {channel: sensor.offset for channel, sensor in sensors.items()}
     return Outcome(recording, device, offsets, {"reading_interval": interval, **settings})
 
 
@@ -175,7 +175,7 @@ def record_valve_map(request: Request) -> Outcome:
     # The openings once nothing moves any more: of the valve with every time and frequency taken out.
     kind = VALVES[device.valve.kind]
     with_times = valve_settings(device.valve)
-    still = with_times._replace(**{item.name: 0.0 for item in kind.quantities if item.unit})
+    still = with_times._replace(**{quantity.name: 0.0 for quantity in kind.quantities if quantity.unit})
     model = kind.choose(still)
     parameters = model.prepare(still)
     rising = np.linspace(-1.0, 1.0, COMMAND_STEPS + 1)
@@ -273,7 +273,7 @@ def record_vane_leak(request: Request) -> Outcome:
     """Return both pressures after chamber 1 was filled and both ports were plugged, the vane held in the middle."""
     sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
     # What belongs to the scenario is no override of a device.
-    of_device = [item for item in request.overrides if item.strip().partition(".")[0] in sections]
+    of_device = [override for override in request.overrides if override.strip().partition(".")[0] in sections]
     actuator = load_device(request.parameter_set, overrides=of_device, valve=request.valve).actuator
     motion = {"kind": "locked", "angle": f"{0.5 * (actuator.angle_min + actuator.angle_max)!r} rad"}
     initial = {"pressure_1": "supply", "pressure_2": "atmosphere"}
@@ -328,9 +328,9 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
     for number, (pressure, volume) in enumerate(zip(pressures, chamber_volumes(run.plant, angle), strict=True), 1):
         density = real_density(pressure, warm, physics.gas_constant, physics.virial)
         start[f"sensor_pressure_{number}"] = pressure
-        for place, filled in (("", volume), ("line_", physics.line_volume)):
-            start[f"{place}mass_{number}"] = mass = density * filled
-            start[f"{place}energy_{number}"] = gas_energy(mass, warm, physics.heat_capacity)
+        for prefix, filled in (("", volume), ("line_", physics.line_volume)):
+            start[f"{prefix}mass_{number}"] = mass = density * filled
+            start[f"{prefix}energy_{number}"] = gas_energy(mass, warm, physics.heat_capacity)
     return RigState(**start)
 
 
@@ -342,13 +342,13 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
     true = dict(zip(_SENSED, signals.T, strict=True))
     for supply, drop in _SUPPLIES.items():
         true[supply] = getattr(plant, supply) - solution.states[:, RigState._fields.index(drop)]
-    readings = {item: bench_run.sensors[item].readings(values) for item, values in true.items()}
+    readings = {channel: bench_run.sensors[channel].readings(values) for channel, values in true.items()}
     readings["command"] = solution.commands
     readings["torque"] = plant.torque_constant * (readings["pressure_1"] - readings["pressure_2"])
     readings["reference"] = profile_values(scenario.reference, bench_run.sample_times)[0]
-    channels = {item: Channel(readings[item], CHANNELS[item].unit) for item in names}
+    channels = {channel: Channel(readings[channel], CHANNELS[channel].unit) for channel in names}
     recording = Recording(name, bench_run.sample_times, channels, kind="synthetic")
-    offsets = {item: bench_run.sensors[item].offset for item in names if item in bench_run.sensors}
+    offsets = {channel: bench_run.sensors[channel].offset for channel in names if channel in bench_run.sensors}
     settings = {
         "duration": scenario.run.duration,
         "initial_angle": bench_run.initial.angle,
@@ -394,8 +394,8 @@ class Experiment:
 
 
 EXPERIMENTS: dict[str, Experiment] = {
-    item.name: item
-    for item in (
+    experiment.name: experiment
+    for experiment in (
         Experiment("static-torque", "torque on a scale over pressure, three times up and down", record_static_torque),
         Experiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
         Experiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
@@ -410,7 +410,7 @@ EXPERIMENTS: dict[str, Experiment] = {
 
 def overview() -> tuple[str, dict[str, Any]]:
     """Return the experiments and the presets with what they are, as text and as plain data."""
-    experiments = {item.name: item.summary for item in EXPERIMENTS.values()}
+    experiments = {experiment.name: experiment.summary for experiment in EXPERIMENTS.values()}
     presets = {name: load_preset(name).title for name in list_presets()}
     width = max(map(len, [*experiments, *presets]))
     lines = ["experiments (recordings are synthetic):"]
@@ -456,8 +456,8 @@ def record(
     if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed <= LARGEST_SEED:
         raise ParameterError(f"seed = {seed} must be a whole number from 0 to {LARGEST_SEED}")
     words = tuple(overrides)
-    of_preset = tuple(item for item in words if item.strip().startswith(PREFIX))
-    others = tuple(item for item in words if item not in of_preset)
+    of_preset = tuple(word for word in words if word.strip().startswith(PREFIX))
+    others = tuple(word for word in words if word not in of_preset)
     if not isinstance(preset, Preset):
         preset = load_preset(preset, of_preset)
     elif of_preset:

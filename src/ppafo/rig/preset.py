@@ -127,7 +127,8 @@ def _layout() -> type[BaseModel]:
     }
     for name, members in SECTIONS.items():
         values = {
-            item.name: (PresetValue, Field(description=f"{item.summary} [{item.unit or '-'}]")) for item in members
+            quantity.name: (PresetValue, Field(description=f"{quantity.summary} [{quantity.unit or '-'}]"))
+            for quantity in members
         }
         fields[name] = (table("".join(part.capitalize() for part in name.split("_")), values), Field())
     return table("RigPreset", fields)
@@ -156,7 +157,7 @@ class Preset:
 
     def section(self, name: str) -> dict[str, float]:
         """Return the values of one section by name, in SI."""
-        return {item.name: self.values[f"{name}.{item.name}"] for item in SECTIONS[name]}
+        return {quantity.name: self.values[f"{name}.{quantity.name}"] for quantity in SECTIONS[name]}
 
     def with_value(self, path: str, value: float, reason: str) -> "Preset":
         """Return the preset with one value [SI] replaced. ParameterError where it is unknown or out of range."""
@@ -190,13 +191,13 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
             in_si = to_si(entry.value, entry.unit, quantity.unit)
         with refused_as(ParameterError, file, ParameterError):
             preset = preset.with_value(path, in_si, entry.reason)
-    for typed, given in override_set(overrides).items():
+    for typed, override in override_set(overrides).items():
         path = typed.removeprefix(PREFIX)
         if path not in PATHS or not typed.startswith(PREFIX):
             hint = nearest_name(typed, [f"{PREFIX}{known}" for known in PATHS])
-            raise ParameterError(f"override '{given}': the rig has no value '{typed}'{hint}")
-        with refused_as(ParameterError, f"override '{given}'", UnitError):
-            value = parse_quantity(given.text, PATHS[path].unit)
+            raise ParameterError(f"override '{override}': the rig has no value '{typed}'{hint}")
+        with refused_as(ParameterError, f"override '{override}'", UnitError):
+            value = parse_quantity(override.text, PATHS[path].unit)
         preset = preset.with_value(path, value, "override")
     return preset
 
@@ -231,13 +232,13 @@ def real_device(device: Device, preset: Preset) -> Device:
     ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
     """
     for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
-        zeros = {item.name: f"0 {item.unit}".strip() for item in effect.quantities}
+        zeros = {quantity.name: f"0 {quantity.unit}".strip() for quantity in effect.quantities}
         off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)
         raise ParameterError(
             f"the simulated bench has no effect '{effect.name}': switch it off with {off}, or take the recording of a "
             "simulated run"
         )
-    declared = {item.name for item in VALVES[device.valve.kind].quantities}
+    declared = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
     settings, added = dict(device.valve.settings), preset.section("valve")
     for name in (name for name in added if name in declared):
         # What the set states of its valve counts; a damping ratio is stated beside any frequency.
@@ -368,8 +369,8 @@ def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_ra
 
     ``fraction_of_range`` [-] scales offset, noise and step.
     """
-    given = preset.section(CHANNEL_SENSORS[channel])
-    offset, noise, resolution = (fraction_of_range * given[name] for name in ("offset", "noise", "resolution"))
+    numbers = preset.section(CHANNEL_SENSORS[channel])
+    offset, noise, resolution = (fraction_of_range * numbers[name] for name in ("offset", "noise", "resolution"))
     stream = random_stream(seed, channel)
     # The offset comes first, so that a longer recording begins with the same noise.
     drawn = offset * float(stream.standard_normal())

@@ -120,12 +120,12 @@ _ENERGY_TOLERANCE, _VALVE_TOLERANCE = 1e-8, 1e-10
 
 def absolute_tolerances(valve_unknowns: int) -> Floats:
     """Return the absolute tolerances of all unknowns [SI], the valve's last."""
-    found = []
+    tolerances = []
     # Below a millionth of usual values: of a chamber 1e-4 kg and 10 J, of a supply 1e5 Pa.
     for name in RigState._fields:
         by_kind = next((size for kind, size in _BY_KIND.items() if kind in name), _ENERGY_TOLERANCE)
-        found.append(_TOLERANCES.get(name, by_kind))
-    return np.array(found + [_VALVE_TOLERANCE] * valve_unknowns)
+        tolerances.append(_TOLERANCES.get(name, by_kind))
+    return np.array(tolerances + [_VALVE_TOLERANCE] * valve_unknowns)
 
 
 TOLERANCE = 1.0e-8
@@ -158,23 +158,23 @@ def solve_stretch(
         said = solver.step()
         if solver.status == "failed":
             raise SimulationError(f"the rig's solver stopped at t = {solver.t:.6g} s: {said}")
-        after, found = float(solver.t), None
+        after, event = float(solver.t), None
         # The interpolant is valid in the last step only, so it is asked for in each.
         inside = solver.dense_output()
         if roots is not None and before is not None:
             now = roots(after, solver.y)
             # Strictly above 0 before: a vane that just came to rest has not done so again.
             crossed = [place for place in (0, 1) if before[place] > 0.0 >= now[place]]
-            found = min((_root(roots, place, inside, float(solver.t_old), after) for place in crossed), default=None)
+            event = min((_root(roots, place, inside, float(solver.t_old), after) for place in crossed), default=None)
             before = now
-        last = after if found is None else found
+        last = after if event is None else event
         while waiting and waiting[0] < last:
             moment = waiting.pop(0)
             times.append(moment)
             states.append(inside(moment))
-        if found is not None or solver.status == "finished":
+        if event is not None or solver.status == "finished":
             times.append(last)
-            states.append(inside(last) if found is not None else np.array(solver.y))
+            states.append(inside(last) if event is not None else np.array(solver.y))
             return Stretch(np.array(times), np.array(states))
     raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
 
@@ -290,15 +290,15 @@ class _Rig:
 
     def decide(self, sample: int) -> None:
         """Let the controller see the sensors and send its command on its way."""
-        given, run, controller = self.rig_run, self.run, self.run.program.controller
+        rig, run, controller = self.rig_run, self.run, self.run.program.controller
         if controller is None:
             raise SimulationError("the simulated test bench runs controllers of the catalogue only")
         # The noise is the last recorded sample's.
-        index = max(0, int(np.searchsorted(given.sample_times, self.time + SAME_TIME, side="right")) - 1)
+        index = max(0, int(np.searchsorted(rig.sample_times, self.time + SAME_TIME, side="right")) - 1)
         pressures = self.observe(self.time, self.y)[:2]
-        signals = sensor_signals(given.physics, self.prescribe_angle(self.y, self.time), pressures)
+        signals = sensor_signals(rig.physics, self.prescribe_angle(self.y, self.time), pressures)
         angle, first, second = (
-            given.sensors[name].reads(value, index)
+            rig.sensors[name].reads(value, index)
             for name, value in zip(("angle", "pressure_1", "pressure_2"), signals, strict=True)
         )
         measured = Measurement(
@@ -307,12 +307,12 @@ class _Rig:
             pressure_2=second,
             torque=actuator_torque(first, second, self.plant.torque_constant),
         )
-        requested = run.program.reference.value(run.reference, sample * given.control_period)[0]
+        requested = run.program.reference.value(run.reference, sample * rig.control_period)[0]
         self.decided, self.controller_state = controller.update(
             run.controller, self.controller_state, requested, measured, run.period
         )
-        self.spool = spool_position(self.spool, self.decided, given.hysteresis)
-        self.pending_commands.append((self.time + given.command_delay, self.spool))
+        self.spool = spool_position(self.spool, self.decided, rig.hysteresis)
+        self.pending_commands.append((self.time + rig.command_delay, self.spool))
 
     def advance_to(self, end: float) -> None:
         """Integrate over all that happens on the way."""

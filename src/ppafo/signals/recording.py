@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, nearest_name, refused_as
+from ppafo.errors import DataError, UnitError, count_of, nearest_name, refused_as
 from ppafo.units import from_si
 
 TIME = "time"
@@ -210,7 +210,7 @@ class Recording:
 
     def __repr__(self) -> str:
         """Return label, kind, samples, span and channels with their units."""
-        samples = f"{len(self)} sample{'' if len(self) == 1 else 's'}"
+        samples = count_of(len(self), "sample")
         channels = ", ".join(f"{name} [{channel.unit}]" for name, channel in self.channels.items())
         span = f"from {self.time[0]:g} s to {self.time[-1]:g} s"
         return f"Recording '{self.label}', {self.kind}, {samples} {span}\n  channels: {channels or 'none'}"

@@ -164,9 +164,9 @@ class Check:
             ),
             (("how it ends",) if self.failed else (), f"the run with {' and that with '.join(self.failed)} diverged."),
         ]
-        found = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
+        told = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
         parting = [] if self.parts_at is None else [f"The runs part at t = {self.parts_at:.4g} s."]
-        return " ".join([f"Numerically sensitive: {' Also: '.join(found)}", self.error.sentence, *parting])
+        return " ".join([f"Numerically sensitive: {' Also: '.join(told)}", self.error.sentence, *parting])
 
     @in_units(_units_of)
     def __repr__(self) -> str:
@@ -193,8 +193,7 @@ class Check:
         document: dict[str, Any] = plain(self)
         rows = {"metrics": self.metrics, "courses": self.courses}
         judged = {
-            group: [{**plain(row), "is_determined": row.is_determined} for row in found]
-            for group, found in rows.items()
+            group: [{**plain(row), "is_determined": row.is_determined} for row in row] for group, row in rows.items()
         }
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
@@ -239,14 +238,14 @@ def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
     """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
     courses = [_COURSES[name] for name in _courses_of(result)]
     if not fine.status.is_completed:
-        found, errors = [math.inf for _ in courses], dict.fromkeys(result.metrics, math.inf)
+        errors_at_end, errors = [math.inf for _ in courses], dict.fromkeys(result.metrics, math.inf)
     else:
         largest = [np.max(_largest_differences(fine.recording, result.recording, names)) for names in courses]
-        found = [MARGIN * float(difference) for difference in largest]
+        errors_at_end = [MARGIN * float(difference) for difference in largest]
         changes = {name: abs(_difference(_value(fine, name), _value(result, name))) for name in result.metrics}
         errors = {name: MARGIN * change for name, change in changes.items()}
-    angle, pressure = found[:2]
-    temperature = found[2] if len(found) > 2 else None
+    angle, pressure = errors_at_end[:2]
+    temperature = errors_at_end[2] if len(errors_at_end) > 2 else None
     shares = _shares(result, errors)
     worst = max(shares, key=lambda name: shares[name], default="")
     return ErrorEstimate(angle, pressure, errors, temperature, worst, shares.get(worst, 0.0))
@@ -296,8 +295,8 @@ def checked(result: Ran, run: Run, again: Again) -> Check:
     if not run.program.ideal_sensors:
         repeats += [(MOVED_MEASUREMENT, moved) for moved in _measurements_moved(run, pressures)]
     results = again([repeat for _, repeat in repeats])
-    found = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
-    courses = tuple(_course(name, found, result, pressures) for name in _courses_of(result))
+    checked = [(name, repeated) for (name, _), repeated in zip(repeats, results, strict=True)]
+    courses = tuple(_course(name, checked, result, pressures) for name in _courses_of(result))
     partings = [repeated.status.time for repeated in results if repeated.status.time is not None]
     for course in courses:
         for repeated in results:
@@ -305,11 +304,11 @@ def checked(result: Ran, run: Run, again: Again) -> Check:
             partings += [float(recording.time[np.argmax(beyond)])] if beyond.any() else []
     return Check(
         scenario=scenario.name,
-        metrics=_metrics(result, found, pressures),
+        metrics=_metrics(result, checked, pressures),
         courses=courses,
         error=estimated_error(result, results[0]),
         parts_at=min(partings, default=None),
-        failed=tuple(dict.fromkeys(name for name, repeated in found if not repeated.status.is_completed)),
+        failed=tuple(dict.fromkeys(name for name, repeated in checked if not repeated.status.is_completed)),
         atmosphere=scenario.device.supply.atmospheric_pressure,
     )
 

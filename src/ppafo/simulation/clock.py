@@ -1,13 +1,13 @@
 """Times of a run: one step that divides the sample period; recorded samples may lie between steps."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Number, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_text, value_at
+from ppafo.simulation.motion_kind import Clock
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6
@@ -20,16 +20,6 @@ _DURATION, _STEP, _OUTPUT = RUN
 _LONGEST_STEP = 1.0e-3
 _DURATION_PATH, _STEP_PATH, _OUTPUT_PATH = (f"run.{item.name}" for item in RUN)
 _RATE_PATH, _PERIOD_PATH = "controller.rate", "controller.period"
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """Duration, longest step, output interval and sample period [s]; the step divides the sample period."""
-
-    duration: float
-    step: float
-    output_interval: float
-    period: float
 
 
 def read_clock(reading: Reading) -> Clock:

@@ -46,7 +46,7 @@ ANGLE = FREE[0]
 LOCKED_ANGLE = "motion.angle"
 # Without the external torque: with a leg it follows from equation (11).
 LEG = (*FREE[:2], *quantities_of(Leg))
-FOOT = {item.name: item for item in quantities_of(Leg)}
+FOOT = {quantity.name: quantity for quantity in quantities_of(Leg)}
 SHANK_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 GAIT_SHANK = "gait"
 GAIT_START = Quantity("start", "1", "phase in strides at time 0, from heel strike", 0.0, 0.0, 1.0)
@@ -77,7 +77,7 @@ REFERENCE_OF = "reference.of"
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
-SUPPLY_LINES = tuple(item.name for item in fields(SupplyLine))
+SUPPLY_LINES = tuple(line.name for line in fields(SupplyLine))
 
 _REGULATED = quantities_of(RegulatedLine)
 
@@ -134,37 +134,41 @@ def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, 
     law = CONTROLLERS[kind]
     # A law that knows no torque has its settings in units of its own.
     is_of_any = controlled in law.controls and TORQUE in law.controls
-    return tuple(CONTROLLED[controlled].setting(item) for item in law.quantities) if is_of_any else law.quantities
+    return (
+        tuple(CONTROLLED[controlled].setting(quantity) for quantity in law.quantities) if is_of_any else law.quantities
+    )
 
 
 def reference_settings(kind: str, controlled: str) -> tuple[Quantity, ...]:
     """Return the settings of a reference: levels, to be given where it is no torque, and differences of them."""
     followed = CONTROLLED[controlled]
-    found = profile_settings(kind, followed.level)
+    settings = profile_settings(kind, followed.level)
     if controlled == TORQUE or kind not in PROFILES:
-        return found
+        return settings
     profile, span = PROFILES[kind], followed.level.maximum - followed.level.minimum
-    levels = {item.name for item in profile.quantities if not item.unit}
+    levels = {quantity.name for quantity in profile.quantities if not quantity.unit}
 
-    def of_reference(item: Quantity) -> Quantity:
-        if item.name not in levels:
-            return item
-        if item.name in profile.differences:
-            return replace(item, unit=followed.difference, minimum=-span, maximum=span)
-        return replace(item, default=None)
+    def of_reference(quantity: Quantity) -> Quantity:
+        if quantity.name not in levels:
+            return quantity
+        if quantity.name in profile.differences:
+            return replace(quantity, unit=followed.difference, minimum=-span, maximum=span)
+        return replace(quantity, default=None)
 
-    return tuple(map(of_reference, found))
+    return tuple(map(of_reference, settings))
 
 
 def profile_settings(kind: str, prescribed: Quantity) -> tuple[Quantity, ...]:
     """Return the settings of a profile; a level, which has no unit of its own, gets the unit of what is prescribed."""
-    found = []
-    for item in PROFILES[kind].quantities if kind in PROFILES else ():
-        lowest, highest = max(item.minimum, prescribed.minimum), min(item.maximum, prescribed.maximum)
+    settings = []
+    for quantity in PROFILES[kind].quantities if kind in PROFILES else ():
+        lowest, highest = max(quantity.minimum, prescribed.minimum), min(quantity.maximum, prescribed.maximum)
         # A level is a torque in a reference and an angle in a motion, so that it has no unit of its own.
-        is_level = not item.unit
-        found.append(replace(item, unit=prescribed.unit, minimum=lowest, maximum=highest) if is_level else item)
-    return tuple(found)
+        is_level = not quantity.unit
+        settings.append(
+            replace(quantity, unit=prescribed.unit, minimum=lowest, maximum=highest) if is_level else quantity
+        )
+    return tuple(settings)
 
 
 def gas_settings(kind: str) -> tuple[Quantity, ...]:
@@ -179,7 +183,7 @@ def shank_settings(kind: str) -> tuple[Quantity, ...]:
 
 def by_path(section: str, items: Iterable[Quantity]) -> dict[str, Quantity]:
     """Return the declarations of a section by path."""
-    return {f"{section}.{item.name}": item for item in items}
+    return {f"{section}.{quantity.name}": quantity for quantity in items}
 
 
 def section_of(document: Mapping[str, Any]) -> MotionSection | None:
@@ -206,7 +210,7 @@ def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | 
         section = section_of(document)
         of_motion = motion_quantities(section, kind_at(document, profile_path(section)))
     controlled = controlled_in(document)
-    found = {
+    declared = {
         **by_path("run", (*RUN, ACCURACY)),
         **of_motion,
         **by_path("initial", INITIAL),
@@ -215,7 +219,7 @@ def quantities(document: Mapping[str, Any], of_motion: Mapping[str, Quantity] | 
         **by_path("sensors", (*SENSORS, SEED)),
         **by_path("gas_model", gas_settings(kind_at(document, "gas_model"))),
     }
-    return found | line_paths() if SUPPLY_LINE in document else found
+    return declared | line_paths() if SUPPLY_LINE in document else declared
 
 
 def profile_path(section: MotionSection | None) -> str:
@@ -310,22 +314,26 @@ def line_entries() -> dict[str, Entry]:
     """Return the defaults for what ``[supply_line]`` does not give, by path such as ``dorsiflexion.droop``."""
     document = tomllib.loads((resources.files("ppafo.simulation") / "supply_line.toml").read_text(encoding="utf-8"))
     return {
-        f"{line}.{item.name}": Entry.model_validate(document[line][item.name])
+        f"{line}.{quantity.name}": Entry.model_validate(document[line][quantity.name])
         for line in SUPPLY_LINES
-        for item in _REGULATED
+        for quantity in _REGULATED
     }
 
 
 @functools.cache
 def line_quantities(line: str) -> tuple[Quantity, ...]:
     """Return what a file may state of one line, with defaults in SI."""
-    found = ((item, line_entries()[f"{line}.{item.name}"]) for item in _REGULATED)
-    return tuple(replace(item, default=to_si(entry.value, entry.unit, item.unit)) for item, entry in found)
+    entries = ((quantity, line_entries()[f"{line}.{quantity.name}"]) for quantity in _REGULATED)
+    return tuple(
+        replace(quantity, default=to_si(entry.value, entry.unit, quantity.unit)) for quantity, entry in entries
+    )
 
 
 def line_paths() -> dict[str, Quantity]:
     """Return the declaration of every number of both lines, by path such as ``supply_line.dorsiflexion.droop``."""
-    return {f"{SUPPLY_LINE}.{line}.{item.name}": item for line in SUPPLY_LINES for item in line_quantities(line)}
+    return {
+        f"{SUPPLY_LINE}.{line}.{quantity.name}": quantity for line in SUPPLY_LINES for quantity in line_quantities(line)
+    }
 
 
 OF_A_VANE = Declared(
@@ -400,7 +408,9 @@ class Reading:
         self, section: str, quantities: tuple[Quantity, ...], atmosphere: float = STANDARD_ATMOSPHERE
     ) -> dict[str, float]:
         """Return all values of a section by name, in SI; gauge pressures count from an atmosphere [Pa absolute]."""
-        return {item.name: self.number(f"{section}.{item.name}", item, atmosphere) for item in quantities}
+        return {
+            quantity.name: self.number(f"{section}.{quantity.name}", quantity, atmosphere) for quantity in quantities
+        }
 
 
 def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
@@ -436,6 +446,7 @@ def limits(quantity: Quantity, atmosphere: float) -> str:
         f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""
         for limit in (quantity.minimum, quantity.maximum)
     )
-    parts = [f"{'at least' if quantity.minimum_allowed else 'more than'} {lower}"] if lower else []
+    beyond = "at least" if quantity.minimum_allowed else "more than"
+    parts = [f"{beyond} {lower}"] if lower else []
     parts += [f"at most {upper}"] if upper else []
     return " and ".join(parts)

@@ -33,13 +33,13 @@ def read_followers(
         return known[path] if path in known else device_number_at(device, path)
 
     for section, items in sections.items():
-        for item in items:
-            path, read = f"{section}.{item.name}", item
+        for quantity in items:
+            path, read = f"{section}.{quantity.name}", quantity
             # A setting of this list may follow one before it.
-            if item.follows and value_at(reading.document, path) is None:
-                link = Follows(tuple(terms[name] for name in item.follows), item.default or 0.0)
+            if quantity.follows and value_at(reading.document, path) is None:
+                link = Follows(tuple(terms[name] for name in quantity.follows), quantity.default or 0.0)
                 links[path] = (link,)
-                read = replace(item, default=float(link.number(number)))
+                read = replace(quantity, default=float(link.number(number)))
             settings[path] = reading.number(path, read)
     return settings, links
 

@@ -17,10 +17,11 @@ from ppafo.model.columns import Problem
 from ppafo.model.gait import foot_in_gait
 from ppafo.model.leg import FootLoad, torque_on_foot
 from ppafo.model.plant import PlantParameters
+from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.plan import CarriedLeg, plan_vane
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
-from ppafo.simulation.vane_recording import Measured, friction_sizes, measured
+from ppafo.simulation.vane_recording import friction_sizes, measured
 
 
 def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:

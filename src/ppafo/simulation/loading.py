@@ -24,7 +24,7 @@ from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
 from ppafo.parameters.overrides import FORMS, check_valve, either, in_two_forms, split_override
 from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock, read_clock
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
 from ppafo.simulation.declaration import (
     ACCURACY,
     AT_REST,
@@ -51,7 +51,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
-from ppafo.simulation.motion_kind import MOTIONS
+from ppafo.simulation.motion_kind import MOTIONS, Clock
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths
 from ppafo.simulation.profiles import reference_problem
@@ -178,8 +178,8 @@ def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[s
         raise _of_device(reading, error) from error
     before = atmospheric_pressure(parameter_set) if overrides else None
     changed = apply_device_overrides(parameter_set, overrides, valve=valve)
-    given = {split_override(text, ScenarioError).typed for text in overrides}
-    return Hardware(changed, name, links_of_set(changed, given, before))
+    paths = {split_override(text, ScenarioError).typed for text in overrides}
+    return Hardware(changed, name, links_of_set(changed, paths, before))
 
 
 def set_name(name: str, folder: Path) -> str:
@@ -207,7 +207,7 @@ def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
     Each is a number or a word; a word follows its pressure, a number in gauge the atmosphere.
     """
     pressures: list[float] = []
-    found: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[Follows, ...]] = {}
     for quantity in INITIAL:
         path = f"initial.{quantity.name}"
         value = value_at(reading.document, path)
@@ -215,15 +215,15 @@ def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
         if isinstance(word, str) and word.strip() in PRESSURE_WORDS:
             name = PRESSURE_WORDS[word.strip()]
             pressures.append(float(getattr(supply, name)))
-            found[path] = (follows(f"supply.{name}"),)
+            links[path] = (follows(f"supply.{name}"),)
             continue
         if isinstance(word, str) and not any(character.isdigit() for character in word):
             words = ", ".join(PRESSURE_WORDS)
             hint = nearest_name(word, PRESSURE_WORDS)
             raise reading.refusal(path, f"is neither a pressure such as '50 psi_g' nor one of {words}{hint}")
         pressures.append(reading.number(path, quantity, supply.atmospheric_pressure))
-        found[path] = gauge_link(path, *split_quantity(str(word)))
-    return Initial(*pressures), {path: links for path, links in found.items() if links}
+        links[path] = gauge_link(path, *split_quantity(str(word)))
+    return Initial(*pressures), {path: links for path, links in links.items() if links}
 
 
 def _control(
@@ -238,18 +238,18 @@ def _control(
     kind = kind_at(reading.document, "controller")
     controlled, leg = controlled_in(reading.document), getattr(motion, "leg", None)
     items = controller_settings(kind, controlled)
-    if not any(item.follows for item in items):
+    if not any(quantity.follows for quantity in items):
         return Control(kind, reading.section("controller", items), period), {}
     rows = None if lines is None else lines.row(device.supply)
     terms = nominal_terms(device, rows) | loop_terms(
         device, CONTROLLERS[kind], walks=False, controlled=controlled, has_leg=leg is not None
     )
-    of_sensors = {item.name: getattr(sensors, item.name) for item in SENSORS}
+    of_sensors = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
     present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
     if leg is not None:
         present |= {path: getattr(leg, path.removeprefix("motion.")) for path in LEG_PATHS}
-    found, links = read_followers(reading, {"controller": items}, terms, device, present)
-    return Control(kind, {path.partition(".")[2]: number for path, number in found.items()}, period), links
+    followed, links = read_followers(reading, {"controller": items}, terms, device, present)
+    return Control(kind, {path.partition(".")[2]: number for path, number in followed.items()}, period), links
 
 
 def _controlled(reading: Reading) -> str:
@@ -283,9 +283,9 @@ def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[Pr
         return _NOTHING_TO_FOLLOW, {}
     kind = kind_at(reading.document, "reference")
     settings = reference_settings(kind, controlled)
-    levels = [f"reference.{item.name}" for item in settings if item.unit == "Pa_a"]
-    given = {path: value_at(reading.document, path) for path in levels}
-    links = {path: gauge_link(path, *split_quantity(str(text))) for path, text in given.items() if text is not None}
+    levels = [f"reference.{quantity.name}" for quantity in settings if quantity.unit == "Pa_a"]
+    written = {path: value_at(reading.document, path) for path in levels}
+    links = {path: gauge_link(path, *split_quantity(str(text))) for path, text in written.items() if text is not None}
     choice = ProfileChoice(kind, reading.section("reference", settings, atmosphere))
     return choice, {path: follow for path, follow in links.items() if follow}
 
@@ -326,9 +326,9 @@ def read_assumptions(
 
 def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
     """Return the value at a path as written in the file or, where it has none, the default; None without either."""
-    given = value_at(reading.document, path)
-    if given is not None and path in OF_A_VANE.paths(reading.document):
-        return str(given)
+    written = value_at(reading.document, path)
+    if written is not None and path in OF_A_VANE.paths(reading.document):
+        return str(written)
     quantity = quantities(reading.document).get(path)
     if quantity is None:
         # What is not of the scenario is of its device, where the valve has a name.
@@ -502,12 +502,12 @@ def _check_layout(
         try:
             model(document).model_validate(document)
         except ValidationError as error:
-            found = error.errors(include_url=False)
+            errors = error.errors(include_url=False)
         else:
             return
     if of_kinds_alone:
-        problems = [item for item in found if is_unknown_kind(item)]
+        problems = [detail for detail in errors if is_unknown_kind(detail)]
     else:
-        problems = [item for item in found if not (may_have_gaps and is_gap(item))]
+        problems = [detail for detail in errors if not (may_have_gaps and is_gap(detail))]
     if problems:
         raise ScenarioError(f"{file}: {all_problems(problems, layout.whole(document))}")

@@ -160,9 +160,9 @@ def chambers_of(device: Device) -> ChambersOf:
     sections = ("actuator", "actuator", "supply")
     names = {"supply_pressure": "pressure"}
     sources = tuple(
-        f"{section}.{names.get(item.name, item.name)}"
+        f"{section}.{names.get(quantity.name, quantity.name)}"
         for section, row in zip(sections, rows, strict=True)
-        for item in quantities_of(row)
+        for quantity in quantities_of(row)
     )
     if actuator.kind == VANE:
         return ChambersOf(function=vane_at_right_angle, growth=vane_growth, sources=sources, rows=rows)

@@ -5,14 +5,14 @@ a run or an ensemble of such a motion needs is loaded when it is called.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import DataError, ScenarioError, one_line
-from ppafo.kinds import late
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import (
@@ -32,10 +32,16 @@ from ppafo.simulation.declaration import (
     shank_settings,
     value_at,
 )
-from ppafo.simulation.motion_kind import MotionKind, MotionSection, ProfileTable
+from ppafo.simulation.motion_kind import Clock, Measured, MotionKind, MotionSection, ProfileTable
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario
 from ppafo.simulation.schema import profile_table, shank_table
+
+if TYPE_CHECKING:
+    from ppafo.engine.lanes import Floats
+    from ppafo.engine.run import Run
+    from ppafo.metrics.metric import MetricKind
+    from ppafo.model.columns import Problem
 
 _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
@@ -65,15 +71,40 @@ def _switches(scenario: Scenario) -> tuple[Any, ...]:
     return scenario.sensors.flaws
 
 
-_PLAN = late("ppafo.simulation.plan:plan_vane")
-_MEASURED_PRESCRIBED = late("ppafo.simulation.vane_recording:measured_prescribed")
-_OF_ALL_VANES: dict[str, Any] = {
-    "rules": late("ppafo.simulation.ensemble.vane:rules"),
-    "clock": late("ppafo.simulation.ensemble.vane:clock"),
-    "lacks": late("ppafo.simulation.ensemble.vane:lacks"),
-    "switches": _switches,
-    "noise": _noise,
-}
+def _plan(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
+    from ppafo.simulation.plan import plan_vane
+
+    return plan_vane(scenario)
+
+
+def _rules(scenario: Scenario) -> "tuple[Problem, ...]":
+    from ppafo.simulation.ensemble.vane import rules
+
+    return rules(scenario)
+
+
+def _clock(scenario: Scenario, times: Mapping[str, Any]) -> "tuple[Clock, tuple[Problem, ...]]":
+    from ppafo.simulation.ensemble.vane import clock
+
+    return clock(scenario, times)
+
+
+def _lacks(scenario: Scenario, kind: "MetricKind") -> str:
+    from ppafo.simulation.ensemble.vane import lacks
+
+    return lacks(scenario, kind)
+
+
+def _measured_free(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
+    from ppafo.simulation.vane_recording import measured_free
+
+    return measured_free(scenario, run, times, rows)
+
+
+def _measured_prescribed(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
+    from ppafo.simulation.vane_recording import measured_prescribed
+
+    return measured_prescribed(scenario, run, times, rows)
 
 
 def _read_angle(reading: Reading, device: Device) -> float:
@@ -92,12 +123,16 @@ def _read_free(reading: Reading, device: Device, _duration: float, _step: float,
 
 FREE_MOTION = MotionKind(
     name="free",
-    plan=_PLAN,
-    measured=late("ppafo.simulation.vane_recording:measured_free"),
+    plan=_plan,
+    rules=_rules,
     quantities=quantities_of_vane,
     places={},
+    clock=_clock,
+    switches=_switches,
+    noise=_noise,
+    lacks=_lacks,
+    measured=_measured_free,
     section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
-    **_OF_ALL_VANES,
 )
 """Equation (1), with a constant external torque."""
 
@@ -111,14 +146,13 @@ def _read_locked(reading: Reading, device: Device, _duration: float, _step: floa
     return PrescribedMotion(ProfileChoice("constant", {"level": _read_angle(reading, device)}), "locked")
 
 
-LOCKED_MOTION = MotionKind(
+LOCKED_MOTION = replace(
+    FREE_MOTION,
     name="locked",
-    plan=_PLAN,
-    measured=_MEASURED_PRESCRIBED,
     quantities=_quantities_of_locked,
     places={LOCKED_ANGLE: ("motion", "profile", "level")},
+    measured=_measured_prescribed,
     section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
-    **_OF_ALL_VANES,
 )
 """A vane on a test bench that is clamped: its profile is constant."""
 
@@ -131,12 +165,10 @@ def _read_prescribed(reading: Reading, device: Device, duration: float, step: fl
     return PrescribedMotion(profile)
 
 
-PRESCRIBED_MOTION = MotionKind(
+PRESCRIBED_MOTION = replace(
+    FREE_MOTION,
     name="prescribed",
-    plan=_PLAN,
-    measured=_MEASURED_PRESCRIBED,
-    quantities=quantities_of_vane,
-    places={},
+    measured=_measured_prescribed,
     section=MotionSection(
         "the angle of the vane is a given function of time",
         (),
@@ -148,7 +180,6 @@ PRESCRIBED_MOTION = MotionKind(
             partial(profile_table, ANGLE_LEVEL, "Angle"),
         ),
     ),
-    **_OF_ALL_VANES,
 )
 """The ankle goes along a profile whatever the device does."""
 
@@ -162,7 +193,7 @@ def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, 
     shank = ProfileChoice(kind, reading.section(_SHANK, shank_settings(kind)))
     if kind != GAIT_SHANK:
         if not PROFILES[kind].is_smooth:
-            smooth = ", ".join([name for name, item in PROFILES.items() if item.is_smooth] + [GAIT_SHANK])
+            smooth = ", ".join([name for name, profile in PROFILES.items() if profile.is_smooth] + [GAIT_SHANK])
             raise reading.refusal(
                 f"{_SHANK}.kind", f"this profile has corners, at which the foot would be struck; use one of {smooth}"
             )
@@ -188,12 +219,23 @@ def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, 
     return FreeMotion(*start, leg=Leg(**numbers, shank=shank, gait=gait.name, curves=series))
 
 
-LEG_MOTION = MotionKind(
+def _plan_leg(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
+    from ppafo.simulation.leg import plan_leg
+
+    return plan_leg(scenario)
+
+
+def _measured_leg(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
+    from ppafo.simulation.leg import measured_leg
+
+    return measured_leg(scenario, run, times, rows)
+
+
+LEG_MOTION = replace(
+    FREE_MOTION,
     name="leg",
-    plan=late("ppafo.simulation.leg:plan_leg"),
-    measured=late("ppafo.simulation.leg:measured_leg"),
-    quantities=quantities_of_vane,
-    places={},
+    plan=_plan_leg,
+    measured=_measured_leg,
     section=MotionSection(
         "the vane moves a foot that is free, on a shank that is led",
         LEG,
@@ -206,6 +248,5 @@ LEG_MOTION = MotionKind(
             {GAIT_SHANK: ("gait",)},
         ),
     ),
-    **_OF_ALL_VANES,
 )
 """Equation (11), without ground."""

@@ -5,14 +5,36 @@ A kind is loaded when a document or a scenario names it: a vane alone loads no w
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.kinds import Kinds, declared_kinds
 from ppafo.model.declaration import Quantity
 
+if TYPE_CHECKING:
+    from ppafo.engine.lanes import Floats
+    from ppafo.engine.run import Run
+    from ppafo.metrics.metric import Metric, MetricKind
+    from ppafo.model.columns import Problem
+    from ppafo.parameters.device import Device
+    from ppafo.signals.recording import Recording
+
+ScenarioType = TypeVar("ScenarioType")
+"""A scenario, which has a motion and is defined above it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """Duration, longest step, output interval and sample period [s]; the step divides the sample period."""
+
+    duration: float
+    step: float
+    output_interval: float
+    period: float
+
 
 @dataclass(frozen=True, slots=True, eq=False)
-class MotionKind:
+class MotionKind(Generic[ScenarioType]):
     """What a motion brings to the runs of its scenarios, as functions of the scenario.
 
     ``plan`` gives the run and what may be wrong with it, as ``plan_runs`` does; ``rules`` which numbers contradict each
@@ -29,16 +51,20 @@ class MotionKind:
     """
 
     name: str
-    plan: Callable[..., Any]
-    rules: Callable[..., Any]
-    quantities: Callable[..., Any]
+    plan: "Callable[[ScenarioType], tuple[Run, tuple[Problem, ...]]]"
+    rules: "Callable[[ScenarioType], tuple[Problem, ...]]"
+    quantities: Callable[[ScenarioType], dict[str, Quantity]]
     places: Mapping[str, tuple[str, ...]]
-    clock: Callable[..., Any]
-    switches: Callable[..., tuple[Any, ...]]
-    noise: Callable[..., Any]
-    lacks: Callable[..., str]
-    measured: Callable[..., Any]
+    clock: "Callable[[ScenarioType, Mapping[str, Any]], tuple[Clock, tuple[Problem, ...]]]"
+    switches: Callable[[ScenarioType], tuple[Any, ...]]
+    noise: Callable[[ScenarioType], Any]
+    lacks: "Callable[[ScenarioType, MetricKind], str]"
+    measured: "Callable[[ScenarioType, Run, Floats, Mapping[str, Floats]], Measured]"
     section: "MotionSection | None" = None
+
+
+Measured = tuple["Recording", Mapping[str, "Metric"], str]
+"""Recording and metrics of a run, and how it ended if it was completed, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +77,7 @@ class MotionSection:
 
     summary: str
     numbers: tuple[Quantity, ...]
-    read: Callable[..., Any]
+    read: "Callable[[Any, Device, float, float, Path], Any]"
     profile: "ProfileTable | None" = None
 
 
@@ -77,7 +103,7 @@ VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
 """Motions of a vane alone that this package has."""
 
 _GROUP = "ppafo.motions"
-MOTIONS: Kinds[MotionKind] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
+MOTIONS: Kinds[MotionKind[Any]] = Kinds(_GROUP, "motion", MotionKind, declared_kinds(_GROUP))
 """Motions of a vane alone, and of a leg that walks with the device."""
 
 

@@ -13,6 +13,7 @@ from ppafo.model.declaration import NOMINAL
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.model.valves.proportional import spool_lag
+from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 from ppafo.parameters.device import VANE, Device, SonicOrifice
 from ppafo.parameters.graph import Term
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
@@ -23,8 +24,6 @@ if TYPE_CHECKING:
 
 _GAS = ("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature")
 _MASS = ("gas.molar_mass", "gas.temperature")
-_AREA = ("valve.area", "valve.discharge_coefficient")
-_SONIC = ("valve.sonic_conductance", "valve.critical_ratio")
 _ANY = ("supply.pressure",)
 """A source for what no number decides."""
 
@@ -37,6 +36,11 @@ _SAME = {
 }
 VALVE, LEAK = "valve", "actuator.leak"
 """Sections of the orifices."""
+AREA_PATHS, SONIC_PATHS = (
+    {section: tuple(f"{section}.{quantity.name}" for quantity in form) for section in (VALVE, LEAK)}
+    for form in (AREA_FORM, SONIC_FORM)
+)
+"""Paths of the numbers of an orifice in each of its forms, by its section."""
 LEAST_SHARE = 0.05
 """Part of a chamber's volume in the middle of its range that is dead volume at least."""
 _PAIRS = ("solenoid", "solenoid_recycling")
@@ -129,19 +133,24 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
     The valve of another package is not known: then ``nominal_flow`` is 0, and the observer off.
     """
     valve, kind = device.valve, VALVES[device.valve.kind]
-    names = tuple(item.name for item in kind.quantities)
+    names = tuple(quantity.name for quantity in kind.quantities)
     is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
-    found = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
-    found |= {
+    terms = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
+    terms |= {
         "gas_product": Term(_MASS, product_of),
         "valve_conductance": _conductance(device, VALVE),
         "leak_conductance": _conductance(device, LEAK),
         "flow": in_its_form(
-            device, VALVE, Term((*_GAS, *_AREA), flow_of_area), Term((*_MASS, _SONIC[0]), flow_of_sonic)
+            device,
+            VALVE,
+            Term((*_GAS, *AREA_PATHS[VALVE]), flow_of_area),
+            Term((*_MASS, SONIC_PATHS[VALVE][0]), flow_of_sonic),
         )
         if is_known
         else Term(_ANY, no),
-        "critical_ratio": in_its_form(device, VALVE, Term(_GAS[1:2], critical_pressure_ratio), Term(_SONIC[1:])),
+        "critical_ratio": in_its_form(
+            device, VALVE, Term(_GAS[1:2], critical_pressure_ratio), Term(SONIC_PATHS[VALVE][1:])
+        ),
         # Not a number that varies: the source is there because a term needs one.
         "relieving": Term(_ANY, yes if device.supply.relieving else no),
         "pair": Term(_ANY, yes if is_pair else no),
@@ -154,7 +163,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
         else Term(_ANY, no),
     }
     for name in ("opening_delay", "closing_delay", "switching_interval", "dead_band"):
-        found[name] = Term((f"valve.{name}",)) if name in names and is_known else Term(_ANY, no)
+        terms[name] = Term((f"valve.{name}",)) if name in names and is_known else Term(_ANY, no)
     for number, line in enumerate(SUPPLY_LINES, start=1):
         path = f"{SUPPLY_LINE}.{line}"
         of_line = {
@@ -162,9 +171,9 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
             "line_largest_flow": Term((f"{path}.largest_flow", *_MASS), as_content),
             "line_volume": Term((f"{path}.volume",)),
         }
-        found |= {f"{name}_{number}": Term(_ANY, no) if lines is None else term for name, term in of_line.items()}
-    found["line_relieving"] = Term(_ANY, yes if lines is not None and first(lines.relieving) else no)
-    return {NOMINAL[name]: term for name, term in found.items()}
+        terms |= {f"{name}_{number}": Term(_ANY, no) if lines is None else term for name, term in of_line.items()}
+    terms["line_relieving"] = Term(_ANY, yes if lines is not None and first(lines.relieving) else no)
+    return {NOMINAL[name]: term for name, term in terms.items()}
 
 
 def _conductance(device: Device, section: str) -> Term:
@@ -172,8 +181,8 @@ def _conductance(device: Device, section: str) -> Term:
     return in_its_form(
         device,
         section,
-        Term((*_GAS, f"{section}.area", f"{section}.discharge_coefficient"), conductance_of_area),
-        Term((*_MASS, f"{section}.sonic_conductance"), conductance_of_sonic),
+        Term((*_GAS, *AREA_PATHS[section]), conductance_of_area),
+        Term((*_MASS, SONIC_PATHS[section][0]), conductance_of_sonic),
     )
 
 

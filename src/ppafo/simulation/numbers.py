@@ -16,8 +16,9 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings
-from ppafo.simulation.clock import Clock, read_clock
+from ppafo.simulation.clock import read_clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
+from ppafo.simulation.motion_kind import Clock
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
 
@@ -50,8 +51,7 @@ def chosen_path(path: str, scenario: Scenario) -> str:
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a scenario and its device, by path; both forms of an orifice."""
-    own: dict[str, Quantity] = scenario.motion.motion_kind.quantities(scenario)
-    return device_numbers(scenario.device) | own
+    return device_numbers(scenario.device) | scenario.motion.motion_kind.quantities(scenario)
 
 
 def device_numbers(device: Device) -> dict[str, Quantity]:
@@ -140,12 +140,12 @@ def other_form(device: Device, section: str) -> tuple[str, ...]:
     return tuple(quantity.name for quantity in (SONIC_FORM if isinstance(orifice, Orifice) else AREA_FORM))
 
 
-def _changing_form(scenario: Scenario, given: Collection[str]) -> list[str]:
+def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
     """Return the sections of the orifices that take the form in which they are not."""
     return [
         section
         for section in _ORIFICES
-        if any(f"{section}.{name}" in given for name in other_form(scenario.device, section))
+        if any(f"{section}.{name}" in paths for name in other_form(scenario.device, section))
     ]
 
 
@@ -267,11 +267,11 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
     """
     document = {section: dict(texts) for section, texts in given.items()}
     for path, value in times.items():
-        section, item = path.split(".")
+        section, key = path.split(".")
         # A rate takes the place of a period that the file has, and the reverse.
         if section == "controller":
             document[section] = {}
-        document[section][item] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
+        document[section][key] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
     return read_clock(Reading(name, document, frozenset(times)))
 
 

@@ -94,9 +94,9 @@ class Gains:
         """The gains in force and where they come from."""
         loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
         parts = [
-            f"{', '.join(item.text for item in self.gains if item.computed == computed)} {origin}"
+            f"{', '.join(gain.text for gain in self.gains if gain.computed == computed)} {origin}"
             for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})"))
-            if any(item.computed == computed for item in self.gains)
+            if any(gain.computed == computed for gain in self.gains)
         ]
         return f"gains: {'; '.join(parts)}"
 
@@ -146,17 +146,22 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains of a scenario's torque law in force; None for a law that has none."""
     if scenario.controller.kind == PYTHON_CONTROLLER:
         return None
-    items = [item for item in settings_of(scenario, law) if _OF_LOOP.intersection(item.follows)]
+    items = [quantity for quantity in settings_of(scenario, law) if _OF_LOOP.intersection(quantity.follows)]
     if not items:
         return None
     links, terms = scenario.links, _terms(scenario, law)
-    found = tuple(
-        Gain(item.name, item.unit, float(scenario.controller.settings[item.name]), f"controller.{item.name}" in links)
-        for item in items
+    gains = tuple(
+        Gain(
+            quantity.name,
+            quantity.unit,
+            float(scenario.controller.settings[quantity.name]),
+            f"controller.{quantity.name}" in links,
+        )
+        for quantity in items
     )
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    return Gains(found, rate, late, CONTROLLED[controlled].plain_unit)
+    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit)
 
 
 def asks_gradually(scenario: Scenario, law: ControllerKind) -> bool:
@@ -215,7 +220,7 @@ def _lies_on_stop(scenario: Scenario, angle: Floats) -> bool:
 
 def _first(scenario: Scenario, law: ControllerKind) -> dict[str, Quantity]:
     """Return the settings of a law that say how fast its loops are, by what they follow, the innermost first."""
-    items = {name: item for item in settings_of(scenario, law) for name in _FIRST if name in item.follows}
+    items = {name: quantity for quantity in settings_of(scenario, law) for name in _FIRST if name in quantity.follows}
     return {name: items[name] for name in _FIRST if name in items}
 
 
@@ -223,10 +228,14 @@ def _unlike(scenario: Scenario, law: ControllerKind) -> list[tuple[Quantity, flo
     """Return those of them that are not the device's, each with the number [SI] that would be."""
     terms, settings = _terms(scenario, law), scenario.controller.settings
     rights = {
-        name: (item, float(terms[name].number(lambda path: number_at(scenario, path))))
-        for name, item in _first(scenario, law).items()
+        name: (quantity, float(terms[name].number(lambda path: number_at(scenario, path))))
+        for name, quantity in _first(scenario, law).items()
     }
-    return [(item, right) for item, right in rights.values() if abs(float(settings[item.name]) - right) > _NEAR * right]
+    return [
+        (quantity, right)
+        for quantity, right in rights.values()
+        if abs(float(settings[quantity.name]) - right) > _NEAR * right
+    ]
 
 
 def _remedy(scenario: Scenario, law: ControllerKind, unlike: list[tuple[Quantity, float]]) -> str:
@@ -237,8 +246,8 @@ def _remedy(scenario: Scenario, law: ControllerKind, unlike: list[tuple[Quantity
     if not unlike:
         first = next(iter(items.values()))
         return f"{first.name} is this device's: look for what delays it (sensors, lines), or give half of it"
-    item, right = unlike[0]
+    quantity, right = unlike[0]
     # The rules leave the slope of the error alone.
     slopes = [name for name in _SLOPES if scenario.controller.settings.get(name, 0.0) > 0.0]
     rest = "".join(f" and `{name} = 0`" for name in slopes)
-    return f"for this device `{item.name} = {right:.3g} {item.unit}`{rest}"
+    return f"for this device `{quantity.name} = {right:.3g} {quantity.unit}`{rest}"

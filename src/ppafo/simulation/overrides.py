@@ -53,12 +53,21 @@ def apply_overrides(
     ScenarioError for a path that is neither ``declared`` nor of the device, and for two overrides of which one leaves
     the other without use.
     """
-    given = override_set(overrides, ScenarioError, declared.same)
-    if _VALVE in given:
-        check_valve(map(str, given.values()), given[_VALVE].text, f"override '{given[_VALVE]}'", ScenarioError)
+    overrides_of = override_set(overrides, ScenarioError, declared.same)
+    if _VALVE in overrides_of:
+        check_valve(
+            map(str, overrides_of.values()),
+            overrides_of[_VALVE].text,
+            f"override '{overrides_of[_VALVE]}'",
+            ScenarioError,
+        )
     changed = _with_one_path_each(document, file, declared)
-    of_device = {path: item for path, item in given.items() if path not in declared.appended and is_of_device(path)}
-    own = {path: item for path, item in given.items() if path not in of_device}
+    of_device = {
+        path: override
+        for path, override in overrides_of.items()
+        if path not in declared.appended and is_of_device(path)
+    }
+    own = {path: override for path, override in overrides_of.items() if path not in of_device}
     waiting = _choose_kinds(changed, own, file, declared)
     known = declared.paths(changed) if own else ()
     for path in sorted(own):
@@ -103,7 +112,7 @@ def over_layer(
     _choose_kinds(changed, every, file, declared)
     known = frozenset(declared.paths(changed))
     lost = {path for path in every if path not in known and path not in new and chosen_by(path, choosing)}
-    left = {item for path, item in every.items() if path not in lost}
+    left = {text for path, text in every.items() if path not in lost}
     return tuple(text for text in both if split_override(text, ScenarioError) in left)
 
 
@@ -122,34 +131,35 @@ def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
 
 
 def _choose_kinds(
-    document: dict[str, Any], given: Mapping[str, Given], file: str, declared: Declared
+    document: dict[str, Any], overrides_of: Mapping[str, Given], file: str, declared: Declared
 ) -> tuple[str, ...]:
     """Set the kinds that are given, outer sections first, and return the paths that remain.
 
     A kind whose section is not there remains.
     """
     # A kind of an outer section decides which sections there are inside it.
-    first = sorted(filter(_is_choosing, given), key=lambda path: (path.count("."), path))
+    first = sorted(filter(_is_choosing, overrides_of), key=lambda path: (path.count("."), path))
     done = set()
     for path in first:
         if path in declared.paths(document):
             if path == "motion.kind":
-                declared.check_motion(given[path].text, f"override '{given[path]}'")
-            _set(document, path, given[path].text, file, declared)
+                declared.check_motion(overrides_of[path].text, f"override '{overrides_of[path]}'")
+            _set(document, path, overrides_of[path].text, file, declared)
             done.add(path)
-    return tuple(path for path in sorted(given) if path not in done)
+    return tuple(path for path in sorted(overrides_of) if path not in done)
 
 
-def _unused(path: str, given: Mapping[str, Given], known: tuple[str, ...], file: str) -> ScenarioError:
+def _unused(path: str, overrides_of: Mapping[str, Given], known: tuple[str, ...], file: str) -> ScenarioError:
     """Return the error for an override without use: beside a kind that is given, or in any case."""
-    choosing = chosen_by(path, filter(_is_choosing, given))
+    choosing = chosen_by(path, filter(_is_choosing, overrides_of))
     if not choosing:
-        return unknown_value(str(given[path]), known, f"{file} has")
+        return unknown_value(str(overrides_of[path]), known, f"{file} has")
     section = f"{choosing[-1].rpartition('.')[0]}."
-    near = [item for item in known if item.startswith(section)]
+    near = [known_path for known_path in known if known_path.startswith(section)]
     hint = nearest_name(path, near) or f"; there it has {', '.join(near)}"
     return ScenarioError(
-        f"overrides '{given[path]}' and '{given[choosing[-1]]}': with the latter {file} has no value '{path}'{hint}"
+        f"overrides '{overrides_of[path]}' and '{overrides_of[choosing[-1]]}': with the latter {file} has no value "
+        f"'{path}'{hint}"
     )
 
 
@@ -170,8 +180,8 @@ def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declar
 def device_paths() -> tuple[str, ...]:
     """Return every path of the device that an override can set, with ``valve`` for the one that is chosen."""
     sections = [path for path in device_quantities({}) if not path.startswith("reported.")]
-    valve = [*ORIFICE, *(item for kind in VALVES.values() for item in kind.quantities)]
-    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{item.name}" for item in valve))
+    valve = [*ORIFICE, *(quantity for kind in VALVES.values() for quantity in kind.quantities)]
+    return (*sections, SPECIES_PATH, RELIEVING_PATH, *(f"valve.{quantity.name}" for quantity in valve))
 
 
 def is_of_device(path: str) -> bool:
@@ -181,13 +191,13 @@ def is_of_device(path: str) -> bool:
 
 def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
     """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
-    given = split_override(override, ScenarioError)
+    change = split_override(override, ScenarioError)
     EFFECTS.load_own()
     allowed = [*known, *device_paths()]
-    section = given.typed.partition(".")[0]
+    section = change.typed.partition(".")[0]
     near = [name for name in known if name.startswith(f"{section}.")]
-    hint = nearest_name(given.typed, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
-    return ScenarioError(f"override '{given}': {who_has} no value '{given.typed}'{hint}")
+    hint = nearest_name(change.typed, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
+    return ScenarioError(f"override '{change}': {who_has} no value '{change.typed}'{hint}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:

@@ -167,7 +167,7 @@ def compose_run(
     if components.controller is not None:
         law, given = components.controller, components.settings
         # The numbers that a plan made have no settings of their names; they come in the order of the law's parameters.
-        numbers = given.values() if law.plan is not None else [given[item.name] for item in law.quantities]
+        numbers = given.values() if law.plan is not None else [given[quantity.name] for quantity in law.quantities]
         controller = rebuilt(law.parameters, numbers)
     # After lines and leg: the rule looks at the plant with both.
     steps = rule(plant)
@@ -277,8 +277,7 @@ def plan_runs(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
     All runs of an ensemble must ask for one program: of a valve's and the sensors' settings, each is 0 for all or none.
     """
-    planned: tuple[Run, tuple[Problem, ...]] = scenario.motion.motion_kind.plan(scenario)
-    return planned
+    return scenario.motion.motion_kind.plan(scenario)
 
 
 def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, tuple[Problem, ...]]:
@@ -379,7 +378,7 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
         angle, rate = motion.angle, motion.angular_velocity
     else:
         path = PROFILES[motion.profile.kind]
-        numbers = [motion.profile.settings[item.name] for item in path.quantities]
+        numbers = [motion.profile.settings[quantity.name] for quantity in path.quantities]
         angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
     kind = scenario.device.actuator.kind

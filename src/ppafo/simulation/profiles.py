@@ -23,21 +23,21 @@ TOLERANCE = 1.0e-9
 def profile_parameters(choice: ProfileChoice) -> Any:
     """The NamedTuple of a profile, nested ones filled in the order of its quantities; settings may be arrays."""
     kind = PROFILES[choice.kind]
-    return rebuilt(kind.parameters, [choice.settings[item.name] for item in kind.quantities])
+    return rebuilt(kind.parameters, [choice.settings[quantity.name] for quantity in kind.quantities])
 
 
 def profile_values(choice: ProfileChoice, times: "np.ndarray[tuple[int], np.dtype[np.float64]]") -> np.ndarray:
     """Value, rate and second derivative of a profile at times [s], shape (3, times)."""
-    found = np.empty((3, times.size))
+    rows = np.empty((3, times.size))
     for row, series in enumerate(over_samples(PROFILES[choice.kind].value, profile_parameters(choice), times)):
-        found[row] = series
-    return found
+        rows[row] = series
+    return rows
 
 
 def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
     """Lowest and highest value of a profile, N m or rad as its levels; arrays (runs,) where its settings are."""
     kind = PROFILES[choice.kind]
-    numbers = [choice.settings[item.name] for item in kind.quantities]
+    numbers = [choice.settings[quantity.name] for quantity in kind.quantities]
     lowest, highest = over_runs(lambda *values: kind.bounds(rebuilt(kind.parameters, values)), *numbers)
     return lowest, highest
 

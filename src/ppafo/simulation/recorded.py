@@ -221,11 +221,11 @@ def _is_seen(columns: Floats, values: Floats) -> bool:
     # Samples that lie together in time, but for one, tell no bend from a slope.
     if np.linalg.matrix_rank(columns, rtol=_LEAST_RANK) < columns.shape[1]:
         return False
-    found = np.linalg.lstsq(columns, values)[0]
+    fitted = np.linalg.lstsq(columns, values)[0]
     # A second difference of white noise has the square root of 6 times its standard deviation: 1 + 4 + 1.
     noise = _SPREAD_OF_MEDIAN * float(np.median(np.abs(np.diff(values, n=2)))) / math.sqrt(6.0)
     error = noise * math.sqrt(float(np.linalg.inv(columns.T @ columns)[0, 0]))
-    return bool(abs(found[0]) > _SEEN_SLOPE * error + _ROUNDING * float(np.abs(values).max()))
+    return bool(abs(fitted[0]) > _SEEN_SLOPE * error + _ROUNDING * float(np.abs(values).max()))
 
 
 def usual_interval(time: Floats) -> float:

@@ -64,12 +64,12 @@ class SampledRun:
 
     def result(self) -> BatchResult:
         """States and record so far: of the samples that were taken, and the one that they led to."""
-        clock, found = self._batch.clock, self._block.result()
+        clock, outcome = self._batch.clock, self._block.result()
         steps = min(self.taken * clock.steps_per_sample, clock.step_count)
         kept = samples_in(steps, clock.record_every) if clock.record_every else None
         # The record at the end of a step is taken when the next one begins, but for the last of the run.
         late = 1 if kept is not None and steps < clock.step_count and (kept - 1) * clock.record_every >= steps else 0
-        return BatchResult(found.states, found.record[: None if kept is None else kept - late])
+        return BatchResult(outcome.states, outcome.record[: None if kept is None else kept - late])
 
 
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:

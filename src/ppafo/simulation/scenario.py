@@ -91,7 +91,7 @@ class FreeMotion:
         return held(self, name)
 
     @property
-    def motion_kind(self) -> MotionKind:
+    def motion_kind(self) -> "MotionKind[Scenario]":
         """What it brings to the runs of its scenarios."""
         return MOTIONS["free" if self.leg is None else "leg"]
 
@@ -127,7 +127,7 @@ class PrescribedMotion:
     outside_torque: ClassVar[float] = 0.0
 
     @property
-    def motion_kind(self) -> MotionKind:
+    def motion_kind(self) -> "MotionKind[Scenario]":
         """What it brings to the runs of its scenarios."""
         return MOTIONS[self.kind]
 
@@ -149,7 +149,7 @@ class Motion(Protocol):
     """What moves the ankle: a vane alone, or a leg that wears the device, which a package above this one knows."""
 
     @property
-    def motion_kind(self) -> MotionKind:
+    def motion_kind(self) -> "MotionKind[Scenario]":
         """What it brings to the runs of its scenarios."""
 
     @property

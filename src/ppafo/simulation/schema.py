@@ -42,11 +42,11 @@ def _description(quantity: Quantity) -> str:
 def quantity_fields(quantities: tuple[Quantity, ...], words: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the fields of a section; one without a default has to be given, unless a word stands in for it."""
     fields: dict[str, Any] = {}
-    for item in quantities:
-        kind = number_type(item, words)
-        required = item.default is None and not words and not item.follows
-        text = _description(item)
-        fields[item.name] = (kind, Field(description=text)) if required else optional(kind, text)
+    for quantity in quantities:
+        kind = number_type(quantity, words)
+        required = quantity.default is None and not words and not quantity.follows
+        text = _description(quantity)
+        fields[quantity.name] = (kind, Field(description=text)) if required else optional(kind, text)
     return fields
 
 
@@ -83,7 +83,7 @@ def profile_table(prescribed: Quantity, purpose: str, kind: str = "", further: d
     )
 
 
-def motion_kinds() -> dict[str, MotionKind]:
+def motion_kinds() -> dict[str, MotionKind[Any]]:
     """Return the kinds of motion of a vane alone: all of this package, and loaded ones of others."""
     others = {name: kind for name, kind in MOTIONS.loaded().items() if kind.section is not None}
     return {name: MOTIONS[name] for name in VANE_MOTIONS} | others
@@ -113,7 +113,9 @@ def shank_table() -> Any:
 
 def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
     """Return the section of the controller."""
-    sampling = {item.name: optional(number_type(item), _description(item)) for item in declaration.SAMPLING}
+    sampling = {
+        quantity.name: optional(number_type(quantity), _description(quantity)) for quantity in declaration.SAMPLING
+    }
     return one_of(
         [
             table(

@@ -18,11 +18,12 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Number
+from ppafo.model.plain_function import PlainFunction
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
-from ppafo.simulation.nominal import VALVE, flow_of_area, flow_of_sonic, in_its_form
+from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
 PERIOD_PATH = "controller.period"
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
@@ -47,48 +48,55 @@ class FlowNumbers(NamedTuple):
     orifice_2: Annotated[float, Number("", "discharge coefficient or critical ratio")]
 
 
+_Seconds = Annotated[float, Number("s", "")]
+_Hertz = Annotated[float, Number("Hz", "")]
+_Inertia = Annotated[float, Number("kg m^2", "")]
+_Torque = Annotated[float, Number("N m", "")]
+_Damping = Annotated[float, Number("N m s/rad", "")]
+
+
 class Signals(NamedTuple):
     """Sample period and age of a measurement [s], bandwidth of the pressure sensors [Hz]."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
-    delay: Annotated[float, Number("s", "")]
+    period: _Seconds
+    bandwidth: _Hertz
+    delay: _Seconds
 
 
 class SignalsOfWalk(NamedTuple):
-    """The same of a walk, whose measurements are not old."""
+    """Sample period [s] and bandwidth of the pressure sensors [Hz] of a walk, whose measurements are not old."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
+    period: _Seconds
+    bandwidth: _Hertz
 
 
 class OfJoint(NamedTuple):
     """Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
-    delay: Annotated[float, Number("s", "")]
-    angle_bandwidth: Annotated[float, Number("Hz", "")]
-    inertia: Annotated[float, Number("kg m^2", "")]
-    gravity_torque: Annotated[float, Number("N m", "")]
-    viscous_damping: Annotated[float, Number("N m s/rad", "")]
-    dynamic_torque: Annotated[float, Number("N m", "")]
+    period: _Seconds
+    bandwidth: _Hertz
+    delay: _Seconds
+    angle_bandwidth: _Hertz
+    inertia: _Inertia
+    gravity_torque: _Torque
+    viscous_damping: _Damping
+    dynamic_torque: _Torque
 
 
 class OfLeg(NamedTuple):
-    """The same with the foot of a leg: mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
+    """Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
 
-    period: Annotated[float, Number("s", "")]
-    bandwidth: Annotated[float, Number("Hz", "")]
-    delay: Annotated[float, Number("s", "")]
-    angle_bandwidth: Annotated[float, Number("Hz", "")]
-    inertia: Annotated[float, Number("kg m^2", "")]
-    gravity_torque: Annotated[float, Number("N m", "")]
-    viscous_damping: Annotated[float, Number("N m s/rad", "")]
-    dynamic_torque: Annotated[float, Number("N m", "")]
+    period: _Seconds
+    bandwidth: _Hertz
+    delay: _Seconds
+    angle_bandwidth: _Hertz
+    inertia: _Inertia
+    gravity_torque: _Torque
+    viscous_damping: _Damping
+    dynamic_torque: _Torque
     foot_mass: Annotated[float, Number("kg", "")]
     foot_mass_centre: Annotated[float, Number("m", "")]
-    foot_inertia: Annotated[float, Number("kg m^2", "")]
+    foot_inertia: _Inertia
 
 
 def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
@@ -134,7 +142,7 @@ def time_of_spool(valve: Any, period: float) -> float:
 
 
 def time_of_pair(valve: Any, period: float) -> float:
-    """The same of a pair of on/off valves: a coil waits for its next switching, where that is longer."""
+    """Time [s] from a sample to the flow of a pair of on/off valves: a coil may wait for its next switching, too."""
     delay: float = max(valve.opening_delay, valve.closing_delay)
     wait: float = max(SAMPLES_LATE * period, valve.switching_interval)
     return delay + wait
@@ -203,7 +211,7 @@ def turning_alone(signals: OfJoint) -> tuple[float, float]:
 
 
 def turning_with_foot(signals: OfLeg) -> tuple[float, float]:
-    """The same with a foot on it, about the ankle."""
+    """Inertia [kg m^2] and largest gravity torque [N m] of actuator and foot about the ankle."""
     moment = signals.foot_mass * signals.foot_mass_centre
     inertia = signals.inertia + signals.foot_inertia + moment * signals.foot_mass_centre
     return inertia, signals.gravity_torque + moment * STANDARD_GRAVITY
@@ -322,11 +330,11 @@ class LoopFrames(NamedTuple):
     ``joint`` is what ``joint_of`` needs, {} where it is not known.
     """
 
-    loop: Callable[..., TorqueLoop]
-    torque_loop: Callable[..., TorqueLoop]
+    loop: PlainFunction
+    torque_loop: PlainFunction
     rows: tuple[type, ...]
     sources: tuple[str, ...]
-    joint: dict[str, Callable[..., Any]]
+    joint: dict[str, PlainFunction]
 
 
 def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: bool) -> LoopFrames:
@@ -336,7 +344,7 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
     """
     valve = VALVES[device.valve.kind]
     chambers = chambers_of(device)
-    names = {item.name for item in valve.quantities}
+    names = {quantity.name for quantity in valve.quantities}
     timed = {"follow_time": valve.lag or valve.choose(valve_settings(device.valve)).command_delay}
     is_joint = controlled == ANGLE
     signals = (OfLeg if has_leg else OfJoint) if is_joint else (SignalsOfWalk if walks else Signals)
@@ -350,18 +358,18 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
         **_PER_PRESSURE.get(controlled, {}),
     }
     loop = inner = bind(loop_of, "loop_of_device", components)
-    joint: dict[str, Callable[..., Any]] = {}
+    joint: dict[str, PlainFunction] = {}
     if is_joint:
         parts = {"mean_chambers": chambers.function, "turning": turning_with_foot if has_leg else turning_alone}
         joint = {"joint_of": bind(joint_of, "joint_of_device", parts), "torque_loop_of": inner}
         loop = bind(slow_loop_of, "slow_loop_of_device", joint)
-    orifice = ("sonic_conductance", "critical_ratio") if sonic else ("area", "discharge_coefficient")
     late = (PERIOD_PATH, "sensors.pressure_bandwidth", *(() if walks else ("sensors.delay",)))
     of_joint = ("sensors.angle_bandwidth", *_OF_DEVICE) if is_joint else ()
     sources = (
         *chambers.sources,
         *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
-        *(f"valve.{name}" for name in (*orifice, *(item.name for item in valve.quantities))),
+        *(SONIC_PATHS if sonic else AREA_PATHS)[VALVE],
+        *(f"valve.{quantity.name}" for quantity in valve.quantities),
         *late,
         *of_joint,
         *(LEG_PATHS if is_joint and has_leg else ()),
@@ -378,27 +386,25 @@ def loop_terms(
     ``controlled`` says what the law controls; with a leg the foot of it turns about the joint, too.
     """
     of_area, of_sonic = (_frames(device, walks, controlled, has_leg, sonic) for sonic in (False, True))
-    names = {item.name for item in VALVES[device.valve.kind].quantities}
+    names = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
 
-    def in_form(
-        frames: LoopFrames, frame: Callable[..., float], by: Callable[..., float], settings: tuple[str, ...]
-    ) -> Term:
+    def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> Term:
         # A law of the angle alone has the torque loop inside it.
         own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
         inner = {**frames.joint, "rule_of_joint": by} if frame is gain_of_joint else {"loop_of": own_loop, "rule": by}
         return Term((*frames.sources, *settings), bind(frame, f"{by.__name__}_of_device", inner), frames.rows)
 
-    def term(frame: Callable[..., float], by: Callable[..., float], *settings: str) -> Term:
+    def term(frame: PlainFunction, by: PlainFunction, *settings: str) -> Term:
         return in_its_form(device, VALVE, in_form(of_area, frame, by, settings), in_form(of_sonic, frame, by, settings))
 
-    found = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
+    terms = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
     for name, of_joint in _OF_JOINT.items() if TORQUE not in law.controls else ():
-        found[name] = term(gain_of_joint, of_joint, "controller.error_limit")
+        terms[name] = term(gain_of_joint, of_joint, "controller.error_limit")
     opening = opening_beyond_band if "dead_band" in names else gain_of_loop_and_setting
-    found[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
+    terms[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
     # An integral, and what is learnt, go with the proportional gain, also where that one is given.
-    gain = next((item.name for item in law.quantities if torque_loop.PROPORTIONAL_GAIN in item.follows), "")
+    gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
     path = f"controller.{gain}"
-    found[torque_loop.INTEGRAL_GAIN] = term(gain_of_loop_and_setting, torque_loop.integral_gain, path)
-    found[torque_loop.LEARNING_GAIN] = Term((path,), torque_loop.learning_gain)
-    return found
+    terms[torque_loop.INTEGRAL_GAIN] = term(gain_of_loop_and_setting, torque_loop.integral_gain, path)
+    terms[torque_loop.LEARNING_GAIN] = Term((path,), torque_loop.learning_gain)
+    return terms

@@ -13,7 +13,6 @@ from ppafo.engine.run import Run
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.metrics import evaluate
-from ppafo.metrics.metric import Metric
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import gravity_torque, sliding_friction
@@ -21,11 +20,9 @@ from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
 from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.scenario import Scenario, vane_motion
-
-Measured = tuple[Recording, Mapping[str, Metric], str]
-"""Recording and metrics, and how a completed run ended, in words."""
 
 
 def measured_free(scenario: Scenario, run: Run, times: Floats, rows: Mapping[str, Floats]) -> Measured:
@@ -103,26 +100,26 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
     Line pressures and the gas through the bottle's regulator where there are lines; true masses, temperatures and
     energies where the gas has an energy balance.
     """
-    found: dict[str, tuple[Floats, str]] = {}
+    channels: dict[str, tuple[Floats, str]] = {}
     if run.lines is not None:
         lines = rebuilt(LineState, [rows[path] for path in leaf_paths(LineState, "line_state")])
         line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
-        found |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
-        found["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
+        channels |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
+        channels["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
     if run.program.has_true_masses:
-        found |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
+        channels |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
     if not run.program.is_thermal:
-        return found
+        return channels
     for chamber in (1, 2):
         # The state has the mass that would have this pressure at the temperature of the room.
         warmth = rows[f"state.mass_{chamber}"] / rows[f"masses.mass_{chamber}"]
-        found[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
+        channels[f"temperature_{chamber}"] = (gas.temperature * warmth, "K")
     per_content = energy_per_content(run.plant.gas_product, gas.heat_capacity_ratio)
-    found["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")
+    channels["gas_energy"] = (per_content * (rows["state.mass_1"] + rows["state.mass_2"]), "J")
     for name, row in (("supplied_enthalpy", "supplied"), ("vented_enthalpy", "vented"), ("wall_heat", "heat")):
-        found[name] = (per_content * rows[f"masses.{row}_content"], "J")
-    found["gas_work"] = (rows["masses.gas_work"], "J")
-    return found
+        channels[name] = (per_content * rows[f"masses.{row}_content"], "J")
+    channels["gas_work"] = (rows["masses.gas_work"], "J")
+    return channels
 
 
 def friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Floats | float:

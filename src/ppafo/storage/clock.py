@@ -72,13 +72,13 @@ def _stamp(cell: str, form: Form | None, row: str) -> _Stamp:
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
         text = f"{compact['date']} {compact['hour']}:{compact['minute']}:{compact['second']}{compact['rest']}"
-    found = _TIME.search(text)
-    if found is None:
+    match = _TIME.search(text)
+    if match is None:
         raise DataError(f"{row}: {text[:_LONGEST_SHOWN]!r} is no time of day such as '08:00:10,5'")
-    first, second, third = int(found["first"]), int(found["second"]), found["third"]
+    first, second, third = int(match["first"]), int(match["second"]), match["third"]
     if third is None:
         # 00:10.5 has a fraction, which minutes have not.
-        is_minutes = form == "min:s" or (form is None and found["fraction"] is not None)
+        is_minutes = form == "min:s" or (form is None and match["fraction"] is not None)
         if form is None and not is_minutes:
             raise DataError(
                 f"{row}: {text[:_LONGEST_SHOWN]!r} may be hours and minutes or minutes and seconds; give "
@@ -87,15 +87,15 @@ def _stamp(cell: str, form: Form | None, row: str) -> _Stamp:
         hour, minute, whole = (0, first, second) if is_minutes else (first, second, 0)
     else:
         hour, minute, whole = first, second, int(third)
-    half = (found["half"] or "").lower()
+    half = (match["half"] or "").lower()
     is_whole_hour = 1 <= hour <= 12 if half else True
     if (third is not None and minute > 59) or whole > 60 or not is_whole_hour:
         raise DataError(f"{row}: {text[:_LONGEST_SHOWN]!r} is no time of day")
     if half:
         hour = hour % 12 + (12 if half == "p" else 0)
-    fraction = float(f"0.{found['fraction']}") if found["fraction"] else 0.0
-    beside = f"{text[: found.start()]} {text[found.end() :]}".strip(" T,;")
-    return _Stamp(3600.0 * hour + 60.0 * minute + whole + fraction, found["zone"] or "", beside)
+    fraction = float(f"0.{match['fraction']}") if match["fraction"] else 0.0
+    beside = f"{text[: match.start()]} {text[match.end() :]}".strip(" T,;")
+    return _Stamp(3600.0 * hour + 60.0 * minute + whole + fraction, match["zone"] or "", beside)
 
 
 def _offset(zone: str) -> float:
@@ -147,7 +147,9 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
     else:
         parts = [part for part in re.split(r"[\s,./-]+", text) if part]
         months = [_MONTH[part[:3].lower()] for part in parts if part[:3].lower() in _MONTH]
-        numbers = sorted((int(part) for part in parts if part.isascii() and part.isdigit()), key=lambda one: one > 31)
+        numbers = sorted(
+            (int(part) for part in parts if part.isascii() and part.isdigit()), key=lambda number: number > 31
+        )
         if len(months) != 1 or len(numbers) != 2:
             return None
         month, (day, year) = months[0], numbers

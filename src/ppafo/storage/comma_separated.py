@@ -110,8 +110,8 @@ def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
     from ppafo.units import check_unit, to_si
 
     if column.unit != column.si_unit:
-        given, wanted = (_SPELT.get(unit, unit) for unit in (column.unit, column.si_unit))
-        return np.array([to_si(value, given, wanted, atmosphere) for value in values.tolist()])
+        known, wanted = (_SPELT.get(unit, unit) for unit in (column.unit, column.si_unit))
+        return np.array([to_si(value, known, wanted, atmosphere) for value in values.tolist()])
     if column.name not in CHANNELS:
         check_unit(_SPELT.get(column.unit, column.unit))
     return values

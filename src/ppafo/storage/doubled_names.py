@@ -17,23 +17,23 @@ def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[s
     A description is taken where all of that name have one, and nothing else is called so.
     """
     counts = Counter(names)
-    twins = {name: [place for place, other in enumerate(names) if other == name] for name in counts if counts[name] > 1}
+    twins = {name: [index for index, other in enumerate(names) if other == name] for name in counts if counts[name] > 1}
     apart = list(names)
     for name, places in twins.items():
-        said = [descriptions[place].strip() if place < len(descriptions) else "" for place in places]
+        said = [descriptions[index].strip() if index < len(descriptions) else "" for index in places]
         are_names = all(said) and len(set(said)) == len(said) and not set(said) & {*apart, *counts}
-        for number, place in enumerate(places):
-            apart[place] = said[number] if are_names else f"{name}#{number + 1}"
+        for number, index in enumerate(places):
+            apart[index] = said[number] if are_names else f"{name}#{number + 1}"
     return apart
 
 
 def doubled(names: Sequence[str], apart: Sequence[str]) -> dict[str, list[str]]:
     """Return by each doubled name those that stand for it."""
-    found: dict[str, list[str]] = {}
+    twins: dict[str, list[str]] = {}
     for name, own in zip(names, apart, strict=True):
         if name != own:
-            found.setdefault(name, []).append(own)
-    return found
+            twins.setdefault(name, []).append(own)
+    return twins
 
 
 def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[str]]) -> dict[str, Floats]:

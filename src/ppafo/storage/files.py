@@ -145,7 +145,7 @@ def _real(folder: Path) -> Path:
 @contextlib.contextmanager
 def _make_folder(folder: Path) -> Iterator[None]:
     """Make a folder and those above it; at the end the new ones that hold nothing go away again."""
-    new = [place for place in (folder, *folder.parents) if not place.exists()]
+    new = [ancestor for ancestor in (folder, *folder.parents) if not ancestor.exists()]
     nearest = folder if folder.exists() else new[-1].parent
     if not nearest.is_dir():
         raise NotADirectoryError(None, f"there is a file '{nearest}' in the place of a folder")
@@ -153,9 +153,9 @@ def _make_folder(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         yield
     finally:
-        for place in new:
+        for ancestor in new:
             with contextlib.suppress(OSError):
-                place.rmdir()
+                ancestor.rmdir()
 
 
 def _check_no_folder(folder: Path, names: Iterable[str]) -> None:

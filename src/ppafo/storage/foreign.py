@@ -211,8 +211,8 @@ def read_foreign(
             table = _of_matlab(content, columns, map_name)
         with _in_map(map_name):
             channels = {
-                name: _channel(name, item, table.numbers.get(name, np.empty(0)), table.size, (atmosphere, gas))
-                for name, item in columns.channels.items()
+                name: _channel(name, mapped, table.numbers.get(name, np.empty(0)), table.size, (atmosphere, gas))
+                for name, mapped in columns.channels.items()
                 if name != TIME
             }
             time = _time(columns.channels[TIME], table, atmosphere)
@@ -235,35 +235,32 @@ def _check_keys(columns: ColumnMap) -> None:
     """Refuse a map without a time, a channel that comes from nowhere or from two places, and keys that mean nothing."""
     if TIME not in columns.channels:
         raise DataError(f'has no channels.{TIME}; give a column, or {TIME} = {{ rate = "100 Hz" }}')
-    for name, item in columns.channels.items():
-        sources = [key for key in ("column", "constant", "rate") if getattr(item, key) is not None]
+    for name, mapped in columns.channels.items():
+        sources = [key for key in ("column", "constant", "rate") if getattr(mapped, key) is not None]
         may = "a column, constant or rate" if name == TIME else "a column or constant"
         for key in () if name == TIME else _OF_TIME:
-            if getattr(item, key) is not None:
+            if getattr(mapped, key) is not None:
                 raise DataError(f"channels.{name}.{key} is a key of channels.{TIME} alone")
         if len(sources) != 1:
-            given = (
-                f"{'both' if len(sources) == 2 else 'all of'} a {' and a '.join(sources)}"
-                if sources
-                else f"no {may[2:]}"
-            )
-            raise DataError(f"channels.{name} gives {given}; give one of them")
+            several = "both" if len(sources) == 2 else "all of"
+            keys = f"{several} a {' and a '.join(sources)}" if sources else f"no {may[2:]}"
+            raise DataError(f"channels.{name} gives {keys}; give one of them")
 
 
-def _time(item: MappedChannel, table: _Table, atmosphere: float) -> Floats:
+def _time(mapped: MappedChannel, table: _Table, atmosphere: float) -> Floats:
     """Return the time [s] of the rows: by their number and a rate, from a clock, or from numbers with a unit."""
     from ppafo.units import parse_quantity
 
-    if item.rate is not None:
-        with refused_as(DataError, f"channels.{TIME}.rate = {item.rate!r}", UnitError):
-            rate = _rate(item.rate, parse_quantity)
+    if mapped.rate is not None:
+        with refused_as(DataError, f"channels.{TIME}.rate = {mapped.rate!r}", UnitError):
+            rate = _rate(mapped.rate, parse_quantity)
         return np.arange(table.size) / rate
     if table.clock is None:
         return counted_on(
-            _channel(TIME, item, table.numbers.get(TIME, np.empty(0)), table.size, (atmosphere, "")).values
+            _channel(TIME, mapped, table.numbers.get(TIME, np.empty(0)), table.size, (atmosphere, "")).values
         )
     rows = [f"{table.noun} {row}, channels.{TIME}" for row in table.rows]
-    time = clock_seconds(table.clock, rows, table.dates, item.date_order, item.clock)
+    time = clock_seconds(table.clock, rows, table.dates, mapped.date_order, mapped.clock)
     # Loggers that write whole seconds may write many rows in each.
     if table.size > 2 and (np.diff(time) == 0.0).any() and time[-1] > 0.0 and (np.diff(time) >= 0.0).all():
         rate = float(f"{(table.size - 1) / time[-1]:.3g}")
@@ -287,10 +284,10 @@ def _of_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> _Table:
     numbers: dict[str, Floats] = {}
     clock = dates = None
     with _in_map(map_name):
-        for name, item in columns.channels.items():
-            if item.column is None:
+        for name, mapped in columns.channels.items():
+            if mapped.column is None:
                 continue
-            column = _variable(f"channels.{name}.column", item.column, file)
+            column = _variable(f"channels.{name}.column", mapped.column, file)
             if name == TIME and column in file.texts:
                 clock = file.texts[column]
             else:
@@ -347,31 +344,31 @@ def _of_text(content: bytes, columns: ColumnMap, map_name: str) -> _Table:
     with _in_map(map_name):
         names, first, rows = _rows(lines, columns)
         places = {
-            name: place
-            for name, item in columns.channels.items()
-            if (place := _place(f"channels.{name}.column", item.column, names, first, lines)) >= 0
+            name: index
+            for name, mapped in columns.channels.items()
+            if (index := _place(f"channels.{name}.column", mapped.column, names, first, lines)) >= 0
         }
         date_place = _place(f"channels.{TIME}.date", time.date, names, first, lines)
-    titles = {name: names[place] if names else str(place + 1) for name, place in places.items()}
+    titles = {name: names[index] if names else str(index + 1) for name, index in places.items()}
     # A first row that is too short is refused with the others, below.
     begins = first[places[TIME]] if TIME in places and places[TIME] < len(first) else ""
     clock: list[str] | None = [] if is_clock(begins) else None
     dates: list[str] | None = [] if clock is not None and date_place >= 0 else None
     last = max((*places.values(), date_place), default=0)
     # Row by row, so that no cell of a large file is kept as a text.
-    numbers, found = {name: array("d") for name in places if name != TIME or clock is None}, array("q")
+    numbers, stamps = {name: array("d") for name in places if name != TIME or clock is None}, array("q")
     for line, row in rows:
         _check_width(row, len(names), len(first), last, (line, columns))
-        found.append(line)
-        for name, place in places.items():
+        stamps.append(line)
+        for name, index in places.items():
             if name == TIME and clock is not None:
-                clock.append(row[place])
+                clock.append(row[index])
                 continue
-            item = columns.channels[name]
-            known = item.words if item.words is not None else _WORDS if name == _DIRECTION else {}
-            value = _of_word(row[place], known)
+            mapped = columns.channels[name]
+            known = mapped.words if mapped.words is not None else _WORDS if name == _DIRECTION else {}
+            value = _of_word(row[index], known)
             numbers[name].append(
-                _number(row[place], item.thousands, columns.decimal, (titles[name], line, name, known))
+                _number(row[index], mapped.thousands, columns.decimal, (titles[name], line, name, known))
                 if value is None
                 else value
             )
@@ -379,9 +376,14 @@ def _of_text(content: bytes, columns: ColumnMap, map_name: str) -> _Table:
             dates.append(row[date_place])
     kind = kind_of_comments(line for line in lines if line.startswith(_COMMENT))
     return _Table(
-        size=len(found), numbers={name: np.array(numbers[name]) for name in numbers}, clock=clock, dates=dates,
-        rows=found, noun="line", kind=kind,
-    )  # fmt: skip
+        size=len(stamps),
+        numbers={name: np.array(column) for name, column in numbers.items()},
+        clock=clock,
+        dates=dates,
+        rows=stamps,
+        noun="line",
+        kind=kind,
+    )
 
 
 def _of_word(cell: str, words: Mapping[str, float]) -> float | None:
@@ -408,7 +410,7 @@ def _stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
     """Return the lines of a serial monitor with the time before each as a first column, called ``timestamp``."""
     mark = _DELIMITERS.get(columns.delimiter, " ")
     # A time that has a comma must not be two cells.
-    stamped = [_SERIAL_MONITOR.sub(lambda found: f"{found[1].replace(',', '.')}{mark}", line) for line in lines]
+    stamped = [_SERIAL_MONITOR.sub(lambda match: f"{match[1].replace(',', '.')}{mark}", line) for line in lines]
     if not columns.header:
         return stamped
     for number in range(columns.skip_lines, len(stamped)):
@@ -457,7 +459,10 @@ def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) ->
     parts = (
         (name, [part.strip() for cell in cells for part in cell.split(mark)]) for name, mark in _DELIMITERS.items()
     )
-    return next((f'; give delimiter = "{name}"' for name, found in parts if found != cells and is_there(found)), "")
+    return next(
+        (f'; give delimiter = "{name}"' for name, other in parts if other != cells and is_there(other)),
+        "",
+    )
 
 
 def _place(key: str, column: int | str | None, names: list[str], first: list[str], lines: list[str]) -> int:
@@ -467,14 +472,14 @@ def _place(key: str, column: int | str | None, names: list[str], first: list[str
     if isinstance(column, int):
         wanted, line = column, names or first
         if wanted > len(line):
-            remedy = _other_delimiter(line, lambda found: len(found) >= wanted)
+            remedy = _other_delimiter(line, lambda cells: len(cells) >= wanted)
             raise DataError(f"{key} = {wanted}: the file has {len(line)} columns{remedy}")
         return wanted - 1
     if not names:
         raise DataError(f"{key} = {column!r} names a column, but the file has no header; give its number")
-    places = [place for place, known in enumerate(names, start=1) if known == column]
+    places = [number for number, known in enumerate(names, start=1) if known == column]
     if not places:
-        remedy = _other_delimiter(names, lambda found: column in found) or _other_line(lines, names, column)
+        remedy = _other_delimiter(names, lambda cells: column in cells) or _other_line(lines, names, column)
         hint = "" if remedy else nearest_name(column, names)
         raise DataError(f"{key} = {column!r}: there is no such column{hint}; the file has {_shown(names)}{remedy}")
     if len(places) > 1:
@@ -522,7 +527,7 @@ def _number(cell: str, thousands: str | None, decimal: str, place: tuple[str, in
     return value
 
 
-def _channel(name: str, item: MappedChannel, numbers: Floats, count: int, around: tuple[float, str]) -> Channel:
+def _channel(name: str, mapped: MappedChannel, numbers: Floats, count: int, around: tuple[float, str]) -> Channel:
     """Return a channel in SI, a constant one too; the quantity that it is multiplied by brings its own unit.
 
     ``around`` is the atmosphere [Pa absolute], and the gas of a volume flow that does not say it.
@@ -530,32 +535,32 @@ def _channel(name: str, item: MappedChannel, numbers: Floats, count: int, around
     from ppafo.units import split_number
 
     atmosphere, gas = around
-    if item.constant is not None:
-        with refused_as(DataError, f"channels.{name}.constant = {item.constant!r}", UnitError):
-            value, unit = split_number(item.constant)
-            column = Column(name, _flow_unit(name, unit, item, gas) or PLAIN_NUMBER)
-            return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, item.between)
-    values, unit, key = item.sign * (item.factor * numbers + item.offset), item.unit, f"unit = {item.unit!r}"
-    if item.times is not None:
-        with refused_as(DataError, f"channels.{name}.times = {item.times!r}", UnitError):
-            multiple, times_unit = split_number(item.times)
+    if mapped.constant is not None:
+        with refused_as(DataError, f"channels.{name}.constant = {mapped.constant!r}", UnitError):
+            value, unit = split_number(mapped.constant)
+            column = Column(name, _flow_unit(name, unit, mapped, gas) or PLAIN_NUMBER)
+            return Channel(in_si(column, np.full(count, value), atmosphere), column.si_unit, mapped.between)
+    values, unit, key = mapped.sign * (mapped.factor * numbers + mapped.offset), mapped.unit, f"unit = {mapped.unit!r}"
+    if mapped.times is not None:
+        with refused_as(DataError, f"channels.{name}.times = {mapped.times!r}", UnitError):
+            multiple, times_unit = split_number(mapped.times)
         values, unit = values * multiple, f"{unit} {times_unit}".removeprefix(f"{PLAIN_NUMBER} ").strip()
-        key += f" with times = {item.times!r}"
+        key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
-        column = Column(name, _flow_unit(name, unit, item, gas))
-        return Channel(in_si(column, values, atmosphere), column.si_unit, item.between)
+        column = Column(name, _flow_unit(name, unit, mapped, gas))
+        return Channel(in_si(column, values, atmosphere), column.si_unit, mapped.between)
 
 
-def _flow_unit(name: str, unit: str, item: MappedChannel, gas: str) -> str:
+def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel, with reference condition and gas where it is a volume flow for a mass flow."""
     from ppafo.units import is_volume_flow, with_condition
 
     is_flow = Column(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
-        if item.at is not None or item.gas is not None:
+        if mapped.at is not None or mapped.gas is not None:
             raise UnitError("at and gas belong to a volume flow, such as 'L/min', in the place of a mass flow")
         return unit
-    return with_condition(unit, item.at, item.gas or gas) if item.at else unit
+    return with_condition(unit, mapped.at, mapped.gas or gas) if mapped.at else unit
 
 
 _MASS_FLOW = "kg/s"
@@ -567,7 +572,7 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
 
     with refused_as(DataError, f"direction.of = {wanted.of!r}", DataError):
         unit = recording.unit(wanted.of)
-    rate_unit = f"{'1' if unit == PLAIN_NUMBER else unit.removesuffix('_d')}/s"
+    rate_unit = "1/s" if unit == PLAIN_NUMBER else f"{unit.removesuffix('_d')}/s"
     with refused_as(DataError, f"direction.threshold = {wanted.threshold!r}", UnitError):
         threshold = parse_quantity(wanted.threshold, rate_unit)
     with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):
@@ -591,5 +596,5 @@ def _with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
         raise DataError(f"direction.threshold: '{wanted.of}' never moves faster than {wanted.threshold}")
     sweeps = np.zeros(direction.size)
     sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(np.diff(direction[moving]) != 0.0)))
-    found = recording.with_channel("direction", direction, PLAIN_NUMBER)
-    return found if "repetition" in recording else found.with_channel("repetition", sweeps, PLAIN_NUMBER)
+    directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
+    return directed if "repetition" in recording else directed.with_channel("repetition", sweeps, PLAIN_NUMBER)

@@ -50,10 +50,8 @@ class MatlabFile:
 
     def said_of_objects(self) -> str:
         """Return what to do with the objects of the file, as the end of a message; nothing where there are none."""
-        return "".join(
-            f"; {name}{f' ({kind})' if kind else ''} is an object that only MATLAB reads, {_plainly(name, kind)}"
-            for name, kind in self.objects
-        )
+        named = ((f"{name} ({kind})" if kind else name, _plainly(name, kind)) for name, kind in self.objects)
+        return "".join(f"; {called} is an object that only MATLAB reads, {remedy}" for called, remedy in named)
 
 
 _OF_TABLE = "s = table2struct(T, 'ToScalar', true); save('plain.mat', '-struct', 's')"
@@ -75,7 +73,7 @@ def _plainly(name: str, kind: str) -> str:
 
 
 @dataclass(slots=True)
-class _Found:
+class _Contents:
     columns: dict[str, Floats] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
     words: list[str] = field(default_factory=list)
@@ -93,18 +91,23 @@ def read_matlab(path: str | Path) -> MatlabFile:
 def open_matlab(path: str | Path) -> MatlabFile:
     """Return what ``read_matlab`` does; damage can end the process."""
     content = read_bytes(path)
-    found = _Found()
+    contents = _Contents()
     try:
         if content[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5:
-            _read_hdf5(path, found)
+            _read_hdf5(path, contents)
         else:
-            _read_older(path, found)
+            _read_older(path, contents)
     except _OF_DAMAGE as error:
         raise DataError(f"{path}: cannot be read as a .mat file: {one_line(error)}") from error
-    if not found.columns and not found.texts:
-        file = MatlabFile({}, {}, objects=tuple(found.objects))
+    if not contents.columns and not contents.texts:
+        file = MatlabFile({}, {}, objects=tuple(contents.objects))
         raise DataError(f"{path}: has no variable of numbers{file.said_of_objects()}")
-    return MatlabFile(found.columns, found.texts, tuple(found.words), tuple(found.objects))
+    return MatlabFile(
+        contents.columns,
+        contents.texts,
+        tuple(contents.words),
+        tuple(contents.objects),
+    )
 
 
 class _Object(NamedTuple):
@@ -117,7 +120,7 @@ Tree = dict[str, Any] | list[Any] | NDArray[Any] | str | _Object
 """A variable as plain data: a structure, a cell array or an array of structures, numbers, a text, or an object."""
 
 
-def _read_older(path: str | Path, found: _Found) -> None:
+def _read_older(path: str | Path, contents: _Contents) -> None:
     import zlib
 
     from scipy.io import loadmat
@@ -131,9 +134,9 @@ def _read_older(path: str | Path, found: _Found) -> None:
         # What MATLAB keeps for its objects has no name of its own.
         if name in ("__function_workspace__", "None"):
             named = _named_object(value)
-            found.objects += [named] if named[1] or not found.objects else []
+            contents.objects += [named] if named[1] or not contents.objects else []
         elif not name.startswith("__"):
-            _add(name, _tree_of(value), 0, found)
+            _add(name, _tree_of(value), 0, contents)
 
 
 def _named_object(value: Any) -> tuple[str, str]:
@@ -141,7 +144,7 @@ def _named_object(value: Any) -> tuple[str, str]:
     names = getattr(getattr(value, "dtype", None), "names", None) or ()
     if not {"s0", "s2"} <= set(names) or value.size != 1:
         return "a variable", ""
-    said = [item.decode("ascii", "replace") if isinstance(item, bytes) else str(item) for item in value.ravel()[0]]
+    said = [word.decode("ascii", "replace") if isinstance(word, bytes) else str(word) for word in value.ravel()[0]]
     return one_line(said[0]), one_line(said[2])
 
 
@@ -156,21 +159,21 @@ def _tree_of(value: Any) -> Tree:
     if not isinstance(value, np.ndarray) or value.dtype.names:
         return _Object()
     if value.dtype == object:
-        items = [_tree_of(item) for item in value.ravel(order="F")[:_MOST_ELEMENTS]]
+        items = [_tree_of(element) for element in value.ravel(order="F")[:_MOST_ELEMENTS]]
         return items[0] if len(items) == 1 and isinstance(items[0], dict) else items
     if value.dtype.kind in "US":
-        texts = [str(item).strip() for item in value.ravel()]
+        texts = [str(text).strip() for text in value.ravel()]
         return texts[0] if len(texts) == 1 else list(texts)
     return value
 
 
-def _read_hdf5(path: str | Path, found: _Found) -> None:
+def _read_hdf5(path: str | Path, contents: _Contents) -> None:
     import h5py
 
     with h5py.File(path, "r") as file:
-        for name, item in _own_items(file):
+        for name, node in _own_items(file):
             if not name.startswith("#"):
-                _add(name, _tree_of_hdf5(item, file, 0), 0, found)
+                _add(name, _tree_of_hdf5(node, file, 0), 0, contents)
 
 
 def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
@@ -180,74 +183,74 @@ def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
     for name in group:
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             raise ValueError(f"'{one_line(name)}' is a link; a file must contain its numbers itself")
-        item = group[name]
-        if isinstance(item, h5py.Dataset) and (item.is_virtual or item.external):
+        node = group[name]
+        if isinstance(node, h5py.Dataset) and (node.is_virtual or node.external):
             raise ValueError(f"the numbers of '{one_line(name)}' are in another file")
-        yield name, item
+        yield name, node
 
 
-def _tree_of_hdf5(item: Any, file: Any, depth: int) -> Tree:
+def _tree_of_hdf5(node: Any, file: Any, depth: int) -> Tree:
     """Return a variable of h5py as plain data; arrays lie the other way round than in MATLAB."""
     import h5py
 
-    stated = item.attrs.get("MATLAB_class", b"")
+    stated = node.attrs.get("MATLAB_class", b"")
     kind = stated.decode("ascii", "replace") if isinstance(stated, bytes) else str(stated)
-    if item.attrs.get("MATLAB_empty", 0) or depth > _DEEPEST:
+    if node.attrs.get("MATLAB_empty", 0) or depth > _DEEPEST:
         return []
-    if item.attrs.get("MATLAB_object_decode", 0):
+    if node.attrs.get("MATLAB_object_decode", 0):
         return _Object(kind)
-    if isinstance(item, h5py.Group):
-        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in _own_items(item)}
+    if isinstance(node, h5py.Group):
+        fields = {name: _tree_of_hdf5(field, file, depth + 1) for name, field in _own_items(node)}
         # Of an array of structures each field has the values of all.
         is_array = fields and all(
             isinstance(field, h5py.Dataset) and field.dtype == h5py.ref_dtype and not field.attrs.get("MATLAB_class")
-            for field in item.values()
+            for field in node.values()
         )
         if is_array:
             lists = {name: field for name, field in fields.items() if isinstance(field, list)}
             size = min(map(len, lists.values()), default=0)
-            return [{name: field[place] for name, field in lists.items()} for place in range(size)]
+            return [{name: field[index] for name, field in lists.items()} for index in range(size)]
         return fields
-    if item.dtype == h5py.ref_dtype:
-        references = item[()].ravel()[:_MOST_ELEMENTS]
+    if node.dtype == h5py.ref_dtype:
+        references = node[()].ravel()[:_MOST_ELEMENTS]
         return [_tree_of_hdf5(file[reference], file, depth + 1) for reference in references if reference]
-    array = np.asarray(item[()]).T
+    array = np.asarray(node[()]).T
     return "".join(map(chr, array.ravel().tolist())).strip() if kind == "char" else array
 
 
-def _add(name: str, tree: Tree, depth: int, found: _Found) -> None:
+def _add(name: str, tree: Tree, depth: int, contents: _Contents) -> None:
     """Add what is below a name to what was found."""
     if depth > _DEEPEST:
         return
     if isinstance(tree, dict):
-        for key, item in tree.items():
-            _add(f"{name}.{key}", item, depth + 1, found)
-        _add_labelled(name, found)
+        for key, inner in tree.items():
+            _add(f"{name}.{key}", inner, depth + 1, contents)
+        _add_labelled(name, contents)
     elif isinstance(tree, list):
-        if tree and all(isinstance(item, str) for item in tree):
-            found.texts[name] = tree
-        for number, item in enumerate(tree, start=1):
-            if isinstance(item, dict):
-                _add(f"{name}({number})", item, depth + 1, found)
-        found.words += [item for item in tree if isinstance(item, str)]
+        if tree and all(isinstance(text, str) for text in tree):
+            contents.texts[name] = tree
+        for number, inner in enumerate(tree, start=1):
+            if isinstance(inner, dict):
+                _add(f"{name}({number})", inner, depth + 1, contents)
+        contents.words += [text for text in tree if isinstance(text, str)]
     elif isinstance(tree, str):
-        found.texts[name] = [tree]
-        found.words.append(tree)
+        contents.texts[name] = [tree]
+        contents.words.append(tree)
     elif isinstance(tree, _Object):
-        found.objects.append((name, tree.kind))
+        contents.objects.append((name, tree.kind))
     else:
-        _add_numbers(name, tree, found)
+        _add_numbers(name, tree, contents)
 
 
-def _add_numbers(name: str, array: NDArray[Any], found: _Found) -> None:
+def _add_numbers(name: str, array: NDArray[Any], contents: _Contents) -> None:
     """Add a vector by its name, and of a matrix every column and every row, as far as there are not too many."""
     if array.dtype.kind not in "iufb" or array.size == 0:
         return
     numbers = np.squeeze(np.asarray(array, dtype=np.float64))
     if numbers.ndim <= 1:
-        found.columns[name] = np.atleast_1d(numbers)
+        contents.columns[name] = np.atleast_1d(numbers)
     elif numbers.ndim == 2:
-        found.columns.update(_lines_of(name, numbers))
+        contents.columns.update(_lines_of(name, numbers))
 
 
 def _lines_of(name: str, matrix: Floats) -> Iterator[tuple[str, Floats]]:
@@ -258,10 +261,10 @@ def _lines_of(name: str, matrix: Floats) -> Iterator[tuple[str, Floats]]:
         yield from ((f"{name}({number + 1},:)", matrix[number]) for number in range(rows))
 
 
-def _add_labelled(name: str, found: _Found) -> None:
+def _add_labelled(name: str, contents: _Contents) -> None:
     """Add the columns of ``data`` by their labels, where a structure has as many of them."""
-    labels = next((found.texts[f"{name}.{key}"] for key in _LABELS if f"{name}.{key}" in found.texts), [])
+    labels = next((contents.texts[f"{name}.{key}"] for key in _LABELS if f"{name}.{key}" in contents.texts), [])
     for number, label in enumerate(labels, start=1):
-        column = found.columns.get(f"{name}.data(:,{number})")
-        if column is not None and f"{name}.data(:,{len(labels) + 1})" not in found.columns and label:
-            found.columns.setdefault(label, column)
+        column = contents.columns.get(f"{name}.data(:,{number})")
+        if column is not None and f"{name}.data(:,{len(labels) + 1})" not in contents.columns and label:
+            contents.columns.setdefault(label, column)

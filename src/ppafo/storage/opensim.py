@@ -298,8 +298,8 @@ def read_trc(path: str | Path) -> MarkerTable:
                 raise DataError(f"line {number} has {len(cells)} values for {wanted} columns")
             # Cells that are not there belong to markers that were not seen.
             cells = [*cells, *[""] * (wanted - len(cells))][:wanted]
-            place = zip(cells[2:], labels, strict=True)
-            rows.append([_number(cells[1], number, TIME), *(_number(one, number, of, _UNSEEN) for one, of in place)])
+            labelled = zip(cells[2:], labels, strict=True)
+            rows.append([_number(cells[1], number, TIME), *(_number(one, number, of, _UNSEEN) for one, of in labelled)])
         if not rows:
             raise DataError("has no rows")
         values = np.array(rows)
@@ -307,7 +307,7 @@ def read_trc(path: str | Path) -> MarkerTable:
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     twins = doubled(written, names)
-    named = {name: values[:, 1 + 3 * place : 4 + 3 * place].T for place, name in enumerate(names)}
+    named = {name: values[:, 1 + 3 * index : 4 + 3 * index].T for index, name in enumerate(names)}
     markers = without_copies(named, twins)
     return MarkerTable(values[:, 0], markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
 

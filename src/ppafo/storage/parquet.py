@@ -33,7 +33,8 @@ def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -
     import pyarrow as pa
 
     arrays = [
-        pa.array(item.values) if isinstance(item.values, np.ndarray) else item.values for item in columns.values()
+        pa.array(channel.values) if isinstance(channel.values, np.ndarray) else channel.values
+        for channel in columns.values()
     ]
     fields = [
         pa.field(name, array.type, metadata={"unit": column.unit, "summary": column.summary})

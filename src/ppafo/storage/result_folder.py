@@ -207,7 +207,7 @@ def write_result(
     folder: str | Path, recording: Recording, document: Mapping[str, Any], attachments: Mapping[str, bytes]
 ) -> Path:
     """Write a result folder with ``document`` in ``run.json`` and attachments by file name; returns the folder."""
-    place = Path(folder)
+    folder_path = Path(folder)
     netcdf = netcdf_bytes(recording, document.get("scenario"))
     contents = {NETCDF_FILE: netcdf, CSV_FILE: csv_bytes(recording), **attachments}
     hashes = _hashes(contents)
@@ -225,8 +225,8 @@ def write_result(
         },
         **document,
     }
-    write_owned_folder(place, {**contents, RUN_FILE: f"{json_text(described)}\n".encode()}, _RESULT)
-    return place
+    write_owned_folder(folder_path, {**contents, RUN_FILE: f"{json_text(described)}\n".encode()}, _RESULT)
+    return folder_path
 
 
 def check_result_folder(folder: str | Path) -> None:
@@ -243,16 +243,16 @@ def read_result(folder: str | Path) -> StoredResult:
     >>> ppafo.read_result(folder).document["status"]
     {'kind': 'completed', 'time': None, 'message': 'completed'}
     """
-    place = Path(folder)
-    if not place.is_dir():
+    folder_path = Path(folder)
+    if not folder_path.is_dir():
         raise DataError(f"{folder}: is not a folder")
-    document = read_document(place)
-    if sha256(read_bytes(place / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
+    document = read_document(folder_path)
+    if sha256(read_bytes(folder_path / NETCDF_FILE)).hexdigest() != document["recording"].get("sha256"):
         # Refused before it is opened: the HDF5 library can hang on a damaged one.
         raise DataError(
-            f"{place / NETCDF_FILE}: is not the file that was written with {RUN_FILE}; run the scenario again"
+            f"{folder_path / NETCDF_FILE}: is not the file that was written with {RUN_FILE}; run the scenario again"
         )
-    return StoredResult(place, read_netcdf(place / NETCDF_FILE), document)
+    return StoredResult(folder_path, read_netcdf(folder_path / NETCDF_FILE), document)
 
 
 def read_document(folder: str | Path) -> dict[str, Any]:
@@ -290,31 +290,31 @@ def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHE
     >>> ppafo.read_recording(folder).names[:3]
     ('angle', 'angular_velocity', 'pressure_1')
     """
-    place = Path(path)
-    if place.is_dir() and (place / RUN_FILE).exists():
-        return read_result(place).recording
-    if place.is_dir():
-        if not (place / WALK_RECORDING).is_file():
+    file = Path(path)
+    if file.is_dir() and (file / RUN_FILE).exists():
+        return read_result(file).recording
+    if file.is_dir():
+        if not (file / WALK_RECORDING).is_file():
             raise DataError(
-                f"{place}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})"
+                f"{file}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})"
             )
-        place /= WALK_RECORDING
-    if place.suffix == ".nc":
+        file /= WALK_RECORDING
+    if file.suffix == ".nc":
         # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
-        check_can_be_read(place, "ppafo.storage.netcdf", "read_netcdf", "h5py")
-        return read_netcdf(place)
-    if place.suffix.lower() == ".mat":
+        check_can_be_read(file, "ppafo.storage.netcdf", "read_netcdf", "h5py")
+        return read_netcdf(file)
+    if file.suffix.lower() == ".mat":
         raise DataError(
             f"{path}: is a .mat file, whose variables have no units: name them in a column map, "
             "--columns FILE.toml:NAME"
         )
-    if place.suffix.lower() in TEXT_SUFFIXES:
-        found = read_csv(place, atmosphere=atmosphere)
-        run_file = place.parent / RUN_FILE
-        if place.name != CSV_FILE or not run_file.exists():
+    if file.suffix.lower() in TEXT_SUFFIXES:
+        found = read_csv(file, atmosphere=atmosphere)
+        run_file = file.parent / RUN_FILE
+        if file.name != CSV_FILE or not run_file.exists():
             return found
         # The recording of a result folder is what ``run.json`` beside it says of it.
-        described = read_document(place.parent)["recording"]
+        described = read_document(file.parent)["recording"]
         with refused_as(DataError, run_file, DataError):
             kind = recording_kind(str(described.get("kind", found.kind)))
         return replace(found, label=str(described.get("label", found.label)), kind=kind)

@@ -275,8 +275,8 @@ def share_interval(hits: Floats, replicates: int, confidence: float) -> Interval
     # With fewer, a replicate often has none at all, and Student's interval of 16 small counts is too narrow.
     if min(count, known.size - count) < 2 * replicates:
         return fraction_interval(count, known.size, confidence)
-    found = replicates_interval(hits, replicates, confidence)
-    return Interval(found.value, max(0.0, found.low), min(1.0, found.high))
+    interval = replicates_interval(hits, replicates, confidence)
+    return Interval(interval.value, max(0.0, interval.low), min(1.0, interval.high))
 
 
 def quantile_interval(values: Floats, share: float, confidence: float) -> Interval:

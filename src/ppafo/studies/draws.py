@@ -43,12 +43,12 @@ class Uncertainty:
     @property
     def paths(self) -> tuple[str, ...]:
         """The uncertain paths."""
-        return tuple(item.path for item in self.drawn)
+        return tuple(drawn.path for drawn in self.drawn)
 
     def columns(self, uniform: Floats) -> Columns:
         """Return values [SI] (draws,) by path for uniform numbers in (0, 1), shape (draws, paths)."""
         fractions = uniform if self.scores is None else correlate(uniform, self.scores)
-        values = {item.path: item.distribution.values(fractions[:, row]) for row, item in enumerate(self.drawn)}
+        values = {drawn.path: drawn.distribution.values(fractions[:, row]) for row, drawn in enumerate(self.drawn)}
         return with_followers(values, self.same)
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
@@ -138,7 +138,7 @@ def uncertainty_of(study: Study) -> Uncertainty:
 def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
     """Return the distributions that hold in one configuration; StudyError where none does."""
     whole = uncertainty_of(study)
-    kept = [row for row, item in enumerate(whole.drawn) if study.varies(item.path, configuration.name)]
+    kept = [row for row, drawn in enumerate(whole.drawn) if study.varies(drawn.path, configuration.name)]
     if not kept:
         raise StudyError(
             f"study '{study.name}': nothing has a distribution in the configuration '{configuration.name}'"
@@ -156,7 +156,7 @@ def uncertainty_in(study: Study, configuration: Configuration) -> Uncertainty:
 
 def choose_configuration(study: Study, name: str | None) -> Configuration:
     """Return a configuration by its name; without a name the only one. StudyError where that leaves a choice."""
-    names = [item.name for item in study.configurations]
+    names = [configuration.name for configuration in study.configurations]
     if name is None:
         if len(names) > 1:
             raise StudyError(f"study '{study.name}' has several configurations; choose one: {', '.join(names)}")
@@ -222,13 +222,13 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     """
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
     # The same under two atmospheres: an absolute pressure, or no pressure at all.
-    found = common_level(text, METRICS[metric].unit, what, atmospheres)
-    if found is None:
+    level = common_level(text, METRICS[metric].unit, what, atmospheres)
+    if level is None:
         raise StudyError(
             f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
             "for example '446 kPa_a'"
         )
-    return found
+    return level
 
 
 def common_level(text: str, unit: str, what: str, atmospheres: Collection[float]) -> float | None:
@@ -236,8 +236,8 @@ def common_level(text: str, unit: str, what: str, atmospheres: Collection[float]
 
     StudyError, whose message ``what`` begins, where the unit does not fit.
     """
-    found = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
-    return found.pop() if len(found) == 1 else None
+    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
+    return levels.pop() if len(levels) == 1 else None
 
 
 def difference_of(text: str, metric: str, what: str) -> float:

@@ -79,8 +79,8 @@ def load_study(
         # What the command line changes is written into the document, as if it stood in the file.
         changes = tuple(overrides)
         if changes:
-            for table, item in zip(document["configurations"], parsed.configurations, strict=True):
-                changed = _configuration(item, source.folder, changes).scenario
+            for table, configuration in zip(document["configurations"], parsed.configurations, strict=True):
+                changed = _configuration(configuration, source.folder, changes).scenario
                 table["overrides"] = list(changed.origin.overrides)
         if given and parsed.sample is None:
             raise StudyError(
@@ -103,49 +103,49 @@ class Source:
     text: bytes
 
 
-def read_source(kind: TomlKind, given: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Source]:
+def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Source]:
     """Return a document that may be changed, and where it is from: a file of a kind, by name or path, or data."""
-    if isinstance(given, Mapping):
-        kind.check_depth(given, kind.noun)
-        return copy.deepcopy(dict(given)), Source(kind.noun, Path(), b"")
-    source = Source(label(str(given)), Path(given).parent, kind.read(given))
+    if isinstance(named, Mapping):
+        kind.check_depth(named, kind.noun)
+        return copy.deepcopy(dict(named)), Source(kind.noun, Path(), b"")
+    source = Source(label(str(named)), Path(named).parent, kind.read(named))
     return kind.parse(source.text, source.file), source
 
 
 def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source) -> Study:
-    repeated = first_twice([item.name for item in parsed.configurations])
+    repeated = first_twice([configuration.name for configuration in parsed.configurations])
     if repeated is not None:
         raise StudyError(f"there are two configurations named '{repeated}'; give each its own name")
-    configurations = tuple(_configuration(item, source.folder) for item in parsed.configurations)
+    configurations = tuple(_configuration(configuration, source.folder) for configuration in parsed.configurations)
     _check_requests(parsed)
     _check_set_or_varied(parsed, configurations)
-    places = {item.path: _place(item, configurations, parsed) for item in parsed.vary}
-    moving = [item for item in parsed.vary if not isinstance(item, declared.SameAs)]
-    varied = [_axis_or_drawn(item, places[item.path], configurations) for item in moving]
-    own = tuple(item for item in varied if isinstance(item, Drawn))
+    places = {entry.path: _place(entry, configurations, parsed) for entry in parsed.vary}
+    moving = [entry for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
+    varied = [_axis_or_drawn(entry, places[entry.path], configurations) for entry in moving]
+    own = tuple(drawn for drawn in varied if isinstance(drawn, Drawn))
     # Noise comes last among what is drawn; a grid alone is run once, with the noise that its scenarios write.
     drawn, scores = own, _scores(parsed, own)
-    scenarios = [item.scenario for item in configurations]
+    scenarios = [configuration.scenario for configuration in configurations]
     if own:
-        drawn, scores = with_noise(own, scores, scenarios, [item.path for item in parsed.vary])
-    units = {path: place.quantity.unit or "-" for path, place in places.items()}
+        drawn, scores = with_noise(own, scores, scenarios, [entry.path for entry in parsed.vary])
+    units = {path: varied_path.quantity.unit or "-" for path, varied_path in places.items()}
     same = _followers(parsed, places)
     # What follows a gauge pressure counts from the atmosphere of its run as well.
-    gauge = {path for path, place in places.items() if place.is_gauge}
+    gauge = {path for path, varied_path in places.items() if varied_path.is_gauge}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
         configurations=configurations,
-        axes=tuple(item for item in varied if isinstance(item, Axis)),
+        axes=tuple(axis for axis in varied if isinstance(axis, Axis)),
         drawn=drawn,
         same=same,
         scores=scores,
         sample=_sample(parsed, drawn),
         outputs=valid_outputs(parsed.outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
-        units=units | {item.path: "-" for item in drawn if item.path not in units},
+        units=units | {number.path: "-" for number in drawn if number.path not in units},
         gauge=frozenset(gauge | {path for path, other in same.items() if other in gauge}),
-        only={item.path: item.only for item in parsed.vary if item.only},
+        only={entry.path: entry.only for entry in parsed.vary if entry.only},
         document=document,
         text=source.text,
     )
@@ -154,28 +154,28 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source)
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
     """Refuse a value that is set in a configuration in which it, or another form of it, also varies."""
     for each, loaded in zip(parsed.configurations, configurations, strict=True):
-        given = override_set(each.overrides, StudyError, valve=loaded.scenario.device.valve_name)
-        for item in parsed.vary:
-            path = chosen_path(item.path, loaded.scenario)
+        override = override_set(each.overrides, StudyError, valve=loaded.scenario.device.valve_name)
+        for entry in parsed.vary:
+            path = chosen_path(entry.path, loaded.scenario)
             # The varied column replaces the value in every run, whichever form of it (area or conductance) is set.
-            unused = [other for other in (path, *other_forms(path)) if other in given]
+            unused = [other for other in (path, *other_forms(path)) if other in override]
             if (
                 not unused
-                or (item.kind == "stated" and unused[0] == path)
-                or (item.only and each.name not in item.only)
+                or (entry.kind == "stated" and unused[0] == path)
+                or (entry.only and each.name not in entry.only)
             ):
                 continue
             raise StudyError(
-                f"configuration '{each.name}': '{given[unused[0]]}' is set and '{item.path}' is varied, so the set "
+                f"configuration '{each.name}': '{override[unused[0]]}' is set and '{entry.path}' is varied, so the set "
                 "value would be ignored; omit one, or restrict the [[vary]] to the other configurations with 'only'"
             )
 
 
-def _configuration(item: declared.Configuration, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
+def _configuration(entry: declared.Configuration, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
     """Return a configuration whose scenario has its own overrides and, over these, others."""
-    with refused_as(StudyError, f"configuration '{item.name}'", ScenarioError, ParameterError, DataError):
-        scenario = load_scenario(placed(item.scenario, folder), item.overrides)
-        return Configuration(item.name, reloaded(scenario, overrides) if overrides else scenario)
+    with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
+        scenario = load_scenario(placed(entry.scenario, folder), entry.overrides)
+        return Configuration(entry.name, reloaded(scenario, overrides) if overrides else scenario)
 
 
 def _check_requests(parsed: declared.StudyFile) -> None:
@@ -185,7 +185,7 @@ def _check_requests(parsed: declared.StudyFile) -> None:
         raise StudyError(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")
     if not parsed.vary and len(parsed.configurations) == 1:
         raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
-    paths = [item.path for item in parsed.vary]
+    paths = [entry.path for entry in parsed.vary]
     # Rows of channels over time are lists of one length, and bands are quantiles at one time.
     if "run.duration" in paths and (outputs.trajectories or outputs.bands):
         raise StudyError("'run.duration' cannot vary where trajectories or bands are kept: they need one length")
@@ -194,89 +194,91 @@ def _check_requests(parsed: declared.StudyFile) -> None:
         raise StudyError(f"'{repeated}' is varied twice; give it only one [[vary]]")
 
 
-def _place(item: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile) -> VariedPath:
+def _place(entry: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile) -> VariedPath:
     """Return the path with its declaration, which must be the same in all configurations that vary it."""
     names = [configuration.name for configuration in configurations]
-    for name in item.only:
+    for name in entry.only:
         if name not in names:
             hint = nearest_name(name, names)
-            raise StudyError(f"vary '{item.path}': only: there is no configuration '{name}'{hint}")
-    with refused_as(StudyError, f"vary '{item.path}'", ScenarioError):
-        places = [varied_path(item.path, each.scenario) for each in _varying(item, configurations)]
+            raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{hint}")
+    with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
+        places = [varied_path(entry.path, each.scenario) for each in _varying(entry, configurations)]
     if any(place != places[0] for place in places):
-        raise StudyError(f"vary '{item.path}': has different units, limits or atmospheres in different configurations")
+        raise StudyError(f"vary '{entry.path}': has different units, limits or atmospheres in different configurations")
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
-    if isinstance(item, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
+    if isinstance(entry, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
         return places[0]
-    with refused_as(StudyError, f"vary '{item.path}'", UnitError):
-        first = _varying(item, configurations)[0].scenario
-        is_stated = isinstance(item, declared.Stated)
-        texts = [f"0 {stated_normal(places[0], first)[1]}"] if is_stated else texts_of(item)
+    with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
+        first = _varying(entry, configurations)[0].scenario
+        is_stated = isinstance(entry, declared.Stated)
+        texts = [f"0 {stated_normal(places[0], first)[1]}"] if is_stated else texts_of(entry)
         return in_its_unit(places[0], texts)
 
 
-def _axis_or_drawn(item: declared.Varied, place: VariedPath, configurations: Iterable[Configuration]) -> Axis | Drawn:
-    with refused_as(StudyError, f"vary '{item.path}'", UnitError):
-        if not isinstance(item, declared.Stated):
-            return axis_or_distribution(item, place)
+def _axis_or_drawn(
+    entry: declared.Varied, varied_path: VariedPath, configurations: Iterable[Configuration]
+) -> Axis | Drawn:
+    with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
+        if not isinstance(entry, declared.Stated):
+            return axis_or_distribution(entry, varied_path)
         # One draw is run in every configuration, so all of them must mean the same distribution.
-        found = {stated_normal(place, each.scenario)[0] for each in _varying(item, configurations)}
-        if len(found) > 1:
+        units = {stated_normal(varied_path, each.scenario)[0] for each in _varying(entry, configurations)}
+        if len(units) > 1:
             raise UnitError(
                 "the parameter sets of the configurations state different values; use 'only', or give the values"
             )
-        stated = found.pop()
-        return Drawn(item.path, Above(stated, place.atmosphere) if place.is_gauge else stated)
+        stated = units.pop()
+        return Drawn(entry.path, Above(stated, varied_path.atmosphere) if varied_path.is_gauge else stated)
 
 
 def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath]) -> dict[str, str]:
     """Return the path that a path follows, by path; refuses one that does not vary, or has another unit."""
-    own = [item.path for item in parsed.vary if not isinstance(item, declared.SameAs)]
+    own = [entry.path for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
     same: dict[str, str] = {}
-    for item in parsed.vary:
-        if not isinstance(item, declared.SameAs):
+    for entry in parsed.vary:
+        if not isinstance(entry, declared.SameAs):
             continue
-        if item.same_as not in own:
-            hint = nearest_name(item.same_as, own) or f"; available: {', '.join(own) or 'none'}"
-            raise StudyError(f"vary '{item.path}': same_as = '{item.same_as}' does not vary independently here{hint}")
-        unit, other = places[item.path].quantity.unit, places[item.same_as].quantity.unit
+        if entry.same_as not in own:
+            hint = nearest_name(entry.same_as, own) or f"; available: {', '.join(own) or 'none'}"
+            raise StudyError(f"vary '{entry.path}': same_as = '{entry.same_as}' does not vary independently here{hint}")
+        unit, other = places[entry.path].quantity.unit, places[entry.same_as].quantity.unit
         if unit != other:
             raise StudyError(
-                f"vary '{item.path}': same_as = '{item.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
+                f"vary '{entry.path}': same_as = '{entry.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
             )
-        same[item.path] = item.same_as
+        same[entry.path] = entry.same_as
     return same
 
 
-def _varying(item: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:
+def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:
     """Return the configurations in which a path varies."""
-    return [each for each in configurations if not item.only or each.name in item.only]
+    return [each for each in configurations if not entry.only or each.name in entry.only]
 
 
 def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None:
     if not parsed.correlations:
         return None
-    paths = [item.path for item in drawn]
+    paths = [number.path for number in drawn]
     coefficients: dict[tuple[str, str], float] = {}
-    for item in parsed.correlations:
-        one, other = item.between
-        for path in item.between:
+    for pair in parsed.correlations:
+        first, other = pair.between
+        for path in pair.between:
             if path not in paths:
                 raise StudyError(
                     f"correlations: '{path}' has no distribution here{nearest_name(path, paths)}; available: {paths}"
                 )
-        if one == other or (one, other) in coefficients or (other, one) in coefficients:
+        if first == other or (first, other) in coefficients or (other, first) in coefficients:
             raise StudyError(
-                f"correlations: between = ['{one}', '{other}'] must name two different paths, and each pair only once"
+                f"correlations: between = ['{first}', '{other}'] must name two different paths, and each pair only once"
             )
-        coefficients[one, other] = item.coefficient
+        coefficients[first, other] = pair.coefficient
     matrix = np.eye(len(paths))
-    for (one, other), coefficient in coefficients.items():
-        row, column = paths.index(one), paths.index(other)
+    for (first, other), coefficient in coefficients.items():
+        row, column = paths.index(first), paths.index(other)
         matrix[row, column] = matrix[column, row] = coefficient
     factor = cholesky_factor(matrix)
     if factor is None:
-        shown = ", ".join(f"{one} with {other}: {value:g}" for (one, other), value in coefficients.items())
+        shown = ", ".join(f"{first} with {other}: {value:g}" for (first, other), value in coefficients.items())
         raise StudyError(
             f"correlations: contradict each other, their matrix is not positive definite ({shown}); make them smaller"
         )

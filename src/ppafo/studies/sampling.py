@@ -152,10 +152,10 @@ def with_noise(
     ``paths`` are all that vary; a seed among them is left as it is.
     """
     # An open-loop controller uses no sensor; levels may be arrays (runs,).
-    closed = [item for item in scenarios if item.controller.kind != OPEN_LOOP]
+    closed = [scenario for scenario in scenarios if scenario.controller.kind != OPEN_LOOP]
     is_noisy = bool(closed) and any(path in _NOISE_LEVELS for path in paths)
-    for item in closed:
-        level = item.motion.motion_kind.noise(item)
+    for scenario in closed:
+        level = scenario.motion.motion_kind.noise(scenario)
         is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
     if NOISE in paths or not is_noisy:
         return drawn, scores

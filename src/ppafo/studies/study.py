@@ -43,7 +43,9 @@ class Outputs:
 def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> Outputs:
     """Return the outputs in SI units; StudyError for a name that does not exist."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
-    _check_names("metrics", metrics, METRICS, dict.fromkeys(name for item in scenarios for name in offered(item)))
+    _check_names(
+        "metrics", metrics, METRICS, dict.fromkeys(name for scenario in scenarios for name in offered(scenario))
+    )
     _check_names("trajectories", outputs.trajectories, tuple(TRACED))
     _check_names("bands", outputs.bands, tuple(TRACED))
     channels = (*outputs.trajectories, *outputs.bands)
@@ -78,14 +80,14 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> O
     )
 
 
-def _check_names(key: str, given: Sequence[str], known: Collection[str], shown: Collection[str] = ()) -> None:
+def _check_names(key: str, requested: Sequence[str], known: Collection[str], shown: Collection[str] = ()) -> None:
     """Refuse an unknown or repeated name; ``shown`` are the names that apply here, by default all that are known."""
-    for name in given:
+    for name in requested:
         if name not in known:
             what, apply = "metric" if key == "metrics" else "channel", shown or known
             hint = nearest_name(name, apply)
             raise StudyError(f"outputs.{key}: there is no {what} '{name}'{hint}; available: {', '.join(apply)}")
-    repeated = first_twice(given)
+    repeated = first_twice(requested)
     if repeated is not None:
         raise StudyError(f"outputs.{key}: '{repeated}' is named twice")
 
@@ -161,7 +163,7 @@ class Study:
     @property
     def paths(self) -> tuple[str, ...]:
         """The varied paths: grid and lists first, then distributions."""
-        return (*(axis.path for axis in self.axes), *(item.path for item in self.drawn))
+        return (*(axis.path for axis in self.axes), *(number.path for number in self.drawn))
 
     @property
     def runs_of_configuration(self) -> int:
@@ -200,7 +202,7 @@ def choose_configurations(
     if configurations is None:
         if study is None:
             raise StudyError("nothing to compare: give scenarios, a study, or both")
-        found = study.configurations
+        chosen = study.configurations
     else:
         if study is not None and study.only:
             path, varying = next(iter(study.only.items()))
@@ -208,17 +210,21 @@ def choose_configurations(
                 f"study '{study.name}': '{path}' varies only in {', '.join(varying)}; "
                 "compare the study's own configurations"
             )
-        given = configurations.values() if isinstance(configurations, Mapping) else configurations
-        scenarios = [scenario_or_load(item) for item in given]
-        names = list(configurations) if isinstance(configurations, Mapping) else [item.name for item in scenarios]
+        named = configurations.values() if isinstance(configurations, Mapping) else configurations
+        scenarios = [scenario_or_load(named_scenario) for named_scenario in named]
+        names = (
+            list(configurations) if isinstance(configurations, Mapping) else [scenario.name for scenario in scenarios]
+        )
         repeated = first_twice(names)
         if repeated is not None:
             raise StudyError(f"two of the scenarios are named '{repeated}'; give them different names in a study file")
-        found = tuple(map(Configuration, names, scenarios))
-    if len(found) < 2:
-        raise StudyError(f"a comparison needs at least two configurations, there is {len(found)}")
+        chosen = tuple(map(Configuration, names, scenarios))
+    if len(chosen) < 2:
+        raise StudyError(f"a comparison needs at least two configurations, there is {len(chosen)}")
     changes = tuple(overrides)
-    return tuple(replace(item, scenario=with_overrides(item.scenario, changes)) for item in found)
+    return tuple(
+        replace(configuration, scenario=with_overrides(configuration.scenario, changes)) for configuration in chosen
+    )
 
 
 def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:

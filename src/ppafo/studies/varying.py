@@ -137,49 +137,51 @@ def value_at(path: str, scenario: Scenario) -> float | None:
         return None
 
 
-def in_its_unit(place: VariedPath, texts: Iterable[object]) -> VariedPath:
+def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
     """Return the place of values that vary together with the atmosphere, for texts with units such as ``50 psi_g``.
 
     Gauge pressures then count from the atmosphere of their run. UnitError for gauge and absolute pressures together.
     """
     units = [split_quantity(text)[1] for text in texts if isinstance(text, str)]
-    gauge = [bool(gauge_link(place.path, 0.0, unit)) for unit in units]
-    if place.quantity.unit != "Pa_a" or not any(gauge):
-        return place
+    gauge = [bool(gauge_link(varied.path, 0.0, unit)) for unit in units]
+    if varied.quantity.unit != "Pa_a" or not any(gauge):
+        return varied
     if not all(gauge):
         other = units[gauge.index(not gauge[0])]
         raise UnitError(
             f"the atmosphere varies, so '{units[0]}' and '{other}' do not go together; give gauge or absolute pressures"
         )
-    return replace(place, is_gauge=True)
+    return replace(varied, is_gauge=True)
 
 
-def texts_of(item: declared.Varied) -> list[object]:
+def texts_of(entry: declared.Varied) -> list[object]:
     """Return the values of a table in the order of its keys, without differences and shares."""
     keys = ("first", "last", "minimum", "maximum", "mean", "median", "mode")
-    return [*(getattr(item, key) for key in keys if hasattr(item, key)), *getattr(item, "values", ())]
+    return [*(getattr(entry, key) for key in keys if hasattr(entry, key)), *getattr(entry, "values", ())]
 
 
-def axis_or_distribution(item: declared.Varied, place: VariedPath) -> Axis | Drawn:
+def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | Drawn:
     """Return what a table asks for; UnitError with the key where a value is not usable or contradicts another."""
-    is_counted, is_whole = item.path in WHOLE, item.kind == "whole_numbers"
+    is_counted, is_whole = entry.path in WHOLE, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
         raise UnitError(f"kind = 'whole_numbers' is for {' and '.join(WHOLE)} alone; use 'choice' or 'uniform'")
-    if is_counted and item.kind not in ("grid", "list", "choice", "whole_numbers"):
-        raise UnitError(f"kind = '{item.kind}' gives no whole numbers, which '{item.path}' needs; use 'whole_numbers'")
-    if isinstance(item, declared.Listed):
-        levels = tuple(_level("values", value, place) for value in item.values)
-        return Axis(item.path, _all_whole(item.path, levels))
-    if not isinstance(item, declared.Grid):
-        return Drawn(item.path, _DISTRIBUTIONS[item.kind](item, place))
-    first, last = _key(item, "first", place), _key(item, "last", place)
+    if is_counted and entry.kind not in ("grid", "list", "choice", "whole_numbers"):
+        raise UnitError(
+            f"kind = '{entry.kind}' gives no whole numbers, which '{entry.path}' needs; use 'whole_numbers'"
+        )
+    if isinstance(entry, declared.Listed):
+        levels = tuple(_level("values", value, varied) for value in entry.values)
+        return Axis(entry.path, _all_whole(entry.path, levels))
+    if not isinstance(entry, declared.Grid):
+        return Drawn(entry.path, _DISTRIBUTIONS[entry.kind](entry, varied))
+    first, last = _key(entry, "first", varied), _key(entry, "last", varied)
     if first == last:
-        raise UnitError(f"first and last are both {item.first!r}; a grid needs two different ends")
-    is_logarithmic = item.spacing == "logarithmic"
+        raise UnitError(f"first and last are both {entry.first!r}; a grid needs two different ends")
+    is_logarithmic = entry.spacing == "logarithmic"
     if is_logarithmic and min(first, last) <= 0.0:
         raise UnitError("spacing = 'logarithmic' needs both ends above 0")
     spaced = np.geomspace if is_logarithmic else np.linspace
-    return Axis(item.path, _all_whole(item.path, tuple(spaced(first, last, item.count).tolist())))
+    return Axis(entry.path, _all_whole(entry.path, tuple(spaced(first, last, entry.count).tolist())))
 
 
 def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -189,44 +191,46 @@ def _all_whole(path: str, values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
-def _bounded(made: Callable[[float, float], Distribution], item: Any, place: VariedPath) -> Distribution:
-    return made(*_bounds(item, place))
+def _bounded(made: Callable[[float, float], Distribution], entry: Any, varied: VariedPath) -> Distribution:
+    return made(*_bounds(entry, varied))
 
 
-def _logarithmic(item: declared.LogUniform | declared.LogNormal, place: VariedPath) -> Distribution:
+def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
-    absolute = replace(place, is_gauge=False)
-    found: Distribution
-    if isinstance(item, declared.LogUniform):
-        minimum, maximum = _bounds(item, absolute)
+    absolute = replace(varied, is_gauge=False)
+    distribution: Distribution
+    if isinstance(entry, declared.LogUniform):
+        minimum, maximum = _bounds(entry, absolute)
         if minimum <= 0.0:
-            raise UnitError(f"minimum = {item.minimum!r}: a log-uniform distribution needs both bounds above 0")
-        found = LogUniformBetween(minimum, maximum)
+            raise UnitError(f"minimum = {entry.minimum!r}: a log-uniform distribution needs both bounds above 0")
+        distribution = LogUniformBetween(minimum, maximum)
     else:
-        median = _key(item, "median", absolute)
+        median = _key(entry, "median", absolute)
         if median <= 0.0:
-            raise UnitError(f"median = {item.median!r} must be above 0")
-        found = LogNormalAround(median, item.factor)
-    return Above(found, place.atmosphere) if place.is_gauge else found
+            raise UnitError(f"median = {entry.median!r} must be above 0")
+        distribution = LogNormalAround(median, entry.factor)
+    return Above(distribution, varied.atmosphere) if varied.is_gauge else distribution
 
 
-def _normal(item: declared.Normal | declared.TruncatedNormal, place: VariedPath) -> Distribution:
-    bounds = _bounds(item, place) if isinstance(item, declared.TruncatedNormal) else None
-    mean, deviation = _key(item, "mean", place), _deviation(item, place)
+def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> Distribution:
+    bounds = _bounds(entry, varied) if isinstance(entry, declared.TruncatedNormal) else None
+    mean, deviation = _key(entry, "mean", varied), _deviation(entry, varied)
     return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
-def _triangular(item: declared.Triangular, place: VariedPath) -> Distribution:
-    minimum, maximum = _bounds(item, place)
-    mode = _key(item, "mode", place)
+def _triangular(entry: declared.Triangular, varied: VariedPath) -> Distribution:
+    minimum, maximum = _bounds(entry, varied)
+    mode = _key(entry, "mode", varied)
     if not minimum <= mode <= maximum:
-        raise UnitError(f"mode = {item.mode!r} must lie between minimum {item.minimum!r} and maximum {item.maximum!r}")
+        raise UnitError(
+            f"mode = {entry.mode!r} must lie between minimum {entry.minimum!r} and maximum {entry.maximum!r}"
+        )
     return TriangularBetween(minimum, mode, maximum)
 
 
-def _choice(item: declared.Choice, place: VariedPath) -> Distribution:
-    values = _all_whole(item.path, tuple(_level("values", value, place) for value in item.values))
-    weights = item.weights or (1.0,) * len(values)
+def _choice(entry: declared.Choice, varied: VariedPath) -> Distribution:
+    values = _all_whole(entry.path, tuple(_level("values", value, varied) for value in entry.values))
+    weights = entry.weights or (1.0,) * len(values)
     if len(weights) != len(values):
         raise UnitError(
             f"weights has {len(weights)} numbers, values has {len(values)}; there must be one weight for each value"
@@ -250,39 +254,39 @@ _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
 """What builds each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
 
 
-def _bounds(item: Any, place: VariedPath) -> tuple[float, float]:
-    minimum, maximum = _key(item, "minimum", place), _key(item, "maximum", place)
+def _bounds(entry: Any, varied: VariedPath) -> tuple[float, float]:
+    minimum, maximum = _key(entry, "minimum", varied), _key(entry, "maximum", varied)
     if minimum >= maximum:
-        raise UnitError(f"minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}")
+        raise UnitError(f"minimum = {entry.minimum!r} must be less than maximum = {entry.maximum!r}")
     return minimum, maximum
 
 
-def _deviation(item: Any, place: VariedPath) -> float:
-    with refused_as(UnitError, f"standard_deviation = {item.standard_deviation!r}", UnitError):
-        deviation = place.distance(item.standard_deviation)
+def _deviation(entry: Any, varied: VariedPath) -> float:
+    with refused_as(UnitError, f"standard_deviation = {entry.standard_deviation!r}", UnitError):
+        deviation = varied.distance(entry.standard_deviation)
     if deviation <= 0.0:
-        raise UnitError(f"standard_deviation = {item.standard_deviation!r} must be more than 0")
+        raise UnitError(f"standard_deviation = {entry.standard_deviation!r} must be more than 0")
     return deviation
 
 
-def _key(item: Any, key: str, place: VariedPath) -> float:
-    return _level(key, getattr(item, key), place)
+def _key(entry: Any, key: str, varied: VariedPath) -> float:
+    return _level(key, getattr(entry, key), varied)
 
 
-def _level(key: str, value: str | float, place: VariedPath) -> float:
+def _level(key: str, value: str | float, varied: VariedPath) -> float:
     with refused_as(UnitError, f"{key} = {value!r}", UnitError):
-        return place.level(value)
+        return varied.level(value)
 
 
-def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
+def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
     """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
-    origin, path = scenario.origin, place.path
+    origin, path = scenario.origin, varied.path
     folder = Path(origin.file).parent if origin.file is not None else Path()
     own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = load_parameter_set(set_name(origin.parameter_set, folder))
-    for given in (origin.content["device"].get("overrides", ()), own):
-        parameters = apply_overrides(parameters, given, valve=origin.valve)
+    for overrides in (origin.content["device"].get("overrides", ()), own):
+        parameters = apply_overrides(parameters, overrides, valve=origin.valve)
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:
@@ -293,6 +297,6 @@ def stated_normal(place: VariedPath, scenario: Scenario) -> tuple[NormalAround, 
     unit = _STATED_DIFFERENCES.get(entry.unit, entry.unit)
     if unit.endswith(("_g", "_a")):
         unit = f"{unit[:-2]}_d"
-    half_width = place.distance(f"{entry.uncertainty!r} {unit}".strip())
+    half_width = varied.distance(f"{entry.uncertainty!r} {unit}".strip())
     mean = entry_in_si(entry, parameters.declarations()[inside], atmospheric_pressure(parameters))
     return NormalAround(mean, half_width / DEVIATIONS_IN_HALF_WIDTH), entry.unit

@@ -34,9 +34,11 @@ def chunk_size(study: Study) -> int:
     """Return the runs of a full chunk: fewer where channels over time are kept, so that memory stays small."""
     if study.runs_of_chunk is not None:
         return study.runs_of_chunk
-    if any(item.scenario.controller.custom is not None for item in study.configurations):
+    if any(configuration.scenario.controller.custom is not None for configuration in study.configurations):
         return _SLOW_RUNS_OF_CHUNK
-    bytes_of_run = 8 * len(study.outputs.traces) * max(samples_of(study, item) for item in study.configurations)
+    bytes_of_run = (
+        8 * len(study.outputs.traces) * max(samples_of(study, configuration) for configuration in study.configurations)
+    )
     size = MAXIMUM_RUNS_OF_CHUNK
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
@@ -81,7 +83,7 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
             )
         uniform = uniform if study.scores is None else correlate(uniform, study.scores)
         rows = np.ascontiguousarray(uniform.T)
-        columns |= {item.path: item.distribution.values(row) for item, row in zip(study.drawn, rows, strict=True)}
+        columns |= {number.path: number.distribution.values(row) for number, row in zip(study.drawn, rows, strict=True)}
     return {path: columns[path] for path in study.paths}
 
 

@@ -51,26 +51,28 @@ def controller_document(controller: PythonController) -> dict[str, Any]:
 
 def _object(value: object, inside: Inside) -> dict[str, Any]:
     try:
-        found = object.__getstate__(value)
+        state = object.__getstate__(value)
     except TypeError:  # made outside of Python
-        found = None
-    tables = [table for table in (found if isinstance(found, tuple) else (found,)) if isinstance(table, dict)]
-    settings = {str(name): item for table in tables for name, item in table.items()}
+        state = None
+    tables = [table for table in (state if isinstance(state, tuple) else (state,)) if isinstance(table, dict)]
+    settings = {str(name): setting for table in tables for name, setting in table.items()}
     return {**_written(type(value), type(value).__mro__), "settings": _plain_setting(settings, inside)}
 
 
 def _written(made: type | FunctionType, parts: tuple[type | FunctionType, ...]) -> dict[str, Any]:
     """Return the name of a class or function, and a hash of the files of its parts; of their code without a file."""
     digest = hashlib.sha256()
-    for one in parts:
+    for part in parts:
         # The standard library is another one with another Python, which is no other controller.
-        if one.__module__ != "__main__" and one.__module__.partition(".")[0] in sys.stdlib_module_names:
+        if part.__module__ != "__main__" and part.__module__.partition(".")[0] in sys.stdlib_module_names:
             continue
         try:
-            text = Path(inspect.getfile(one)).read_bytes()
+            text = Path(inspect.getfile(part)).read_bytes()
         except (TypeError, OSError):  # from a notebook, or typed in
-            functions = [one] if isinstance(one, FunctionType) else vars(one).values()
-            text = repr([list(_code(item.__code__)) for item in functions if isinstance(item, FunctionType)]).encode()
+            functions = [part] if isinstance(part, FunctionType) else vars(part).values()
+            text = repr(
+                [list(_code(function.__code__)) for function in functions if isinstance(function, FunctionType)]
+            ).encode()
         digest.update(text)
     return {"type": f"{made.__module__}.{made.__qualname__}", "source": digest.hexdigest()[:_DIGITS]}
 
@@ -95,13 +97,13 @@ def _plain_setting(value: object, inside: Inside) -> Any:
         return f"{type(value).__module__}.{type(value).__qualname__}"
     deeper = (*inside, id(value))
     if isinstance(value, Mapping):
-        return {str(key): _plain_setting(item, deeper) for key, item in value.items()}
+        return {str(key): _plain_setting(inner, deeper) for key, inner in value.items()}
     items: Any = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else value
     if isinstance(items, set | frozenset):
         items = sorted(items, key=repr)
     if not isinstance(items, tuple | list):
         return _object(value, deeper)
-    plainly = [_plain_setting(item, deeper) for item in items]
+    plainly = [_plain_setting(inner, deeper) for inner in items]
     digest = hashlib.sha256(json.dumps(plainly).encode()).hexdigest()
     # Weights of a network, a long table of gains: that they are the same matters, not every one of them.
     return plainly if len(plainly) <= _LONGEST else {"items": len(plainly), "sha256": digest}
@@ -118,18 +120,18 @@ _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
 def manifest(study: Study) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
     scenarios, programs = {}, {}
-    for item in study.configurations:
-        document, custom = _plain(scenario_document(item.scenario)), item.scenario.controller.custom
+    for configuration in study.configurations:
+        document, custom = _plain(scenario_document(configuration.scenario)), configuration.scenario.controller.custom
         # Without the file it came from, which may lie elsewhere the next time.
         del document["origin"]
         if custom is not None:
             document["controller"]["custom"] = controller_document(custom)
-        scenarios[item.name] = document
+        scenarios[configuration.name] = document
         # What it computes: a law or a valve from a module of the user is a name elsewhere. A line of comment says where
         # a function stands, which may be elsewhere the next time too.
-        lines = write_source(plan_run(item.scenario).program, 1)[1].splitlines()
+        lines = write_source(plan_run(configuration.scenario).program, 1)[1].splitlines()
         code = "\n".join(line for line in lines if not line.startswith("#"))
-        programs[item.name] = hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
+        programs[configuration.name] = hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
     # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
     parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
     drawn = _plain(plain(parts))
@@ -157,20 +159,20 @@ def manifest(study: Study) -> dict[str, Any]:
     }
 
 
-def read_manifest(place: Place) -> dict[str, Any]:
+def read_manifest(location: Place) -> dict[str, Any]:
     """Return the document of a folder of results; DataError where it is none."""
     try:
-        document = read_document(place, MANIFEST)
+        document = read_document(location, MANIFEST)
     except (OSError, ValueError) as error:
-        raise DataError(f"{place.address}: contains no study results ({MANIFEST} cannot be read)") from error
+        raise DataError(f"{location.address}: contains no study results ({MANIFEST} cannot be read)") from error
     if not isinstance(document, dict) or document.get("format") != FORMAT:
-        raise DataError(f"{place.address}: {MANIFEST} is not a manifest of study results")
+        raise DataError(f"{location.address}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{place.address}: has schema_version {quote(document.get('schema_version'))}, "
+            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, "
             f"this version of ppafo reads {SCHEMA_VERSION}"
         )
-    validate(_Stored, document, f"{place.address}: {MANIFEST}", DataError)
+    validate(_Stored, document, f"{location.address}: {MANIFEST}", DataError)
     return document
 
 
@@ -251,10 +253,10 @@ class _Stored(_Part):
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         """Refuse chunks that the configurations cannot share, and an axis that does not vary."""
-        names = [item.name for item in self.study.configurations]
+        names = [configuration.name for configuration in self.study.configurations]
         if len(set(names)) < len(names) or self.chunks % len(names) or self.chunks > self.runs:
             raise ValueError(f"{self.chunks} chunks of {self.runs} runs do not fit {len(names)} configurations")
-        lost = [item.path for item in self.study.vary if item.path not in self.varied]
+        lost = [number.path for number in self.study.vary if number.path not in self.varied]
         if lost:
             raise ValueError(f"'{one_line(lost[0])}' varies and has no unit")
         for si_unit, unit in self.shown.items():
@@ -265,19 +267,19 @@ class _Stored(_Part):
         return self
 
 
-def check_same_study(place: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
+def check_same_study(location: Place, stored: Mapping[str, Any], requested: Mapping[str, Any]) -> None:
     """Refuse to go on with the results of another study, or of this one before it was changed."""
     before, now = stored.get("study", {}), requested["study"]
     if before.get("name") != now["name"]:
         raise StudyError(
-            f"{place.address}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
+            f"{location.address}: contains the results of the study '{before.get('name')}', not of '{now['name']}'; "
             "choose another folder"
         )
     changed = [line for key in _COMPARED for line in _differences(key, stored.get(key), requested[key])]
     if changed:
         named = "; ".join(changed[:_NAMED]) + (f"; and {len(changed) - _NAMED} more" if len(changed) > _NAMED else "")
         raise StudyError(
-            f"{place.address}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
+            f"{location.address}: contains results of an earlier version of '{now['name']}': {named}; undo the change "
             "or choose another folder"
         )
 

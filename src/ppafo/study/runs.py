@@ -88,9 +88,9 @@ class Runs:
         runs = cls.__new__(cls)
 
         def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
-            found = {name: np.asarray(values) for name, values in model(columns).items()}
-            failed = found.get(FAILED, ~np.any([np.isfinite(found[name]) for name in metrics], axis=0))
-            return {**found, FAILED: failed}, "diverged" if failed.any() else ""
+            rows = {name: np.asarray(values) for name, values in model(columns).items()}
+            failed = rows.get(FAILED, ~np.any([np.isfinite(rows[name]) for name in metrics], axis=0))
+            return {**rows, FAILED: failed}, "diverged" if failed.any() else ""
 
         runs._begin(metrics, rows, Tally(1, None), _AT_ONCE)
         return runs
@@ -157,9 +157,9 @@ def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ..
 
     A metric at one instant needs oscillations of what is controlled, and each of them how often the command turns.
     """
-    found = (*metrics, REVERSALS) if judges_loop(scenario) else tuple(metrics)
+    wanted = (*metrics, REVERSALS) if judges_loop(scenario) else tuple(metrics)
     companions = [name for metric in metrics for name in ONE_INSTANT.get(metric, ())]
-    return tuple(dict.fromkeys((*found, *(name for name in companions if not lacking(scenario, METRICS[name])))))
+    return tuple(dict.fromkeys((*wanted, *(name for name in companions if not lacking(scenario, METRICS[name])))))
 
 
 def judges_loop(scenario: Scenario) -> bool:

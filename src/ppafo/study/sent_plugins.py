@@ -46,13 +46,13 @@ _taken: dict[str, str] = {}
 
 def take_plugins(sent: Iterable[SentPlugin]) -> None:
     """Name what was sent. KindError where this process runs another version of it already."""
-    for item in sent:
-        module = item.plugin.module
-        if _taken.setdefault(module, item.digest) != item.digest:
+    for plugin in sent:
+        module = plugin.plugin.module
+        if _taken.setdefault(module, plugin.digest) != plugin.digest:
             raise KindError(f"plugin '{module}': a worker has loaded an earlier version of it; restart the workers")
-        folder = Path(item.plugin.folder)
-        is_here = all(_has(folder / name, content) for name, content in item.files)
-        add_plugin(item.plugin if is_here else Plugin(module, _written(item)))
+        folder = Path(plugin.plugin.folder)
+        is_here = all(_has(folder / name, content) for name, content in plugin.files)
+        add_plugin(plugin.plugin if is_here else Plugin(module, _written(plugin)))
 
 
 def _has(path: Path, content: bytes) -> bool:

@@ -76,29 +76,29 @@ class Store:
     place: Place
 
     @classmethod
-    def claim(cls, study: Study, place: Place, agreed: bool, threads: int | None) -> "Store":
+    def claim(cls, study: Study, location: Place, agreed: bool, threads: int | None) -> "Store":
         """Give a place to a study, or refuse it: of another study, of an earlier version, without room."""
-        names = place.names()
+        names = location.names()
         if MANIFEST in names:
-            check_same_study(place, read_manifest(place), manifest(study))
+            check_same_study(location, read_manifest(location), manifest(study))
         elif names:
             raise StudyError(
-                f"{place.address}: is not empty and contains no study results (it has no {MANIFEST}); choose another "
-                "folder"
+                f"{location.address}: is not empty and contains no study results (it has no {MANIFEST}); choose "
+                "another folder"
             )
         else:
-            check_room(study, place, agreed)
+            check_room(study, location, agreed)
             # A few runs of each configuration, spread evenly: a path that cannot vary is refused at once.
             total = study.runs_of_configuration
             runs = np.unique(np.linspace(0, total - 1, min(total, _TRIED_RUNS)).astype(np.int64))
             for number in range(len(study.configurations)):
                 _result(study, Chunk(0, number, 0, runs.size), drawn_values(study, runs), threads)
-            place.write(MANIFEST, f"{json_text(manifest(study))}\n".encode())
-        place.tidy()
+            location.write(MANIFEST, f"{json_text(manifest(study))}\n".encode())
+        location.tidy()
         # After study.json, by which the folder is known to be ours.
         if study.text and STUDY_COPY not in names:
-            place.write(STUDY_COPY, study.text)
-        return cls(study, place)
+            location.write(STUDY_COPY, study.text)
+        return cls(study, location)
 
     def finished(self) -> list[Finished]:
         """Return the chunks whose files are as they were written."""
@@ -129,17 +129,17 @@ class Store:
         return finished
 
 
-def stored_rows(place: Place, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
+def stored_rows(location: Place, numbers: Sequence[int], columns: Sequence[str] | None = None) -> "Iterator[pa.Table]":
     """Give the tables of some chunks one after the other; DataError where one is missing or damaged."""
     for number in numbers:
         name = chunk_file(number)
         try:
-            table = read_parquet(place.open(name), name, columns)
+            table = read_parquet(location.open(name), name, columns)
             check_types(table, name)
             yield table
         except (DataError, OSError) as error:
             raise DataError(
-                f"{place.address}/{name}: is missing or damaged; run the study again into this folder to recompute "
+                f"{location.address}/{name}: is missing or damaged; run the study again into this folder to recompute "
                 "this chunk"
             ) from error
 
@@ -177,7 +177,7 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
     configuration = study.configurations[part.configuration]
     name = configuration.name
     own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
-    names = [item.name for item in study.configurations]
+    names = [configuration.name for configuration in study.configurations]
     first = part.configuration * study.runs_of_configuration + part.first
     numbers = np.arange(first, first + part.runs, dtype=np.int64)
     columns = {
@@ -187,8 +187,8 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
         ),
     }
     for path, column in values.items():
-        given = own.get(path, column) if study.varies(path, name) else np.full(part.runs, np.nan)
-        columns[path] = TableColumn(given, study.units[path], "varied value")
+        shown = own.get(path, column) if study.varies(path, name) else np.full(part.runs, np.nan)
+        columns[path] = TableColumn(shown, study.units[path], "varied value")
     columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
     columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
     columns["reason"] = TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics")
@@ -268,23 +268,24 @@ def stored_unit(unit: str) -> str:
 
 def estimate_bytes(study: Study) -> int:
     """Return an upper estimate of the bytes on disk: as if nothing could be compressed."""
-    outputs, samples = study.outputs, max(samples_of(study, item) for item in study.configurations)
+    outputs, samples = study.outputs, max(samples_of(study, configuration) for configuration in study.configurations)
     numbers = 2 + len(study.paths) + len(outputs.metrics) * (2 if outputs.errors else 1)
     traces = sum(_BYTES_OF_NUMBER if name in outputs.bands else _BYTES_OF_SAMPLE for name in outputs.traces)
     row = _FIXED_BYTES_OF_ROW + _BYTES_OF_NUMBER * numbers + samples * traces
     return study.runs * row + chunk_count(study) * _BYTES_OF_FILE
 
 
-def check_room(study: Study, place: Place, agreed: bool) -> None:
+def check_room(study: Study, location: Place, agreed: bool) -> None:
     """Refuse a study that does not fit onto the disk, or that takes much of it and was not agreed to with ``--yes``."""
-    needed, free = estimate_bytes(study), place.free_bytes()
+    needed, free = estimate_bytes(study), location.free_bytes()
     size = f"{study.runs:,} runs of '{study.name}' need about {_bytes_text(needed)}"
     if free is not None and needed > free:
         raise StudyError(
-            f"{place.address}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or trajectories"
+            f"{location.address}: {size}, but only {_bytes_text(free)} are free: use fewer runs, metrics or "
+            "trajectories"
         )
     if needed > ASKED_ABOVE and not agreed:
-        raise StudyError(f"{place.address}: {size}; give --yes to start it anyway")
+        raise StudyError(f"{location.address}: {size}; give --yes to start it anyway")
 
 
 def _bytes_text(size: int) -> str:

@@ -92,11 +92,11 @@ _OF_C = {"sqrt": "sqrt", "abs": "fabs", **{name: name for name in LIBRARY}}
 
 def c_name(name: str, others: Collection[str] = (), outer: Collection[str] = ()) -> str:
     """A name of Python as C can have it: not one of C's, of the ``others`` beside it, or of the file around it."""
-    found = name
+    written = name
     # Python allows a final underscore on any name, so one more always ends at a free name.
-    while found in _RESERVED or _MACRO.match(found) or found in outer or (found != name and found in others):
-        found = f"v{found}" if _MACRO.match(found) else f"{found}_"
-    return found
+    while written in _RESERVED or _MACRO.match(written) or written in outer or (written != name and written in others):
+        written = f"v{written}" if _MACRO.match(written) else f"{written}_"
+    return written
 
 
 def is_free(name: str) -> bool:
@@ -123,116 +123,120 @@ class CTerms:
     functions: Mapping[str, str]
     made: Callable[[Type], None]
 
-    def term(self, item: Term, least: int = 0) -> str:
+    def term(self, term: Term, least: int = 0) -> str:
         """A term as text, in brackets where what is around it binds more than ``least``."""
-        text, level = self.worked_out(item)
+        text, level = self.worked_out(term)
         # An int of 32 bits would carry digits that the small processor does not have.
-        if item.type == INT16 and item.kind in _WORKED_OUT:
+        if term.type == INT16 and term.kind in _WORKED_OUT:
             # Arithmetic on 16 bits gives an int in C, which has 16 or 32.
             text, level = f"(int16_t)({text})", _SIGN
         return f"({text})" if level < least else text
 
-    def worked_out(self, item: Term) -> tuple[str, int]:
+    def worked_out(self, term: Term) -> tuple[str, int]:
         """A term as C works it out, and how strongly its text holds together."""
-        match item.kind:
+        match term.kind:
             case "number":
-                return self.number(item)
+                return self.number(term)
             case "convert":
-                return self.conversion(item)
+                return self.conversion(term)
             case "negative" | "not":
-                return f"{'-' if item.kind == 'negative' else '!'}{self.term(item.parts[0], _ATOM)}", _SIGN
+                sign = "-" if term.kind == "negative" else "!"
+                return f"{sign}{self.term(term.parts[0], _ATOM)}", _SIGN
             case "choice":
-                test, yes, no = (self.term(part, _CHOICE + 1) for part in item.parts)
+                test, yes, no = (self.term(part, _CHOICE + 1) for part in term.parts)
                 return f"{test} ? {yes} : {no}", _CHOICE
-        text = self.looked_up(item) or self.call(item)
-        return (text, _ATOM) if text else self.operation(item)
+        text = self.looked_up(term) or self.call(term)
+        return (text, _ATOM) if text else self.operation(term)
 
-    def looked_up(self, item: Term) -> str:
+    def looked_up(self, term: Term) -> str:
         """A name, or what lies at a place in a row, a tuple or an array; empty for any other term."""
-        match item.kind:
+        match term.kind:
             case "name":
-                text = self.name(item.detail)
+                text = self.name(term.detail)
             case "field":
-                kind, sign = item.parts[0].type, "."
+                kind, sign = term.parts[0].type, "."
                 if isinstance(kind, Shared):
                     kind, sign = kind.row, "->"
                 assert isinstance(kind, Row)
-                text = f"{self.term(item.parts[0], _ATOM)}{sign}{member_name(kind, item.detail)}"
+                text = f"{self.term(term.parts[0], _ATOM)}{sign}{member_name(kind, term.detail)}"
             case "item":
-                place = str(item.detail) if len(item.parts) == 1 else self.term(item.parts[1])
-                kind = item.parts[0].type
+                index = str(term.detail) if len(term.parts) == 1 else self.term(term.parts[1])
+                kind = term.parts[0].type
                 is_uniform = isinstance(kind, Items) and kind.is_uniform
-                text = f"{self.term(item.parts[0], _ATOM)}.item{f'[{place}]' if is_uniform else f'_{place}'}"
+                member = f"item[{index}]" if is_uniform else f"item_{index}"
+                text = f"{self.term(term.parts[0], _ATOM)}.{member}"
             case "element":
-                text = self.element(item)
+                text = self.element(term)
             case "extent":
-                text = f"{self.name(item.parts[0].detail)}.extent[{item.detail}]"
+                text = f"{self.name(term.parts[0].detail)}.extent[{term.detail}]"
             case _:
                 text = ""
         return text
 
-    def element(self, item: Term) -> str:
+    def element(self, term: Term) -> str:
         """An element of an array, whose first place may have a name."""
-        owner, first, *further = item.parts
+        owner, first, *further = term.parts
         assert isinstance(owner.type, Array)
         name, names = self.name(owner.detail), self.places.get(owner.detail, ())
         is_local = bool(owner.type.shape)
         least = 9 if further and not is_local else 0
         index = names[first.detail] if names and first.kind == "number" else self.term(first, least)
         if is_local:
-            return f"{name}[{index}]{''.join(f'[{self.term(place)}]' for place in further)}"
+            return f"{name}[{index}]{''.join(f'[{self.term(index)}]' for index in further)}"
         for number, place in enumerate(further, 1):
             # Arrays are one block of memory: the last index runs fastest, and extents are known only at run time.
-            index = f"{index if number == 1 else f'({index})'} * {name}.extent[{number}] + {self.term(place, 9)}"
+            before = index if number == 1 else f"({index})"
+            index = f"{before} * {name}.extent[{number}] + {self.term(place, 9)}"
         return f"{name}.values[{index}]"
 
-    def call(self, item: Term) -> str:
+    def call(self, term: Term) -> str:
         """A call of a function of the module, the prelude or the C library; empty for any other term."""
-        if item.kind in ("min", "max") and item.type in (INT, INT16, INT32):
+        if term.kind in ("min", "max") and term.type in (INT, INT16, INT32):
             # The second operand first, as Python's min and max have it for equal numbers.
-            first, second = (self.term(part, 6) for part in item.parts)
-            return f"({second} {'<' if item.kind == 'min' else '>'} {first} ? {second} : {first})"
-        if item.kind == "call":
-            function = self.functions.get(item.detail, item.detail)
-        elif item.kind == "build":
-            function = f"make_{self.type_name(item.type)}"
-            self.made(item.type)
-        elif item.kind == "part":
+            first, second = (self.term(part, 6) for part in term.parts)
+            sign = "<" if term.kind == "min" else ">"
+            return f"({second} {sign} {first} ? {second} : {first})"
+        if term.kind == "call":
+            function = self.functions.get(term.detail, term.detail)
+        elif term.kind == "build":
+            function = f"make_{self.type_name(term.type)}"
+            self.made(term.type)
+        elif term.kind == "part":
             function = PART
-        elif item.kind in _HELPERS and (item.type == INT or item.kind not in ("abs", "*")):
-            function = _HELPERS[item.kind]
-        elif item.kind in _OF_C:
-            function = _OF_C[item.kind]
+        elif term.kind in _HELPERS and (term.type == INT or term.kind not in ("abs", "*")):
+            function = _HELPERS[term.kind]
+        elif term.kind in _OF_C:
+            function = _OF_C[term.kind]
         else:
             return ""
-        given = [self.term(part) for part in item.parts if not is_empty(part.type)]
-        if item.kind == "part":
+        arguments = [self.term(part) for part in term.parts if not is_empty(part.type)]
+        if term.kind == "part":
             # What each first place has: the product of the further extents.
-            assert isinstance(item.type, Array)
-            sizes = (f"{given[0]}.extent[{at}]" for at in range(1, item.type.dimensions))
-            given.append(" * ".join(sizes) or "1")
-        return f"{function}({', '.join(given)})"
+            assert isinstance(term.type, Array)
+            sizes = (f"{arguments[0]}.extent[{at}]" for at in range(1, term.type.dimensions))
+            arguments.append(" * ".join(sizes) or "1")
+        return f"{function}({', '.join(arguments)})"
 
-    def operation(self, item: Term) -> tuple[str, int]:
+    def operation(self, term: Term) -> tuple[str, int]:
         """An operator between two terms, and its level."""
         # Operators that many misread get brackets around their operands, sums and products only where they need them.
-        level = _LEVELS.get(item.kind, 0)
+        level = _LEVELS.get(term.kind, 0)
         inner = level if level >= _LEVELS["+"] else _LEVELS["+"] if level else _SIGN
-        if item.kind in _WORDS:
-            left, right = (self.term(part, level if part.kind == item.kind else _LEVELS["<"]) for part in item.parts)
+        if term.kind in _WORDS:
+            left, right = (self.term(part, level if part.kind == term.kind else _LEVELS["<"]) for part in term.parts)
         else:
-            left, right = self.term(item.parts[0], inner), self.term(item.parts[1], inner + 1)
-        return f"{left} {_WORDS.get(item.kind, item.kind)} {right}", level or _CHOICE
+            left, right = self.term(term.parts[0], inner), self.term(term.parts[1], inner + 1)
+        return f"{left} {_WORDS.get(term.kind, term.kind)} {right}", level or _CHOICE
 
-    def number(self, item: Term) -> tuple[str, int]:
+    def number(self, term: Term) -> tuple[str, int]:
         """A number as a literal, and how strongly it holds together."""
-        value = item.detail
-        if item.type == BOOL:
+        value = term.detail
+        if term.type == BOOL:
             return ("true" if value else "false"), _ATOM
-        if item.type in (INT16, INT32):
-            text = f"INT32_C({abs(value)})" if item.type == INT32 else str(abs(value))
+        if term.type in (INT16, INT32):
+            text = f"INT32_C({abs(value)})" if term.type == INT32 else str(abs(value))
             return (text, _ATOM) if value >= 0 else (f"-{text}", _SIGN)
-        if item.type == INT:
+        if term.type == INT:
             # Literals of 64 bits: a plain one is an int, which may have 32.
             return (f"INT64_C({value})" if value >= 0 else f"-INT64_C({-value})"), _ATOM if value >= 0 else _SIGN
         if math.isnan(value):
@@ -242,27 +246,27 @@ class CTerms:
             return ("(double)INFINITY", _SIGN) if value > 0.0 else ("-(double)INFINITY", _SIGN)
         return repr(float(value)), _ATOM if math.copysign(1.0, value) > 0.0 else _SIGN
 
-    def listed(self, item: Term) -> str:
+    def listed(self, term: Term) -> str:
         """A struct or tuple as an initialiser: its numbers in braces, and inner structs likewise."""
-        if item.kind != "build":
-            return self.term(item)
-        text = ", ".join(self.listed(part) for part in item.parts if not is_empty(part.type))
-        is_array = isinstance(item.type, Items) and item.type.is_uniform
+        if term.kind != "build":
+            return self.term(term)
+        text = ", ".join(self.listed(part) for part in term.parts if not is_empty(part.type))
+        is_array = isinstance(term.type, Items) and term.type.is_uniform
         return f"{{{{{text}}}}}" if is_array else f"{{{text}}}"
 
-    def conversion(self, item: Term) -> tuple[str, int]:
+    def conversion(self, term: Term) -> tuple[str, int]:
         """A value as another type, and how strongly its text holds together."""
-        given = item.parts[0]
-        if item.type in (INT16, INT32):
-            text = f"({self.term(given, _CHOICE + 1)} ? 1 : 0)" if given.type == BOOL else self.term(given, _SIGN)
-            return f"({'int16_t' if item.type == INT16 else 'int32_t'}){text}", _SIGN
-        if given.type == FLOAT:
+        source = term.parts[0]
+        if term.type in (INT16, INT32):
+            text = f"({self.term(source, _CHOICE + 1)} ? 1 : 0)" if source.type == BOOL else self.term(source, _SIGN)
+            return f"({'int16_t' if term.type == INT16 else 'int32_t'}){text}", _SIGN
+        if source.type == FLOAT:
             # A conversion of NaN or a large float is undefined in C: the prelude says what it gives.
-            return f"ppafo_whole_part({self.term(given)})", _ATOM
-        if given.type == BOOL:
-            one, none = ("1.0", "0.0") if item.type == FLOAT else ("INT64_C(1)", "INT64_C(0)")
-            return f"{self.term(given, _CHOICE + 1)} ? {one} : {none}", _CHOICE
-        return f"(double){self.term(given, _SIGN)}", _SIGN
+            return f"ppafo_whole_part({self.term(source)})", _ATOM
+        if source.type == BOOL:
+            one, none = ("1.0", "0.0") if term.type == FLOAT else ("INT64_C(1)", "INT64_C(0)")
+            return f"{self.term(source, _CHOICE + 1)} ? {one} : {none}", _CHOICE
+        return f"(double){self.term(source, _SIGN)}", _SIGN
 
 
 WIDTH = 118
@@ -301,7 +305,7 @@ def translated(composed: str, collector: SourceCollector) -> str:
 
 def documents_of(collector: SourceCollector) -> dict[str, str]:
     """Docstrings of what was gathered, by the name that it has in a composed module."""
-    return {name: inspect.getdoc(item) or "" for name, item in collector.owners.items()}
+    return {name: inspect.getdoc(owner) or "" for name, owner in collector.owners.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,21 +336,27 @@ def c_source(
     the file with what stands before all of them.
     """
     # What returns nothing but empty rows is never called: an empty value is not written.
-    functions = [item for item in module.functions if item.returns is None or not is_empty(item.returns)]
+    functions = [
+        function for function in module.functions if function.returns is None or not is_empty(function.returns)
+    ]
     names: dict[str, str] = {}
     if reading is not None:
-        for item in functions:
+        for function in functions:
             # A function for further types has their number behind its own name.
-            names[item.name] = f"{reading.names.get(item.source, item.source)}{item.name.removeprefix(item.source)}"
-    writer = _Writer(documents, {names.get(item.name, item.name) for item in functions}, places or {}, names, reading)
+            names[function.name] = (
+                f"{reading.names.get(function.source, function.source)}{function.name.removeprefix(function.source)}"
+            )
+    writer = _Writer(
+        documents, {names.get(function.name, function.name) for function in functions}, places or {}, names, reading
+    )
     before = files("ppafo.translation").joinpath(prelude).read_text(encoding="utf-8")
-    bodies = [writer.function(item) for item in functions]
+    bodies = [writer.function(function) for function in functions]
     # Now all structs have their names, which no local name may hide: what has one is written again.
     names_of_structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
     writer.outer |= names_of_structs
-    for place, item in enumerate(functions):
-        if writer.locals[item.name] & names_of_structs:
-            bodies[place] = writer.function(item)
+    for place, function in enumerate(functions):
+        if writer.locals[function.name] & names_of_structs:
+            bodies[place] = writer.function(function)
     parts = [_PART] if any(f"{PART}(" in body for body in bodies) else []
     structs = [text for kind in writer.structs for text in writer.written_struct(kind)]
     if reading is not None:
@@ -366,7 +376,7 @@ def _prelude_for(prelude: str, used: str) -> str:
     # From the end, so that a part which only a later part uses is kept with it.
     for part in reversed(prelude.split("\n\n")):
         head = part.split("{")[0] if "PPAFO_INLINE" in part else part
-        defined = {name for found in _DEFINES.finditer(head) for name in found.groups() if name}
+        defined = {name for definition in _DEFINES.finditer(head) for name in definition.groups() if name}
         words = set(re.findall(r"\w+", "\n".join([*kept, used])))
         if not defined or words & (defined - {"PPAFO_INLINE"}):
             kept.append(part)
@@ -436,54 +446,55 @@ class _Writer:
         if isinstance(kind, Items) and kind.is_uniform:
             inner, count = self.type_name(kind.types[0]), len(kind.types)
             members = [("", f"{inner}{TIED}item[{count}]")]
-            given = [f"{inner}{TIED}item_{place}" for place in range(count)]
-            made, fill = "made", [f"made.item[{place}] = item_{place};" for place in range(count)]
+            parameters = [f"{inner}{TIED}item_{index}" for index in range(count)]
+            made, fill = "made", [f"made.item[{index}] = item_{index};" for index in range(count)]
         else:
             if isinstance(kind, Row):
                 named = [(member_name(kind, own), inner) for own, inner in kind.fields]
             else:
-                named = [(f"item_{place}", inner) for place, inner in enumerate(types_in(kind))]
+                named = [(f"item_{index}", inner) for index, inner in enumerate(types_in(kind))]
             held = {own: self.type_name(inner) for own, inner in named if not is_empty(inner)}
             members = [(own, f"{inner}{TIED}{own}") for own, inner in held.items()]
             given_as = {own: c_name(own, held, {name, *held.values()}) for own in held}
-            given = [f"{inner}{TIED}{given_as[own]}" for own, inner in held.items()]
+            parameters = [f"{inner}{TIED}{given_as[own]}" for own, inner in held.items()]
             made = c_name("made", given_as.values(), given_as.values())
             fill = [f"{made}.{own} = {given_as[own]};" for own, _ in members]
         said = _comment(self.documents.get(kind.name, "")) if isinstance(kind, Row) else ""
         declared = [f"    {text};".replace(TIED, " ") for _, text in members]
-        head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(given)})")
+        head = _wrapped(f"PPAFO_INLINE {name} make_{name}({', '.join(parameters)})")
         body = ["{", f"    {name} {made};", *(f"    {line}" for line in fill), f"    return {made};", "}", ""]
         if self.reading is not None:
             declared = _together(text for _, text in members)
         struct = [*([said] if said else []), "typedef struct {", *declared, f"}} {name};", ""]
         if self.reading is not None:
-            listed = ", ".join(item.rpartition(TIED)[2] for item in given)
+            listed = ", ".join(parameter.rpartition(TIED)[2] for parameter in parameters)
             both = "{{{}}}" if isinstance(kind, Items) and kind.is_uniform else "{{}}"
             begin = _wrapped(f"    const {name} {made} = {both.replace('{}', listed)};", " " * 8)
             body = ["{", *begin, f"    return {made};", "}", ""]
             return [*struct, *([*head, *body] if kind in self.made else [])]
         return ["\n".join([*struct, *head, *body])]
 
-    def function(self, item: Function) -> str:
+    def function(self, function: Function) -> str:
         """One function with its comment."""
-        self.owner = item.source
-        writer = _Body(self, item, scopes_of(item))
+        self.owner = function.source
+        writer = _Body(self, function, scopes_of(function))
         # An unused parameter is a warning, and warnings are errors where people read the export.
-        unused = [name for name, _ in item.parameters if name not in writer.scopes.read]
-        body = [*(f"    (void){writer.name(name)};" for name in unused), *writer.block(item.body, 1)]
-        self.locals[item.name] = writer.used
-        returns = "void" if item.returns is None else self.type_name(item.returns)
-        changed = writer.scopes.changes.get(id(item.body), {})
-        given = ", ".join(
-            f"{'const ' if isinstance(kind, Shared) and name not in changed else ''}{self.type_name(kind)}"
-            f"{'' if isinstance(kind, Shared) else TIED}{writer.name(name)}"
-            for name, kind in item.parameters
-        )
-        is_shown = item.is_entry and self.reading is None
-        linkage = f"{'PPAFO_ENTRY' if is_shown else 'PPAFO_INLINE'} {returns}"
-        head = _wrapped(f"{linkage} {self.functions.get(item.name, item.name)}({given or 'void'})")
-        bound = [f"Here {text}." for text in item.bound]
-        said = _comment(self.documents.get(item.source, ""), bound)
+        unused = [name for name, _ in function.parameters if name not in writer.scopes.read]
+        body = [*(f"    (void){writer.name(name)};" for name in unused), *writer.block(function.body, 1)]
+        self.locals[function.name] = writer.used
+        returns = "void" if function.returns is None else self.type_name(function.returns)
+        changed = writer.scopes.changes.get(id(function.body), {})
+        declared = []
+        for name, kind in function.parameters:
+            constant = "const " if isinstance(kind, Shared) and name not in changed else ""
+            between = "" if isinstance(kind, Shared) else TIED
+            declared.append(f"{constant}{self.type_name(kind)}{between}{writer.name(name)}")
+        parameters = ", ".join(declared)
+        is_shown = function.is_entry and self.reading is None
+        linkage = f"PPAFO_ENTRY {returns}" if is_shown else f"PPAFO_INLINE {returns}"
+        head = _wrapped(f"{linkage} {self.functions.get(function.name, function.name)}({parameters or 'void'})")
+        bound = [f"Here {text}." for text in function.bound]
+        said = _comment(self.documents.get(function.source, ""), bound)
         prototype = [*head[:-1], f"{head[-1]};", ""] if is_shown else []
         return "\n".join([*prototype, *([said] if said else []), *head, "{", *body, "}", ""])
 
@@ -491,13 +502,13 @@ class _Writer:
 class _Body:
     """The lines of one function."""
 
-    def __init__(self, writer: _Writer, item: Function, scopes: Scopes) -> None:
+    def __init__(self, writer: _Writer, function: Function, scopes: Scopes) -> None:
         self.writer = writer
-        of_all, own = writer.places, f"{item.source}."
+        of_all, own = writer.places, f"{function.source}."
         of_one = {key.removeprefix(own): names for key, names in of_all.items() if key.startswith(own)}
         self.terms = CTerms(writer.type_name, self.name, {**of_all, **of_one}, writer.functions, writer.made.add)
         self.scopes = scopes
-        self.kinds: dict[str, Type] = dict(item.parameters) | scopes.types
+        self.kinds: dict[str, Type] = dict(function.parameters) | scopes.types
         self.written: dict[str, str] = {}
         self.used: set[str] = set()
 
@@ -522,91 +533,91 @@ class _Body:
             lines += self.statement(statement, level)
         return lines
 
-    def statement(self, item: Statement, level: int) -> Iterator[str]:
+    def statement(self, statement: Statement, level: int) -> Iterator[str]:
         """A statement with its blocks, line by line."""
-        match item:
+        match statement:
             case typed.Assign():
                 # What nobody reads is not written: a compiler would warn of it.
-                if item.name in self.scopes.read and not is_empty(item.value.type):
-                    starts = self.scopes.first.get(id(item), "")
-                    declared = f"{starts}{self.writer.type_name(item.value.type)} " if starts else ""
+                if statement.name in self.scopes.read and not is_empty(statement.value.type):
+                    starts = self.scopes.first.get(id(statement), "")
+                    declared = f"{starts}{self.writer.type_name(statement.value.type)} " if starts else ""
                     is_listed = starts and self.writer.reading is not None
-                    value = self.terms.listed(item.value) if is_listed else self.terms.term(item.value)
-                    yield from self.line(f"{declared.replace('let ', '')}{self.name(item.name)} = {value};", level)
+                    value = self.terms.listed(statement.value) if is_listed else self.terms.term(statement.value)
+                    yield from self.line(f"{declared.replace('let ', '')}{self.name(statement.name)} = {value};", level)
             case typed.Store():
-                yield from self.store(item, level)
+                yield from self.store(statement, level)
             case typed.Return():
                 value = ""
                 # Where people read, a struct that is returned has a name.
-                if item.value.kind == "build" and self.writer.reading is not None:
+                if statement.value.kind == "build" and self.writer.reading is not None:
                     value = c_name("made", self.kinds, {*self.writer.outer, *map(self.name, self.kinds)})
-                    kind = self.writer.type_name(item.value.type)
-                    yield from self.line(f"const {kind} {value} = {self.terms.listed(item.value)};", level)
-                yield from self.line(f"return {value or self.terms.term(item.value)};", level)
+                    kind = self.writer.type_name(statement.value.type)
+                    yield from self.line(f"const {kind} {value} = {self.terms.listed(statement.value)};", level)
+                yield from self.line(f"return {value or self.terms.term(statement.value)};", level)
             case typed.Count():
-                yield from self.counted_loop(item, level)
+                yield from self.counted_loop(statement, level)
             case typed.If() | typed.While():
-                word = "while" if isinstance(item, typed.While) else "if"
-                yield from self.line(f"{word} ({self.terms.term(item.test)}) {{", level)
-                yield from self.block(item.body, level + 1)
-                if isinstance(item, typed.If) and item.otherwise:
+                word = "while" if isinstance(statement, typed.While) else "if"
+                yield from self.line(f"{word} ({self.terms.term(statement.test)}) {{", level)
+                yield from self.block(statement.body, level + 1)
+                if isinstance(statement, typed.If) and statement.otherwise:
                     yield from self.line("} else {", level)
-                    yield from self.block(item.otherwise, level + 1)
+                    yield from self.block(statement.otherwise, level + 1)
                 yield from self.line("}", level)
             case _:
-                yield from self.line(self.plain_line(item), level)
+                yield from self.line(self.plain_line(statement), level)
 
-    def plain_line(self, item: typed.Note | typed.Reserve | typed.Perform | typed.Leave) -> str:
+    def plain_line(self, statement: typed.Note | typed.Reserve | typed.Perform | typed.Leave) -> str:
         """A statement that is one line as it stands."""
-        match item:
+        match statement:
             case typed.Note():
-                return _comment(item.text)
+                return _comment(statement.text)
             case typed.Reserve():
-                extents = "".join(f"[{extent}]" for extent in item.type.shape)
-                return f"PPAFO_ALIGNED double {self.name(item.name)}{extents};"
+                extents = "".join(f"[{extent}]" for extent in statement.type.shape)
+                return f"PPAFO_ALIGNED double {self.name(statement.name)}{extents};"
             case typed.Perform():
-                name = self.writer.functions.get(item.function, item.function)
-                return f"{name}({', '.join(map(self.terms.term, item.given))});"
+                name = self.writer.functions.get(statement.function, statement.function)
+                return f"{name}({', '.join(map(self.terms.term, statement.given))});"
             case typed.Leave():
-                return f"{item.word};"
+                return f"{statement.word};"
 
     def line(self, text: str, level: int) -> Iterator[str]:
         yield from _wrapped("    " * level + text, "    " * (level + 1))
 
-    def store(self, item: typed.Store, level: int) -> Iterator[str]:
+    def store(self, store: typed.Store, level: int) -> Iterator[str]:
         """An element of an array or a field of a row gets a value."""
-        value = item.value
+        value = store.value
         # Member by member reads better, but only where no member is read on the right.
-        is_read = self.writer.reading is not None and not value.reads & item.element.reads
+        is_read = self.writer.reading is not None and not value.reads & store.element.reads
         if is_read and value.kind == "build" and isinstance(value.type, Row):
             for (name, kind), part in zip(value.type.fields, value.parts, strict=True):
                 if not is_empty(kind):
-                    yield from self.store(typed.Store(Term("field", kind, (item.element,), name), part), level)
+                    yield from self.store(typed.Store(Term("field", kind, (store.element,), name), part), level)
             return
-        yield from self.line(f"{self.terms.term(item.element)} = {self.terms.term(item.value)};", level)
+        yield from self.line(f"{self.terms.term(store.element)} = {self.terms.term(store.value)};", level)
 
-    def counted_loop(self, item: typed.Count, level: int) -> Iterator[str]:
+    def counted_loop(self, loop: typed.Count, level: int) -> Iterator[str]:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
-        name = self.name(item.name)
-        is_own = id(item) in self.scopes.counted or item.name not in self.scopes.read
+        name = self.name(loop.name)
+        is_own = id(loop) in self.scopes.counted or loop.name not in self.scopes.read
         # A loop's name ends at its last value in Python, one further in C.
         counter = name if is_own else f"{name}_next"
         while not is_own and counter in {*map(self.name, self.kinds), *self.writer.outer}:
             counter += "_"
         self.used.add(counter)
-        sign, change = ("<", f"++{counter}") if item.step == 1 else (">", f"{counter} += {item.step}")
-        sign = "<" if item.step > 0 else ">"
-        start, stop = self.terms.term(item.start), self.terms.term(item.stop, 6)
-        if item.name == LANE:
+        sign, change = ("<", f"++{counter}") if loop.step == 1 else (">", f"{counter} += {loop.step}")
+        sign = "<" if loop.step > 0 else ">"
+        start, stop = self.terms.term(loop.start), self.terms.term(loop.stop, 6)
+        if loop.name == LANE:
             # Without the pragma gcc fears that lanes overlap, and takes them one by one.
             yield from self.line("PPAFO_SIDE_BY_SIDE", level)
         yield from self.line(
-            f"for ({self.writer.type_name(item.start.type)} {counter} = {start}; {counter} {sign} {stop}; {change}) {{",
+            f"for ({self.writer.type_name(loop.start.type)} {counter} = {start}; {counter} {sign} {stop}; {change}) {{",
             level,
         )
         if not is_own:
             yield from self.line(f"{name} = {counter};", level + 1)
-        yield from self.block(item.body, level + 1)
+        yield from self.block(loop.body, level + 1)
         yield from self.line("}", level)
 
 
@@ -631,4 +642,4 @@ def _wrapped(line: str, further: str = "    ") -> list[str]:
         break_long_words=False,
         break_on_hyphens=False,
     )
-    return [item.replace(TIED, " ") for item in lines]
+    return [line.replace(TIED, " ") for line in lines]

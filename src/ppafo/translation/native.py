@@ -64,10 +64,10 @@ class NativeEntry:
     dimensions: tuple[int, ...]
     layout: struct.Struct
 
-    def __call__(self, *given: Any) -> None:
+    def __call__(self, *arguments: Any) -> None:
         """Call it with arrays, and the numbers that follow them."""
         count = len(self.dimensions)
-        self.function(self._packed(given[:count]), *given[count:])
+        self.function(self._packed(arguments[:count]), *arguments[count:])
 
     def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
         """The entry as a function of what follows these arrays, which it keeps.
@@ -104,8 +104,8 @@ def with_packed_entries(source: str, entries: Entries) -> str:
             for place, kind in enumerate(types[len(arrays) :])
         }
         taken = ", ".join(["const ppafo_array *arrays", *(f"{kind} {number}" for number, kind in numbers.items())])
-        given = ", ".join([*(f"arrays[{place}]" for place in range(len(arrays))), *numbers])
-        texts.append(f"void {name}{_PACKED}({taken})\n{{\n    {name}({given});\n}}\n")
+        packed = ", ".join([*(f"arrays[{place}]" for place in range(len(arrays))), *numbers])
+        texts.append(f"void {name}{_PACKED}({taken})\n{{\n    {name}({packed});\n}}\n")
     return "\n".join([*texts, _ROUNDING])
 
 
@@ -224,25 +224,25 @@ def compiler(name: str) -> CCompiler:
 def _command(name: str) -> tuple[str, ...]:
     """The command of a compiler; empty where it is not on this machine."""
     if name != "zig":
-        found = which(name)
-        return (found,) if found else ()
+        compiler = which(name)
+        return (compiler,) if compiler else ()
     # The package brings a compiler of one version; a zig on the path is whatever the user has.
     package = importlib.util.find_spec("ziglang")
     if package is not None and package.origin is not None:
         return (str(Path(package.origin).with_name("zig.exe" if sys.platform == "win32" else "zig")), "cc")
-    found = which("zig")
-    return (found, "cc") if found else ()
+    compiler = which("zig")
+    return (compiler, "cc") if compiler else ()
 
 
 @cache
 def _file_identity(command: str) -> tuple[str, int, int]:
     """Where a compiler's file is, its size and its time: an update changes them, and no process need be started."""
-    place = Path(command).resolve()
+    file = Path(command).resolve()
     try:
-        found = place.stat()
+        status = file.stat()
     except OSError:
-        return str(place), 0, 0
-    return str(place), found.st_size, found.st_mtime_ns
+        return str(file), 0, 0
+    return str(file), status.st_size, status.st_mtime_ns
 
 
 @cache
@@ -260,12 +260,12 @@ def described_processor() -> str:
 @cache
 def translator_hash() -> str:
     """Hash of the translator: the same text may become other C in another version of it."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     # Sorted: folders list their files in no order.
     for file in sorted(Path(__file__).parent.iterdir()):
         if file.suffix in (".py", ".h"):
-            found.update(file.read_bytes())
-    return found.hexdigest()
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
 
 
 def translated_text(source: str) -> str:

@@ -4,12 +4,13 @@ What the engine steps and what is differentiated here are the same functions: po
 energy balance, vane. Only the sums of equation (9) and the state of the vane, which stands or slides, are said here.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
 from ppafo.model.orifice import orifice_flow
+from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import (
     Openings,
     PlantParameters,
@@ -23,9 +24,9 @@ from ppafo.model.plant import (
     pressures_per_mass,
 )
 from ppafo.model.ports import gas_density, leakage_path
-from ppafo.translation.symbolic import Acting, Compare, both_sides, symbolic
+from ppafo.translation.symbolic import Acting, Compare, Wrapper, both_sides, symbolic
 
-Around = Mapping[Any, Callable[..., Any]]
+Around = Mapping[PlainFunction, Wrapper]
 
 
 class GasFlows(NamedTuple):
@@ -103,9 +104,9 @@ def gas_rates(
     Equation (3) is differentiated, (6) to (9) are the engine's. ``acting`` as in ``symbolic``.
     """
     flows = symbolic(gas_flows, PlantParameters, Openings, float, float, compare=compare, acting=acting)
-    found = flows(plant, openings, *pressures)
+    gas = flows(plant, openings, *pressures)
     # Flows are true masses; where the gas is not ideal its content grows by another amount.
-    gained = found.mass_1, found.mass_2
+    gained = gas.mass_1, gas.mass_2
     if any(gas_density in effect.laws for effect in acting or ()):
         types = (PlantParameters, float, float, float, float, float, float)
         gained = symbolic(real_gas_rates, *types, compare=compare, acting=acting)(
@@ -117,8 +118,8 @@ def gas_rates(
         pressure_2=slopes[1],
         temperature_1=0.0,
         temperature_2=0.0,
-        supplied=found.supplied,
-        vented=found.vented,
+        supplied=gas.supplied,
+        vented=gas.vented,
     )
 
 
@@ -153,17 +154,17 @@ def thermal_gas_rates(
     masses = ThermalState(
         mass_1=mass_1, mass_2=mass_2, supplied_content=0.0, vented_content=0.0, heat_content=0.0, gas_work=0.0
     )
-    found = flows(plant, thermal, openings, state, masses, *pressures)
+    gas = flows(plant, thermal, openings, state, masses, *pressures)
     # The contents hold the work of the moving wall already: only the volumes are left of equation (3).
-    slopes = _pressure_rates(plant, angle, rate, pressures, (found.content_1, found.content_2), acting)
+    slopes = _pressure_rates(plant, angle, rate, pressures, (gas.content_1, gas.content_2), acting)
     # A temperature is the walls' times gas content over mass.
     return PlantRates(
         pressure_1=slopes[0],
         pressure_2=slopes[1],
-        temperature_1=temperatures[0] * (found.content_1 / content_1 - found.mass_1 / mass_1),
-        temperature_2=temperatures[1] * (found.content_2 / content_2 - found.mass_2 / mass_2),
-        supplied=found.supplied,
-        vented=found.supplied - found.mass_1 - found.mass_2,
+        temperature_1=temperatures[0] * (gas.content_1 / content_1 - gas.mass_1 / mass_1),
+        temperature_2=temperatures[1] * (gas.content_2 / content_2 - gas.mass_2 / mass_2),
+        supplied=gas.supplied,
+        vented=gas.supplied - gas.mass_1 - gas.mass_2,
     )
 
 

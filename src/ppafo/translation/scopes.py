@@ -73,7 +73,7 @@ class Scopes:
         else:
             loops = {id(statement) for statement in mentions if self.counts(name, statement)}
             self.counted |= loops
-            for inner in self.blocks(name, tuple(item for item in mentions if id(item) not in loops)):
+            for inner in self.blocks(name, tuple(mention for mention in mentions if id(mention) not in loops)):
                 self.place(name, inner)
 
     def is_own(self, name: str, body: Block) -> bool:
@@ -136,12 +136,12 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
 
 def scopes_of(function: Function) -> Scopes:
     """Where each local name of a function is declared."""
-    found = Scopes()
-    found.look(function.body)
+    scopes = Scopes()
+    scopes.look(function.body)
     # In order of names: the order of a set changes from process to process, and an export has one text.
-    for name in sorted(found.types.keys() - {name for name, _ in function.parameters}):
-        found.place(name, function.body)
-    return found
+    for name in sorted(scopes.types.keys() - {name for name, _ in function.parameters}):
+        scopes.place(name, function.body)
+    return scopes
 
 
 def _begins(statement: Statement, name: str) -> bool:
@@ -200,14 +200,14 @@ class Names:
         loops = [node for node in nodes if isinstance(node, ast.For) and _counts_up(node)]
         counting = [node.target.id for node in loops if isinstance(node.target, ast.Name)]
         stored = [node.id for node in named if isinstance(node.ctx, ast.Store)]
-        given = {node.arg for node in nodes if isinstance(node, ast.arg)}
-        counters = {name for name in counting if counting.count(name) == stored.count(name)} - given
-        return cls(frozenset(every | given), frozenset(read), frozenset(counters))
+        parameters = {node.arg for node in nodes if isinstance(node, ast.arg)}
+        counters = {name for name in counting if counting.count(name) == stored.count(name)} - parameters
+        return cls(frozenset(every | parameters), frozenset(read), frozenset(counters))
 
 
 def changed(body: Iterable[ast.stmt]) -> set[str]:
     """Names that some statements give values."""
-    found: set[str] = set()
+    names: set[str] = set()
     for statement in body:
         targets: list[ast.expr] = []
         if isinstance(statement, ast.Assign):
@@ -216,10 +216,10 @@ def changed(body: Iterable[ast.stmt]) -> set[str]:
             targets = [statement.target]
         for target in targets:
             parts = target.elts if isinstance(target, ast.Tuple) else [target]
-            found.update(part.id for part in parts if isinstance(part, ast.Name))
+            names.update(part.id for part in parts if isinstance(part, ast.Name))
         if isinstance(statement, ast.If | ast.For | ast.While):
-            found |= changed(statement.body) | changed(statement.orelse)
-    return found
+            names |= changed(statement.body) | changed(statement.orelse)
+    return names
 
 
 def _nodes(definition: ast.FunctionDef) -> Iterator[ast.AST]:
@@ -252,4 +252,4 @@ def _counts_up(node: ast.For) -> bool:
         return False
     bounds = node.iter.args
     literals = [bounds[0], *bounds[2:]] if len(bounds) > 1 else []
-    return all(isinstance(item, ast.Constant) for item in literals)
+    return all(isinstance(literal, ast.Constant) for literal in literals)

@@ -11,13 +11,14 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Any
+from typing import Any, Protocol
 
 from ppafo.engine.linking import link_effects
 from ppafo.engine.rows import is_number, is_row, members
 from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.model.effects.kind import Effect
+from ppafo.model.plain_function import PlainFunction
 from ppafo.translation import typed
 from ppafo.translation.typed import Function, Statement, Term
 from ppafo.translation.value_types import FLOAT, INT, Handed, Items, Row, Type, is_empty
@@ -25,7 +26,16 @@ from ppafo.translation.walk import walk_module
 
 Compare = Callable[[str, Any, Any, str], Any]
 """From a sign, two values and where they are compared: the expression of it, or a truth value where it is decided."""
-Around = Mapping[str, Callable[..., Any]]
+
+
+class Wrapper(Protocol):
+    """What stands before a function of the model: it is called with that function and with its arguments."""
+
+    def __call__(self, function: Callable[..., Any], /, *arguments: Any) -> Any:
+        """Return what stands for the function's value."""
+
+
+Around = Mapping[str, Wrapper]
 Acting = Mapping[Effect, Any]
 """Effects in the order in which they act, with their parameters."""
 
@@ -41,7 +51,7 @@ _COMPARISONS: dict[str, Callable[[Any, Any], Any]] = {
     **{"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
     **{"==": operator.eq, "!=": operator.ne},
 }
-_ARITHMETIC: dict[str, Callable[..., Any]] = {
+_ARITHMETIC: dict[str, Any] = {
     **{"+": operator.add, "-": operator.sub, "*": operator.mul, "//": operator.floordiv, "%": operator.mod},
     **{"&": operator.and_, "|": operator.or_, "^": operator.xor, ">>": operator.rshift},
     "/": _quotient,
@@ -73,10 +83,10 @@ class Symbolic:
         """The function's value, in its own units."""
         # Structs of effects come first, as in every composed function.
         every = (*self.rows, *values)
-        given = [value for value, is_given in zip(every, self.walked.is_given, strict=True) if is_given]
-        return self.result(self.walked.functions[self.walked.name], given)
+        arguments = [value for value, is_given in zip(every, self.walked.is_given, strict=True) if is_given]
+        return self.result(self.walked.functions[self.walked.name], arguments)
 
-    def result(self, function: Function, given: list[Any]) -> Any:
+    def result(self, function: Function, arguments: list[Any]) -> Any:
         """The value of one function of the module for arguments that are not empty."""
 
         def own(*values: Any) -> Any:
@@ -85,13 +95,13 @@ class Symbolic:
             return call.block(function.body, dict(zip(names, values, strict=True)))
 
         before = self.around.get(function.source)
-        return own(*given) if before is None else before(own, *given)
+        return own(*arguments) if before is None else before(own, *arguments)
 
 
 def symbolic(
-    function: Callable[..., Any],
-    *given: type | Callable[..., Any],
-    around: Mapping[Callable[..., Any], Callable[..., Any]] | None = None,
+    function: PlainFunction,
+    *given: type | PlainFunction,
+    around: Mapping[PlainFunction, Wrapper] | None = None,
     compare: Compare = both_sides,
     acting: Acting | None = None,
 ) -> Symbolic:
@@ -101,7 +111,7 @@ def symbolic(
     in it, with their parameters. ProgramError, with file and line,
     for what is outside the subset.
     """
-    before = {emitted_name(item): wrapper for item, wrapper in (around or {}).items()}
+    before = {emitted_name(wrapped): wrapper for wrapped, wrapper in (around or {}).items()}
     rows = {effect.name: row for effect, row in (acting or {}).items()}
     effects = tuple(acting or ())
     # A function of the model that has changed since, as in a notebook, is walked again.
@@ -126,9 +136,7 @@ class _Walked:
 
 
 @lru_cache(maxsize=32)
-def _walked(
-    function: Callable[..., Any], given: tuple[type | Callable[..., Any], ...], effects: tuple[Effect, ...]
-) -> _Walked:
+def _walked(function: PlainFunction, given: tuple[type | PlainFunction, ...], effects: tuple[Effect, ...]) -> _Walked:
     """The typed functions of a function of the model, for types of its parameters, with effects in their order."""
     collector = SourceCollector("@function")
     link_effects(effects, collector)
@@ -139,29 +147,32 @@ def _walked(
     if stated:
         raise SimulationError(f"effect '{stated[0]}' has a state of its own, which no linear model has: switch it off")
     first = [asked[row] for row in needed]
-    types = tuple(_type_of(item, collector) for item in (*first, *given))
+    types = tuple(_type_of(kind, collector) for kind in (*first, *given))
     module = walk_module(collector.text(), {name: types})
     places = {
-        own: f"{item.__module__.removeprefix('ppafo.')}.{item.__qualname__}" for own, item in collector.owners.items()
+        own: f"{owner.__module__.removeprefix('ppafo.')}.{owner.__qualname__}"
+        for own, owner in collector.owners.items()
     }
-    functions = {item.name: item for item in module.functions}
-    return _Walked(collector, functions, places, name, tuple(not is_empty(item) for item in types))
+    functions = {member.name: member for member in module.functions}
+    return _Walked(collector, functions, places, name, tuple(not is_empty(kind) for kind in types))
 
 
-def _type_of(item: Any, collector: SourceCollector) -> Type:
+def _type_of(kind: Any, collector: SourceCollector) -> Type:
     """The type of a parameter; functions and rows are added to the module."""
-    if is_row(item):
-        name = collector.add(item)
-        return Row(name, tuple((way.removeprefix("."), _type_of(kind, collector)) for way, kind in members(item)))
-    if isinstance(item, type) and is_number(item):
+    if is_row(kind):
+        name = collector.add(kind)
+        return Row(name, tuple((way.removeprefix("."), _type_of(kind, collector)) for way, kind in members(kind)))
+    if isinstance(kind, type) and is_number(kind):
         return FLOAT
-    if callable(item) and not members(item):
-        return Handed(collector.add(item))
-    return Items(tuple(_type_of(kind, collector) for _, kind in members(item)))
+    if callable(kind) and not members(kind):
+        return Handed(collector.add(kind))
+    return Items(tuple(_type_of(kind, collector) for _, kind in members(kind)))
 
 
-_row_class: Callable[[str, tuple[str, ...]], Any] = lru_cache(maxsize=256)(namedtuple)
-"""Classes of rows whose fields hold expressions."""
+@lru_cache(maxsize=256)
+def _class_of_row(name: str, fields: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+    """The class of a row whose fields hold expressions; one for each name with its fields."""
+    return namedtuple(name, fields)
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,48 +187,48 @@ class _Call:
 
     def block(self, body: tuple[Statement, ...], names: dict[str, Any]) -> Any:
         """What some statements return, None where they return nothing; ``names`` are changed."""
-        for place, item in enumerate(body):
-            if isinstance(item, typed.Return):
-                return self.value(item.value, names)
-            if isinstance(item, typed.Assign):
-                names[item.name] = self.value(item.value, names)
-            elif isinstance(item, typed.Count):
-                self.counted(item, names)
-            elif isinstance(item, typed.If):
-                test = self.value(item.test, names)
+        for index, statement in enumerate(body):
+            if isinstance(statement, typed.Return):
+                return self.value(statement.value, names)
+            if isinstance(statement, typed.Assign):
+                names[statement.name] = self.value(statement.value, names)
+            elif isinstance(statement, typed.Count):
+                self.counted(statement, names)
+            elif isinstance(statement, typed.If):
+                test = self.value(statement.test, names)
                 if isinstance(test, bool):
-                    found = self.block(item.body if test else item.otherwise, names)
-                    if found is not None:
-                        return found
-                elif _returns(item):
+                    value = self.block(statement.body if test else statement.otherwise, names)
+                    if value is not None:
+                        return value
+                elif _returns(statement):
                     # A branch that may return takes what follows with it, on both ways: an expression has one value.
-                    rest = body[place + 1 :]
-                    yes, no = (self.block((*way, *rest), dict(names)) for way in (item.body, item.otherwise))
+                    rest = body[index + 1 :]
+                    yes, no = (self.block((*way, *rest), dict(names)) for way in (statement.body, statement.otherwise))
                     return self.chosen(test, yes, no)
                 else:
-                    self.branched(item, test, names)
+                    self.branched(statement, test, names)
             else:
-                raise self.refused(f"'{type(item).__name__.lower()}' of the lane loop")
+                raise self.refused(f"'{type(statement).__name__.lower()}' of the lane loop")
         return None
 
-    def branched(self, item: typed.If, test: Any, names: dict[str, Any]) -> None:
+    def branched(self, branch: typed.If, test: Any, names: dict[str, Any]) -> None:
         """Both ways of a branch, and for each name the value that holds."""
         yes, no = dict(names), dict(names)
-        self.block(item.body, yes)
-        self.block(item.otherwise, no)
+        self.block(branch.body, yes)
+        self.block(branch.otherwise, no)
         for name in yes.keys() | no.keys():
             one, other = yes.get(name, no.get(name)), no.get(name, yes.get(name))
             names[name] = one if one is other else self.chosen(test, one, other)
 
-    def counted(self, item: typed.Count, names: dict[str, Any]) -> None:
+    def counted(self, loop: typed.Count, names: dict[str, Any]) -> None:
         """A loop, written out."""
-        start, stop = self.value(item.start, names), self.value(item.stop, names)
-        if not isinstance(start, int) or not isinstance(stop, int) or _returns(item):
-            raise self.refused(f"a loop over '{item.name}' whose end is not written out")
+        start, stop = self.value(loop.start, names), self.value(loop.stop, names)
+        if not isinstance(start, int) or not isinstance(stop, int) or _returns(loop):
+            raise self.refused(f"a loop over '{loop.name}' whose end is not written out")
         # CasADi has no loops that fit here: each turn becomes expressions of its own.
-        for number in range(start, stop, item.step):
-            names[item.name] = number
-            self.block(item.body, names)
+        for number in range(start, stop, loop.step):
+            names[loop.name] = number
+            self.block(loop.body, names)
 
     def value(self, term: Term, names: dict[str, Any]) -> Any:
         """The value of a term."""
@@ -226,50 +237,50 @@ class _Call:
         parts = [self.value(part, names) for part in term.parts]
         match term.kind:
             case "call":
-                found = self.home.result(self.home.walked.functions[term.detail], parts)
+                value = self.home.result(self.home.walked.functions[term.detail], parts)
             case "build" if isinstance(term.type, Row):
-                found = _row_class(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
+                value = _class_of_row(term.type.name, tuple(name for name, _ in term.type.fields))(*parts)
             case "build":
-                found = tuple(parts)
+                value = tuple(parts)
             case "field":
-                found = getattr(parts[0], term.detail)
+                value = getattr(parts[0], term.detail)
             case "item":
-                found = parts[0][parts[1] if len(parts) > 1 else term.detail]
+                value = parts[0][parts[1] if len(parts) > 1 else term.detail]
             case "choice":
-                found = self.chosen(*parts)
+                value = self.chosen(*parts)
             case "min" | "max":
-                found = self.extreme(term, *parts)
+                value = self.extreme(term, *parts)
             case _:
-                found = self.calculated(term, parts)
-        return found
+                value = self.calculated(term, parts)
+        return value
 
     def calculated(self, term: Term, parts: list[Any]) -> Any:
         """A number or truth value that is worked out from others."""
         import casadi
 
-        given, is_symbol = parts[0], isinstance(parts[0], casadi.SX)
+        first, is_symbol = parts[0], isinstance(parts[0], casadi.SX)
         if term.kind in _COMPARISONS:
-            found = self.compared(term.kind, parts[0], parts[1], _text(term))
+            compared = self.compared(term.kind, parts[0], parts[1], _text(term))
         elif term.kind in ("and", "or", "not"):
-            found = _logical(term.kind, *parts)
+            compared = _logical(term.kind, *parts)
         elif term.kind == "abs":
-            is_negative = self.compared("<", given, 0.0, f"{_text(term.parts[0])} < 0.0")
-            found = (-given if is_negative else given) if isinstance(is_negative, bool) else casadi.fabs(given)
+            is_negative = self.compared("<", first, 0.0, f"{_text(term.parts[0])} < 0.0")
+            compared = (-first if is_negative else first) if isinstance(is_negative, bool) else casadi.fabs(first)
         elif term.kind == "sqrt" and is_symbol:
-            found = casadi.sqrt(given)
+            compared = casadi.sqrt(first)
         elif term.kind == "sqrt":
-            found = math.sqrt(given) if given >= 0.0 else math.nan
+            compared = math.sqrt(first) if first >= 0.0 else math.nan
         elif term.kind == "convert":
             if is_symbol and term.type == INT:
                 raise self.refused("the whole part of a number")
-            found = given if is_symbol else int(given) if term.type == INT else float(given)
+            compared = first if is_symbol else int(first) if term.type == INT else float(first)
         elif term.kind not in _ARITHMETIC:
             raise self.refused(f"'{term.kind}' of the lane loop")
         elif term.kind in _WHOLE_ONLY and not all(isinstance(part, int) for part in parts):
             raise self.refused(f"'{_text(term)}' of whole numbers")
         else:
-            found = _ARITHMETIC[term.kind](*parts)
-        return found
+            compared = _ARITHMETIC[term.kind](*parts)
+        return compared
 
     def compared(self, sign: str, left: Any, right: Any, words: str) -> Any:
         """A comparison: a truth value where both numbers are known or it is decided, else an expression."""
@@ -331,13 +342,13 @@ def _text(term: Term, is_inside: bool = False) -> str:
     return f"({text})" if is_inside else text
 
 
-def _returns(item: Statement) -> bool:
+def _returns(statement: Statement) -> bool:
     """True where a statement may end its function or its loop."""
-    if isinstance(item, typed.Return | typed.Leave):
+    if isinstance(statement, typed.Return | typed.Leave):
         return True
-    if isinstance(item, typed.If):
-        return any(map(_returns, (*item.body, *item.otherwise)))
-    return isinstance(item, typed.Count | typed.While) and any(map(_returns, item.body))
+    if isinstance(statement, typed.If):
+        return any(map(_returns, (*statement.body, *statement.otherwise)))
+    return isinstance(statement, typed.Count | typed.While) and any(map(_returns, statement.body))
 
 
 def _logical(word: str, left: Any, right: Any = None) -> Any:

@@ -86,28 +86,28 @@ def types_in(kind: Items | Row) -> tuple[Type, ...]:
     return kind.types if isinstance(kind, Items) else tuple(inner for _, inner in kind.fields)
 
 
-def joined(one: Type, other: Type) -> Type | None:
+def joined(first: Type, other: Type) -> Type | None:
     """The type that holds both, as where two branches meet; None where there is none."""
-    if one == other:
-        return one
-    if isinstance(one, Scalar) and isinstance(other, Scalar):
-        return max(one, other, key=_ORDER.index)
+    if first == other:
+        return first
+    if isinstance(first, Scalar) and isinstance(other, Scalar):
+        return max(first, other, key=_ORDER.index)
     # Tuples of different lengths have no common type.
-    if isinstance(one, Items) and isinstance(other, Items) and len(one.types) == len(other.types):
-        types = [joined(*pair) for pair in zip(one.types, other.types, strict=True)]
-        return None if None in types else Items(tuple(item for item in types if item is not None))
-    if isinstance(one, Row) and isinstance(other, Row) and one.name == other.name:
-        pairs = zip(one.fields, other.fields, strict=True)
+    if isinstance(first, Items) and isinstance(other, Items) and len(first.types) == len(other.types):
+        types = [joined(*pair) for pair in zip(first.types, other.types, strict=True)]
+        return None if None in types else Items(tuple(kind for kind in types if kind is not None))
+    if isinstance(first, Row) and isinstance(other, Row) and first.name == other.name:
+        pairs = zip(first.fields, other.fields, strict=True)
         found = [(name, joined(inner, outer)) for (name, inner), (_, outer) in pairs]
         fields = tuple((name, kind) for name, kind in found if kind is not None)
-        return Row(one.name, fields) if len(fields) == len(found) else None
+        return Row(first.name, fields) if len(fields) == len(found) else None
     return None
 
 
-def mixes(one: Type, other: Type) -> bool:
+def mixes(first: Type, other: Type) -> bool:
     """True where one has a whole number or truth value in the place of a float: -0 and large ones would differ."""
-    if isinstance(one, Scalar) and isinstance(other, Scalar):
-        return one != other and FLOAT in (one, other)
-    if isinstance(one, Items | Row) and isinstance(other, Items | Row):
-        return any(mixes(*pair) for pair in zip(types_in(one), types_in(other), strict=True))
+    if isinstance(first, Scalar) and isinstance(other, Scalar):
+        return first != other and FLOAT in (first, other)
+    if isinstance(first, Items | Row) and isinstance(other, Items | Row):
+        return any(mixes(*pair) for pair in zip(types_in(first), types_in(other), strict=True))
     return False

@@ -76,36 +76,32 @@ class Expressions:
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
         """The value of an expression that must be one number, as ``least`` or a wider type."""
-        found = self.term(node)
-        if not isinstance(found.type, Scalar):
+        term = self.term(node)
+        if not isinstance(term.type, Scalar):
             raise self.refused(node, f"'{ast.unparse(node)}' is not one number")
-        kind = joined(found.type, least)
+        kind = joined(term.type, least)
         assert kind is not None
-        return converted(found, kind)
+        return converted(term, kind)
 
     def whole(self, node: ast.expr) -> Term:
         """The value of an expression that must be a whole number."""
-        found = self.scalar(node, INT)
-        if found.type != INT:
+        term = self.scalar(node, INT)
+        if term.type != INT:
             raise self.refused(node, f"'{ast.unparse(node)}' is no whole number")
-        return found
+        return term
 
     def condition(self, node: ast.expr) -> Term:
         """Whether an expression is true."""
         if isinstance(node, ast.BoolOp):
-            return _linked(node, [self.condition(item) for item in node.values])
-        found = self.scalar(node)
-        return (
-            found
-            if found.type == BOOL
-            else Term("!=", BOOL, (found, converted(Term("number", INT, (), 0), found.type)))
-        )
+            return _linked(node, [self.condition(value) for value in node.values])
+        term = self.scalar(node)
+        return term if term.type == BOOL else Term("!=", BOOL, (term, converted(Term("number", INT, (), 0), term.type)))
 
     def part(self, node: ast.expr) -> slice:
         """A part of a tuple, whose bounds are literal."""
         if not isinstance(node, ast.Slice) or node.step is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' is no part of a tuple")
-        return slice(*(None if item is None else self.literal(item) for item in (node.lower, node.upper)))
+        return slice(*(None if bound is None else self.literal(bound) for bound in (node.lower, node.upper)))
 
     def literal(self, node: ast.expr) -> int:
         """A whole number that is written out."""
@@ -155,15 +151,15 @@ class Expressions:
         if isinstance(node.slice, ast.Slice):
             parts = tuple(typed.item_of(owner, place) for place in range(count)[self.part(node.slice)])
             return Term("build", Items(tuple(part.type for part in parts)), parts)
-        place = self.whole(node.slice)
-        number = _literal(place)
+        index = self.whole(node.slice)
+        number = _literal(index)
         if number is not None:
             if not -count <= number < count:
                 raise self.refused(node, f"'{ast.unparse(node)}' is beyond the {count} items")
             return typed.item_of(owner, range(count)[number])
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
             raise self.refused(node, f"'{ast.unparse(node)}' takes an item of a tuple of several types by a variable")
-        return Term("item", owner.type.types[0], (owner, self.from_start(place, Term("number", INT, (), count))))
+        return Term("item", owner.type.types[0], (owner, self.from_start(index, Term("number", INT, (), count))))
 
     def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
         """An element of an array, which has all its places, or a part of it from one first place up to another."""
@@ -176,7 +172,7 @@ class Expressions:
                 raise self.refused(node.slice, problem)
             # Both bounds lie in it: what is beyond is not looked for.
             count = Term("extent", INT, (owner,), 0)
-            bounds = (self.from_start(self.whole(item), count) for item in (begin, end))
+            bounds = (self.from_start(self.whole(bound), count) for bound in (begin, end))
             return Term("part", Array(kind.dimensions), (owner, *bounds))
         places = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         extents = kind.shape or (None,) * kind.dimensions
@@ -188,38 +184,38 @@ class Expressions:
             given.append(self.from_start(self.whole(place), count))
         return Term("element", FLOAT, (owner, *given))
 
-    def from_start(self, place: Term, count: Term) -> Term:
+    def from_start(self, index: Term, count: Term) -> Term:
         """A place counted from the start, where Python counts a negative one from the end."""
-        if self.is_from_zero(place):
-            return place
-        is_negative = Term("<", BOOL, (place, Term("number", INT, (), 0)))
-        return Term("choice", INT, (is_negative, Term("+", INT, (place, count)), place))
+        if self.is_from_zero(index):
+            return index
+        is_negative = Term("<", BOOL, (index, Term("number", INT, (), 0)))
+        return Term("choice", INT, (is_negative, Term("+", INT, (index, count)), index))
 
-    def is_from_zero(self, item: Term) -> bool:
+    def is_from_zero(self, term: Term) -> bool:
         """True for a whole number that cannot be negative."""
-        if item.kind in ("number", "%", "//", ">>", "&") and item.type == INT:
-            known = item if item.kind == "number" else item.parts[1]
-            is_literal = (_literal(known) or 0) > 0 or (item.kind == "number" and _literal(known) == 0)
-            return is_literal and (item.kind in ("number", "%", "&") or self.is_from_zero(item.parts[0]))
-        if item.kind == "name":
-            return item.detail in self.counters
-        if item.kind in ("+", "*", "min"):
-            return all(map(self.is_from_zero, item.parts))
-        if item.kind == "choice":
-            return all(map(self.is_from_zero, item.parts[1:]))
-        return item.kind == "extent" or (item.kind == "convert" and item.parts[0].type == BOOL)
+        if term.kind in ("number", "%", "//", ">>", "&") and term.type == INT:
+            known = term if term.kind == "number" else term.parts[1]
+            is_literal = (_literal(known) or 0) > 0 or (term.kind == "number" and _literal(known) == 0)
+            return is_literal and (term.kind in ("number", "%", "&") or self.is_from_zero(term.parts[0]))
+        if term.kind == "name":
+            return term.detail in self.counters
+        if term.kind in ("+", "*", "min"):
+            return all(map(self.is_from_zero, term.parts))
+        if term.kind == "choice":
+            return all(map(self.is_from_zero, term.parts[1:]))
+        return term.kind == "extent" or (term.kind == "convert" and term.parts[0].type == BOOL)
 
     def _of_tuple(self, node: ast.Tuple) -> Term:
         parts: list[Term] = []
-        for item in node.elts:
-            if not isinstance(item, ast.Starred):
-                parts.append(self.term(item))
+        for element in node.elts:
+            if not isinstance(element, ast.Starred):
+                parts.append(self.term(element))
                 continue
             # With a star it stands for all that it holds.
-            whole = self.term(item.value)
+            whole = self.term(element.value)
             if not isinstance(whole.type, Items | Row):
-                raise self.refused(item, f"'{ast.unparse(item)}' is no tuple")
-            parts += [typed.item_of(whole, place) for place in range(len(types_in(whole.type)))]
+                raise self.refused(element, f"'{ast.unparse(element)}' is no tuple")
+            parts += [typed.item_of(whole, index) for index in range(len(types_in(whole.type)))]
         return Term("build", Items(tuple(part.type for part in parts)), tuple(parts))
 
     def _of_unaryop(self, node: ast.UnaryOp) -> Term:
@@ -232,7 +228,7 @@ class Expressions:
 
     def _of_binop(self, node: ast.BinOp) -> Term:
         if isinstance(node.op, ast.Pow) and "pow" in self.library:
-            parts = tuple(self.scalar(item, FLOAT) for item in (node.left, node.right))
+            parts = tuple(self.scalar(side, FLOAT) for side in (node.left, node.right))
             # Compilers replace powers of literals by products or roots, whose last bits differ from the library's.
             if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
                 problem = "a power of a number or by a number that is written out"
@@ -257,16 +253,16 @@ class Expressions:
             raise self.mistaken(node, f"'{sign}' cannot be compiled for {sides}, in '{{written}}'")
 
     def _of_boolop(self, node: ast.BoolOp) -> Term:
-        parts = [self.term(item) for item in node.values]
+        parts = [self.term(value) for value in node.values]
         if any(part.type != BOOL for part in parts):
             raise self.refused(node, f"the value of '{ast.unparse(node)}', which is no truth value in Python")
         return _linked(node, parts)
 
     def _of_compare(self, node: ast.Compare) -> Term:
-        sides = [self.term(item) for item in (node.left, *node.comparators)]
+        sides = [self.term(side) for side in (node.left, *node.comparators)]
         for op, left, right in zip(node.ops, sides, sides[1:], strict=False):
             self.check_sides(node, SIGN_OF.get(type(op), ""), left, right)
-        values = [self.scalar(item, INT) for item in (node.left, *node.comparators)]
+        values = [self.scalar(side, INT) for side in (node.left, *node.comparators)]
         # A chain of comparisons is joined by "and"; its terms are free of side effects, so each may stand twice.
         made: Term | None = None
         for sign, left, right in zip(node.ops, values, values[1:], strict=False):
@@ -276,18 +272,18 @@ class Expressions:
             # A large integer that becomes a float may round, and Python compares the exact numbers.
             if kind == FLOAT and not all(map(self.is_exact, (left, right))):
                 raise self.refused(node, f"'{ast.unparse(node)}' compares a whole number with a float")
-            one = Term(SIGN_OF[type(sign)], BOOL, (converted(left, kind), converted(right, kind)))
-            made = one if made is None else Term("and", BOOL, (made, one))
+            comparison = Term(SIGN_OF[type(sign)], BOOL, (converted(left, kind), converted(right, kind)))
+            made = comparison if made is None else Term("and", BOOL, (made, comparison))
         assert made is not None
         return made
 
-    def is_exact(self, item: Term) -> bool:
+    def is_exact(self, term: Term) -> bool:
         """True for what a float holds exactly: a float, a truth value, a small literal, a counter."""
-        number = _literal(item)
-        if item.type == FLOAT or number is not None:
+        number = _literal(term)
+        if term.type == FLOAT or number is not None:
             return number is None or abs(number) <= EXACT
-        return (item.kind == "convert" and item.parts[0].type == BOOL) or (
-            item.kind == "name" and item.detail in self.counters
+        return (term.kind == "convert" and term.parts[0].type == BOOL) or (
+            term.kind == "name" and term.detail in self.counters
         )
 
     def _of_ifexp(self, node: ast.IfExp) -> Term:
@@ -303,7 +299,7 @@ class Expressions:
     def name_called(self, node: ast.Call) -> str:
         """The name of what is called; the function's own where it was handed over."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
-        if any(isinstance(item, ast.Starred) for item in node.args):
+        if any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
         handed = self.types.get(name)
         return handed.name if isinstance(handed, Handed) else name
@@ -313,41 +309,43 @@ class Expressions:
         if name in self.rows:
             fields = self.rows[name]
             stated = dict(zip(fields, map(self.term, node.args), strict=False))
-            stated |= {str(item.arg): self.term(item.value) for item in node.keywords}
+            stated |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
             if set(stated) != set(fields):
                 raise self.refused(node, f"'{ast.unparse(node)}' does not give every field")
-            parts = tuple(stated[item] for item in fields)
+            parts = tuple(stated[name] for name in fields)
             return Term("build", Row(name, tuple(zip(fields, (part.type for part in parts), strict=True))), parts)
         if name in self.definitions:
-            function, given = self.called(name, node)
+            function, arguments = self.called(name, node)
             if function.returns is None:
                 raise self.refused(node, f"'{name}' returns nothing")
-            return Term("call", function.returns, given, function.name)
+            return Term("call", function.returns, arguments, function.name)
         return self.built_in(name, node)
 
     def called(self, name: str, node: ast.Call) -> tuple[Function, tuple[Term, ...]]:
         """Another function of the module that is called, and what it is handed."""
         takes = self.definitions[name].args
-        names = [item.arg for item in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
-        placed = [item.arg for item in (*takes.posonlyargs, *takes.args)]
+        names = [argument.arg for argument in (*takes.posonlyargs, *takes.args, *takes.kwonlyargs)]
+        placed = [argument.arg for argument in (*takes.posonlyargs, *takes.args)]
         defaults = dict(zip(placed[::-1], takes.defaults[::-1], strict=False))
-        defaults |= {item.arg: value for item, value in zip(takes.kwonlyargs, takes.kw_defaults, strict=True) if value}
-        given = {item: self.term(value) for item, value in defaults.items()}
+        defaults |= {
+            argument.arg: value for argument, value in zip(takes.kwonlyargs, takes.kw_defaults, strict=True) if value
+        }
+        stated = {name: self.term(value) for name, value in defaults.items()}
         # Defaults first, then arguments by place, then by name: the last one holds.
-        given |= dict(zip(names, map(self.term, node.args), strict=False))
-        given |= {str(item.arg): self.term(item.value) for item in node.keywords}
+        stated |= dict(zip(names, map(self.term, node.args), strict=False))
+        stated |= {str(keyword.arg): self.term(keyword.value) for keyword in node.keywords}
         # What functions call each other with is known since they were composed; this is a call of the engine's own.
-        missing, own = [item for item in names if item not in given], self.definitions[name]
-        if missing or len(node.args) > len(placed) or len(given) > len(names):
+        missing, own = [name for name in names if name not in stated], self.definitions[name]
+        if missing or len(node.args) > len(placed) or len(stated) > len(names):
             problem = f"missing a required argument: '{missing[0]}'" if missing else "too many arguments"
             called = f"({', '.join(map(ast.unparse, node.args))})"
             problem = f"{{name}}({', '.join(names)}): the engine calls it with {called}: {problem}"
             raise self.mistaken(own, problem)
-        types = tuple(given[item].type for item in names)
+        types = tuple(stated[name].type for name in names)
         # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over an array of its own")
-        return self.made(name, types), tuple(given[item] for item in names if not is_empty(given[item].type))
+        return self.made(name, types), tuple(stated[name] for name in names if not is_empty(stated[name].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
         """A call of a function that every language has."""
@@ -366,7 +364,7 @@ class Expressions:
             return Term("number", INT, (), len(types_in(kind)))
         if own == "bool":
             return self.condition(node.args[0])
-        made, *others = [self.scalar(item, least) for item in node.args]
+        made, *others = [self.scalar(argument, least) for argument in node.args]
         kind = made.type
         if own in ("float", "int"):
             return made if own == "float" or kind == INT else Term("convert", INT, (made,))
@@ -428,10 +426,10 @@ _INSTEAD = {
 """What to write in the place of a function of a library, where the package has that."""
 
 
-def _literal(item: Term) -> int | None:
+def _literal(term: Term) -> int | None:
     """The whole number that a term writes out; None for any other term."""
-    sign, item = (-1, item.parts[0]) if item.kind == "negative" else (1, item)
-    return sign * int(item.detail) if item.kind == "number" and item.type == INT else None
+    sign, term = (-1, term.parts[0]) if term.kind == "negative" else (1, term)
+    return sign * int(term.detail) if term.kind == "number" and term.type == INT else None
 
 
 def walk_module(
@@ -489,11 +487,11 @@ class _ModuleWalk:
     def refused(self, where: ast.AST, problem: str) -> ProgramError:
         """The error for a place in the composed text, in terms of the file that it was written in."""
         number = getattr(where, "lineno", 0)
-        found = place_in(self.lines, number)
+        place = place_in(self.lines, number)
         problem = f"{problem}, which cannot be translated"
-        if found is None:
+        if place is None:
             return UntranslatableError(f"the lane loop, line {number} of the composed module: {problem}")
-        return UntranslatableError(str(refusal(found.file, found.line, problem)))
+        return UntranslatableError(str(refusal(place.file, place.line, problem)))
 
     def mistaken(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
         """The error for a mistake at a place in the composed text, as it was written: the line that has ``sought``.
@@ -501,13 +499,13 @@ class _ModuleWalk:
         ``{written}`` in the problem is that line, ``{name}`` the name of the function there.
         """
         number = getattr(where, "lineno", 0)
-        found = place_in(self.lines, number)
-        if found is None:
+        place = place_in(self.lines, number)
+        if place is None:
             written = self.lines[number - 1].strip()
             return ProgramError(f"the model cannot be compiled: {_as_written(problem, written)}")
-        lines = range(found.line, max(found.line + 1, found.next_line))
-        line = next((at for at in lines if sought and sought in linecache.getline(found.file, at)), found.line)
-        return refusal(found.file, line, _as_written(problem, linecache.getline(found.file, line).strip()))
+        lines = range(place.line, max(place.line + 1, place.next_line))
+        line = next((at for at in lines if sought and sought in linecache.getline(place.file, at)), place.line)
+        return refusal(place.file, line, _as_written(problem, linecache.getline(place.file, line).strip()))
 
 
 class _FunctionWalk:
@@ -520,13 +518,13 @@ class _FunctionWalk:
         self.types: dict[str, Type] = {}
         if definition.name not in module.found:
             module.found[definition.name] = Names.of(definition)
-        found = module.found[definition.name]
-        self.names, self.read = found.every, found.read
-        self.given = {item.arg for item in definition.args.args}
+        names = module.found[definition.name]
+        self.names, self.read = names.every, names.read
+        self.given = {argument.arg for argument in definition.args.args}
         self.made: set[str] = set()
         self.values = Expressions(
             self.types,
-            found.counters,
+            names.counters,
             module.rows,
             module.definitions,
             module.library,
@@ -543,8 +541,8 @@ class _FunctionWalk:
 
     def walked(self, name: str, types: tuple[Type, ...]) -> Function:
         """The function as typed statements."""
-        given = self.definition.args
-        names = [item.arg for item in (*given.posonlyargs, *given.args, *given.kwonlyargs)]
+        parameters = self.definition.args
+        names = [argument.arg for argument in (*parameters.posonlyargs, *parameters.args, *parameters.kwonlyargs)]
         self.types.update(zip(names, types, strict=True))
         # Types only grow, so this ends.
         # A name that gets a wider type further down, as in a loop, had it from the beginning.
@@ -559,9 +557,9 @@ class _FunctionWalk:
                 raise self.refused(self.definition, problem)
         if self.writes is not None and self.returns is not None:
             raise self.refused(self.writes, f"'{self.definition.name}' returns a value and writes into an array")
-        kept = tuple((item, self.types[item]) for item in names if not is_empty(self.types[item]))
+        kept = tuple((name, self.types[name]) for name in names if not is_empty(self.types[name]))
         bound = tuple(
-            f"{item} is {kind.name}" for item, kind in zip(names, types, strict=True) if isinstance(kind, Handed)
+            f"{name} is {kind.name}" for name, kind in zip(names, types, strict=True) if isinstance(kind, Handed)
         )
         is_entry = self.returns is None and self.module.entries.get(self.definition.name) == types
         return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound, is_entry)
@@ -597,11 +595,11 @@ class _FunctionWalk:
         name = self.values.name_called(node.value) if isinstance(node.value, ast.Call) else ""
         if not isinstance(node.value, ast.Call) or name not in self.module.definitions:
             raise self.refused(node, f"'{ast.unparse(node)}' is no statement of the subset")
-        function, given = self.values.called(name, node.value)
+        function, arguments = self.values.called(name, node.value)
         if function.returns is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' throws away what it returns")
         self.writes = node
-        return [typed.Perform(function.name, given)]
+        return [typed.Perform(function.name, arguments)]
 
     def do_return(self, node: ast.Return) -> list[Statement]:
         if node.value is None:
@@ -609,7 +607,7 @@ class _FunctionWalk:
         value = self.values.term(node.value)
         kind = value.type if self.returns is None else joined(self.returns, value.type)
         if kind is None:
-            kinds = sorted({kind_of(item) for item in (self.returns, value.type) if item is not None})
+            kinds = sorted({kind_of(kind) for kind in (self.returns, value.type) if kind is not None})
             problem = f"the ways through the function return different things: {' or '.join(kinds)}"
             raise self.module.mistaken(self.first_return or node, problem)
         if self.returns is not None and mixes(self.returns, value.type):
@@ -624,7 +622,7 @@ class _FunctionWalk:
         call, name = node.iter, node.target.id
         if not (isinstance(call, ast.Call) and ast.unparse(call.func) == "range"):
             return self.loop_over_items(name, node)
-        bounds = [self.values.whole(item) for item in call.args]
+        bounds = [self.values.whole(bound) for bound in call.args]
         if not 1 <= len(bounds) <= 3 or call.keywords:
             raise self.refused(node, f"'{ast.unparse(call)}'")
         start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
@@ -652,8 +650,8 @@ class _FunctionWalk:
             places = places[self.values.part(node.iter.slice)]
         counter = self.fresh(f"{name}_place", INT)
         self.note_type(counter, INT, node)
-        item = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
-        taken = self.assign(name, item, node)
+        element = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
+        taken = self.assign(name, element, node)
         start, stop = (Term("number", INT, (), place) for place in (places.start, places.stop))
         return self.loop(node, lambda: typed.Count(counter, start, stop, 1, (taken, *self.block(node.body))))
 
@@ -740,17 +738,17 @@ class _FunctionWalk:
     def note_type(self, name: str, kind: Type, node: ast.AST) -> None:
         """Widen the type of a name where it must be."""
         before = self.types.get(name, kind)
-        found = joined(before, kind)
-        if found is None:
+        joint = joined(before, kind)
+        if joint is None:
             raise self.refused(node, f"'{name}' holds values of different forms")
         if mixes(before, kind):
             raise self.refused(node, f"'{name}' holds a whole number in one place and a float in another")
-        self.has_widened |= found != before
-        self.types[name] = found
+        self.has_widened |= joint != before
+        self.types[name] = joint
 
     def assign_items(self, target: ast.Tuple, value: Term, node: ast.Assign) -> list[Statement]:
         """Several names or elements get the items of a tuple, which has its value before any of them changes."""
-        names = [item.id for item in target.elts if isinstance(item, ast.Name)]
+        names = [name.id for name in target.elts if isinstance(name, ast.Name)]
         is_stored = len(names) < len(target.elts)
         kind = value.type
         if not isinstance(kind, Items | Row) or len(types_in(kind)) != len(target.elts):
@@ -763,7 +761,7 @@ class _FunctionWalk:
             value = Term("name", self.types[whole], (), whole)
         return before + [
             statement
-            for at, item in enumerate(target.elts)
-            if not isinstance(item, ast.Name) or item.id in self.read
-            for statement in self.put(item, typed.item_of(value, at), node)
+            for at, target_of in enumerate(target.elts)
+            if not isinstance(target_of, ast.Name) or target_of.id in self.read
+            for statement in self.put(target_of, typed.item_of(value, at), node)
         ]

@@ -44,20 +44,20 @@ def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
 
     ProgramError for what may leave 32 bits, and for what is no sum, shift, choice or product with a power of two.
     """
-    ranges = _Ranges({item.name: item for item in module.functions})
+    ranges = _Ranges({function.name: function for function in module.functions})
     entry = module.functions[-1]
     returned = ranges.call(entry, tuple(given[name] for name, _ in entry.parameters))
-    called = [item for item in module.functions if item.name in ranges.returned]
-    return Narrowed(Module([_Narrowing(ranges, item).function() for item in called]), returned)
+    called = [function for function in module.functions if function.name in ranges.returned]
+    return Narrowed(Module([_Narrowing(ranges, function).function() for function in called]), returned)
 
 
-def hull(one: Range, other: Range) -> Range:
+def hull(first: Range, other: Range) -> Range:
     """The smallest range that holds both."""
-    if isinstance(one, Interval) and isinstance(other, Interval):
-        return Interval(min(one.low, other.low), max(one.high, other.high))
-    assert not isinstance(one, Interval)
+    if isinstance(first, Interval) and isinstance(other, Interval):
+        return Interval(min(first.low, other.low), max(first.high, other.high))
+    assert not isinstance(first, Interval)
     assert not isinstance(other, Interval)
-    return tuple(hull(*pair) for pair in zip(one, other, strict=True))
+    return tuple(hull(*pair) for pair in zip(first, other, strict=True))
 
 
 _SIGNS: dict[str, Callable[[int, int], int]] = {
@@ -81,24 +81,24 @@ class _Ranges:
     parts: dict[Type, Range] = field(default_factory=dict)
     returned: dict[str, Range] = field(default_factory=dict)
 
-    def call(self, item: Function, given: tuple[Range, ...]) -> Range:
+    def call(self, function: Function, arguments: tuple[Range, ...]) -> Range:
         """What a function returns for some ranges of its parameters."""
         names: Names = {}
-        for (name, kind), value in zip(item.parameters, given, strict=True):
-            self.keep(item, names, name, kind, value)
-        found: list[Range] = []
-        self.run(item, item.body, names, found)
+        for (name, kind), value in zip(function.parameters, arguments, strict=True):
+            self.keep(function, names, name, kind, value)
+        results: list[Range] = []
+        self.run(function, function.body, names, results)
         # Every return may be the one that is taken.
-        result = found[0]
-        for other in found[1:]:
+        result = results[0]
+        for other in results[1:]:
             result = hull(result, other)
-        self.returned[item.name] = hull(self.returned.get(item.name, result), result)
+        self.returned[function.name] = hull(self.returned.get(function.name, result), result)
         return result
 
-    def keep(self, item: Function, names: Names, name: str, kind: Type, value: Range) -> None:
+    def keep(self, function: Function, names: Names, name: str, kind: Type, value: Range) -> None:
         """A name holds a value from here on."""
         names[name] = value
-        self.names[item.name, name] = hull(self.names.get((item.name, name), value), value)
+        self.names[function.name, name] = hull(self.names.get((function.name, name), value), value)
         self.note(kind, value)
 
     def note(self, kind: Type, value: Range) -> None:
@@ -109,38 +109,40 @@ class _Ranges:
             for part, own in zip(types_in(kind), value, strict=True):
                 self.note(part, own)
 
-    def run(self, item: Function, body: tuple[Statement, ...], names: Names, found: list[Range]) -> None:
+    def run(self, function: Function, body: tuple[Statement, ...], names: Names, results: list[Range]) -> None:
         """Some statements: change what names hold, and add what is returned."""
         for statement in body:
             if isinstance(statement, typed.Assign):
-                self.keep(item, names, statement.name, statement.value.type, self.value(item, statement.value, names))
+                self.keep(
+                    function, names, statement.name, statement.value.type, self.value(function, statement.value, names)
+                )
             elif isinstance(statement, typed.Return):
-                found.append(self.value(item, statement.value, names))
+                results.append(self.value(function, statement.value, names))
             elif isinstance(statement, typed.If):
-                self.value(item, statement.test, names)
+                self.value(function, statement.test, names)
                 # Each branch goes on from what held before both.
                 other = dict(names)
-                self.run(item, statement.body, names, found)
-                self.run(item, statement.otherwise, other, found)
+                self.run(function, statement.body, names, results)
+                self.run(function, statement.otherwise, other, results)
                 _join(names, other)
             elif isinstance(statement, typed.Count) and statement.step == 1:
-                self.count(item, statement, names, found)
+                self.count(function, statement, names, results)
             else:
-                raise _refused(item, f"'{type(statement).__name__.lower()}'")
+                raise _refused(function, f"'{type(statement).__name__.lower()}'")
 
-    def count(self, item: Function, loop: typed.Count, names: Names, found: list[Range]) -> None:
+    def count(self, function: Function, loop: typed.Count, names: Names, results: list[Range]) -> None:
         """A loop, turn by turn: after it names hold what they may hold after any number of turns that it can take."""
-        start, stop = (self.value(item, part, names) for part in (loop.start, loop.stop))
+        start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
         assert isinstance(start, Interval)
         assert isinstance(stop, Interval)
         if start.low != start.high or stop.high - start.low > MOST_TURNS:
-            raise _refused(item, f"a loop of more than {MOST_TURNS} turns, or whose beginning is not written out")
+            raise _refused(function, f"a loop of more than {MOST_TURNS} turns, or whose beginning is not written out")
         # A loop without a turn leaves the counter as it was; it has a width all the same.
-        self.keep(item, dict(names), loop.name, INT, Interval(start.low, max(start.low, stop.high)))
+        self.keep(function, dict(names), loop.name, INT, Interval(start.low, max(start.low, stop.high)))
         after = dict(names) if stop.low <= start.low else None
         for turn in range(start.low, stop.high):
             names[loop.name] = Interval(turn, turn)
-            self.run(item, loop.body, names, found)
+            self.run(function, loop.body, names, results)
             # From here on the loop may have ended.
             if turn + 1 >= stop.low:
                 if after is None:
@@ -148,36 +150,36 @@ class _Ranges:
                 _join(after, names)
         names.update(after or {})
 
-    def value(self, item: Function, term: Term, names: Names) -> Range:
+    def value(self, function: Function, term: Term, names: Names) -> Range:
         """The range of a term; kept is the range over all times that it is worked out."""
-        parts = tuple(self.value(item, part, names) for part in term.parts)
+        parts = tuple(self.value(function, part, names) for part in term.parts)
         if term.kind == "name":
-            found = names[term.detail]
+            value = names[term.detail]
         elif term.kind in ("field", "item") and len(parts) == 1:
             whole = parts[0]
             assert not isinstance(whole, Interval)
             kind = term.parts[0].type
-            place = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
-            found = whole[place]
+            index = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
+            value = whole[index]
         elif term.kind == "build":
-            found = parts
+            value = parts
         elif term.kind == "call":
-            found = self.call(self.functions[term.detail], parts)
+            value = self.call(self.functions[term.detail], parts)
         elif term.kind == "choice":
-            found = hull(parts[1], parts[2])
+            value = hull(parts[1], parts[2])
         else:
-            found = _calculated(item, term, [part for part in parts if isinstance(part, Interval)])
-        self.note(term.type, found)
-        if isinstance(found, Interval):
+            value = _calculated(function, term, [part for part in parts if isinstance(part, Interval)])
+        self.note(term.type, value)
+        if isinstance(value, Interval):
             # A term in a loop or in a function that is called twice is worked out for several ranges.
-            known = self.terms.get(id(term), found)
-            self.terms[id(term)] = every = Interval(min(known.low, found.low), max(known.high, found.high))
+            known = self.terms.get(id(term), value)
+            self.terms[id(term)] = every = Interval(min(known.low, value.low), max(known.high, value.high))
             if term.type == INT and _width(every) is None:
-                raise _refused(item, f"a value from {every.low} to {every.high}, beyond 32 bits")
-        return found
+                raise _refused(function, f"a value from {every.low} to {every.high}, beyond 32 bits")
+        return value
 
 
-def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:
+def _calculated(function: Function, term: Term, parts: list[Interval]) -> Interval:
     """Range of a sum, a product with a power of two, a shift, a choice of the smaller or larger."""
     if term.kind == "number":
         return Interval(int(term.detail), int(term.detail))
@@ -191,12 +193,12 @@ def _calculated(item: Function, term: Term, parts: list[Interval]) -> Interval:
     if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
         return Interval(0, parts[1].high)
     if term.kind == "*" and not any(part.low == part.high and part.low.bit_count() == 1 for part in parts):
-        raise _refused(item, "a product that is not with a power of two, for which there may be no multiplier")
+        raise _refused(function, "a product that is not with a power of two, for which there may be no multiplier")
     if term.kind not in _SIGNS:
-        raise _refused(item, f"'{term.kind}'")
+        raise _refused(function, f"'{term.kind}'")
     # Sums, products, shifts, min and max have their extremes at the ends of both ranges.
-    one, other = parts
-    ends = [_SIGNS[term.kind](left, right) for left in one for right in other]
+    left, other = parts
+    ends = [_SIGNS[term.kind](left, right) for left in left for right in other]
     return Interval(min(ends), max(ends))
 
 
@@ -206,13 +208,13 @@ def _join(names: Names, other: Names) -> None:
         names[name] = hull(names.get(name, value), value)
 
 
-def _refused(item: Function, what: str) -> ProgramError:
-    return ProgramError(f"{item.source}: {what}, which cannot be taken to whole numbers of 16 and 32 bits")
+def _refused(function: Function, what: str) -> ProgramError:
+    return ProgramError(f"{function.source}: {what}, which cannot be taken to whole numbers of 16 and 32 bits")
 
 
-def _width(found: Interval) -> Scalar | None:
+def _width(interval: Interval) -> Scalar | None:
     """The narrowest type that holds a range; None where none does."""
-    return next((kind for kind, own in _WIDTHS if own.low <= found.low and found.high <= own.high), None)
+    return next((kind for kind, own in _WIDTHS if own.low <= interval.low and interval.high <= own.high), None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -229,7 +231,7 @@ class _Narrowing:
         returns = self.type_of(self.item.returns, self.ranges.returned[self.item.name])
         return replace(self.item, parameters=parameters, returns=returns, body=self.block(self.item.body, returns))
 
-    def type_of(self, kind: Type, found: Range) -> Type:
+    def type_of(self, kind: Type, value: Range) -> Type:
         """A type with widths for what is held."""
         if isinstance(kind, Row | Items):
             every = self.ranges.parts[kind]
@@ -238,10 +240,10 @@ class _Narrowing:
                 pairs = zip(kind.fields, every, strict=True)
                 return Row(kind.name, tuple((name, self.type_of(inner, own)) for (name, inner), own in pairs))
             return Items(tuple(self.type_of(*pair) for pair in zip(kind.types, every, strict=True)))
-        assert isinstance(found, Interval)
-        width = _width(found)
+        assert isinstance(value, Interval)
+        width = _width(value)
         if kind == INT and width is None:
-            raise _refused(self.item, f"a value from {found.low} to {found.high}, beyond 32 bits")
+            raise _refused(self.item, f"a value from {value.low} to {value.high}, beyond 32 bits")
         return width if kind == INT and width is not None else kind
 
     def of_name(self, name: str, kind: Type) -> Type:
@@ -250,20 +252,22 @@ class _Narrowing:
     def block(self, body: tuple[Statement, ...], returns: Type) -> tuple[Statement, ...]:
         """Some statements, with widths."""
         made: list[Statement] = []
-        for item in body:
-            if isinstance(item, typed.Assign):
-                kind = self.of_name(item.name, item.value.type)
-                made.append(typed.Assign(item.name, converted(self.term(item.value), kind)))
-            elif isinstance(item, typed.Return):
-                made.append(typed.Return(converted(self.term(item.value), returns)))
-            elif isinstance(item, typed.If):
-                bodies = (self.block(inner, returns) for inner in (item.body, item.otherwise))
-                made.append(typed.If(self.term(item.test), *bodies))
+        for statement in body:
+            if isinstance(statement, typed.Assign):
+                kind = self.of_name(statement.name, statement.value.type)
+                made.append(typed.Assign(statement.name, converted(self.term(statement.value), kind)))
+            elif isinstance(statement, typed.Return):
+                made.append(typed.Return(converted(self.term(statement.value), returns)))
+            elif isinstance(statement, typed.If):
+                bodies = (self.block(inner, returns) for inner in (statement.body, statement.otherwise))
+                made.append(typed.If(self.term(statement.test), *bodies))
             else:
-                assert isinstance(item, typed.Count)
-                kind = self.of_name(item.name, INT)
-                start, stop = (converted(self.term(part), kind) for part in (item.start, item.stop))
-                made.append(typed.Count(item.name, start, stop, item.step, self.block(item.body, returns)))
+                assert isinstance(statement, typed.Count)
+                kind = self.of_name(statement.name, INT)
+                start, stop = (converted(self.term(part), kind) for part in (statement.start, statement.stop))
+                made.append(
+                    typed.Count(statement.name, start, stop, statement.step, self.block(statement.body, returns))
+                )
         return tuple(made)
 
     def term(self, term: Term) -> Term:

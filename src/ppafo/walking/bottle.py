@@ -224,7 +224,7 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         line,
         numbers["fill"] * bottle.mass,
         # The order of BOTTLE_NUMBERS is that of the fields after the mass.
-        *(numbers[item.name] for item in BOTTLE_NUMBERS if item is not FILL),
+        *(numbers[quantity.name] for quantity in BOTTLE_NUMBERS if quantity is not FILL),
     )
     _check(reading, device, supply)
     return supply
@@ -233,21 +233,23 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
 def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
     """Return the numbers of the section; the bottle starts at the temperature of the room unless one is given."""
     room = replace(TEMPERATURE, default=bottle.room_temperature)
-    items = (room if item is TEMPERATURE and TEMPERATURE.name not in section else item for item in BOTTLE_NUMBERS)
-    found = {item.name: reading.number(f"{BOTTLE}.{item.name}", item) for item in items}
+    items = (
+        room if quantity is TEMPERATURE and TEMPERATURE.name not in section else quantity for quantity in BOTTLE_NUMBERS
+    )
+    numbers = {quantity.name: reading.number(f"{BOTTLE}.{quantity.name}", quantity) for quantity in items}
     nodes = bottle.fluid.table.temperatures
-    if not nodes[0] < found["temperature"] <= nodes[-1]:
+    if not nodes[0] < numbers["temperature"] <= nodes[-1]:
         known = f"must be above {nodes[0]:g} K and at most {nodes[-1]:g} K, where {bottle.fluid.name} is known"
         raise reading.refusal(f"{BOTTLE}.temperature", known)
-    mass, table = found["fill"] * bottle.mass, bottle.fluid.table
-    most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, found["temperature"])
+    mass, table = numbers["fill"] * bottle.mass, bottle.fluid.table
+    most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, numbers["temperature"])
     if mass >= most:
-        fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {found['temperature']:g} K"
+        fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {numbers['temperature']:g} K"
         raise ScenarioError(
             f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, and {fits}: set "
             f"{BOTTLE}.fill or {BOTTLE}.temperature lower, or {BOTTLE}.volume higher"
         )
-    return found
+    return numbers
 
 
 def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:

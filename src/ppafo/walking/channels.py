@@ -42,13 +42,13 @@ def valve_and_ground_channels(record: Mapping[str, Floats]) -> Channels:
 
 def controller_channels(record: Mapping[str, Floats]) -> Channels:
     """What a controller keeps: phase of the gait, level of help, requested torque, where it is in the stride."""
-    found: Channels = {}
+    channels: Channels = {}
     if PHASE_ROW in record:
-        found["controller_phase"] = (record[PHASE_ROW], "-")
-        found["safe_state"] = (record[SAFE_ROW], "-")
+        channels["controller_phase"] = (record[PHASE_ROW], "-")
+        channels["safe_state"] = (record[SAFE_ROW], "-")
     if REQUEST_ROW in record:
-        found["reference"] = (record[REQUEST_ROW], "N m")
+        channels["reference"] = (record[REQUEST_ROW], "N m")
     fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
     if fraction is not None and event is not None:
-        found["gait_fraction"], found["gait_event"] = (fraction, "-"), (event, "-")
-    return found
+        channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
+    return channels

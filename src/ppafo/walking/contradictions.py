@@ -89,7 +89,9 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
 def rules(scenario: Scenario) -> tuple[Problem, ...]:
     """What contradicts what in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
     check_no_bottle(scenario)
-    return tuple((np.atleast_1d(item.is_bad), item.line) for item in _contradictions(scenario))
+    return tuple(
+        (np.atleast_1d(contradiction.is_bad), contradiction.line) for contradiction in _contradictions(scenario)
+    )
 
 
 def check_no_bottle(scenario: Scenario) -> None:

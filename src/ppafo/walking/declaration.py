@@ -64,7 +64,7 @@ DURATION = Quantity(
 )
 
 WALK_SENSORS = (
-    *(item for item in SENSORS if item.name != "delay"),
+    *(quantity for quantity in SENSORS if quantity.name != "delay"),
     Quantity("force_bandwidth", "Hz", "bandwidth of the force sensors", 30.0, 0.1, 1.0e4),
     Quantity("force_noise", "N", "standard deviation of the measured forces", 0.0, 0.0, 1.0e4),
     Quantity("force_resolution", "N", "step of the measured forces", 0.0, 0.0, 1.0e3),
@@ -72,7 +72,7 @@ WALK_SENSORS = (
     Quantity("angle_lost_share", "1", "fraction of the angle samples that are lost", 0.0, 0.0, 1.0),
     Quantity("pressure_lost_share", "1", "fraction of the pressure samples that are lost", 0.0, 0.0, 1.0),
 )
-FORCES = tuple(item.name for item in WALK_SENSORS if item not in SENSORS)
+FORCES = tuple(quantity.name for quantity in WALK_SENSORS if quantity not in SENSORS)
 """Settings of sensors that no vane has."""
 
 _FAULTY = {
@@ -145,7 +145,7 @@ def sections(controller: str, timing: str, gas: str) -> dict[str, tuple[Quantity
 
 def by_path(declared: Mapping[str, Iterable[Quantity]]) -> dict[str, Quantity]:
     """Return the declarations of numbers by section as declarations by path."""
-    return {f"{section}.{item.name}": item for section, items in declared.items() for item in items}
+    return {f"{section}.{quantity.name}": quantity for section, items in declared.items() for quantity in items}
 
 
 def timing_of(document: Mapping[str, Any]) -> str:
@@ -191,10 +191,10 @@ def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     """Return the declaration of every number that a document with its kinds can hold, by path."""
     find_kinds(document, "the file of a walk")
     controller, gas = kind_at(document, "controller"), kind_at(document, "gas_model")
-    found = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
+    declared = by_path(sections(controller, timing_of(document), gas) | {BOTTLE: BOTTLE_NUMBERS})
     for part, kinds in FAULTS.items():
-        found |= by_path({f"faults.{part}": [item for fault in kinds.values() for item in fault.quantities]})
-    return found | by_path({"shut_off": SHUT_OFF}) | line_paths()
+        declared |= by_path({f"faults.{part}": [quantity for fault in kinds.values() for quantity in fault.quantities]})
+    return declared | by_path({"shut_off": SHUT_OFF}) | line_paths()
 
 
 OF_A_WALK = Declared(
@@ -237,10 +237,12 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
     }
     timings = []
     for name, timing in TIMINGS.items():
-        own_fields = {item.name: optional(number_type(item), item.summary) for item in timing.quantities}
+        own_fields = {
+            quantity.name: optional(number_type(quantity), quantity.summary) for quantity in timing.quantities
+        }
         timings.append(table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | own_fields))
     bottle: dict[str, Any] = {"name": optional(str, "name of a bottle, or the path of its file")}
-    bottle |= {item.name: optional(number_type(item), item.summary) for item in BOTTLE_NUMBERS}
+    bottle |= {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in BOTTLE_NUMBERS}
     bottle["overrides"] = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
     run = {"duration": optional(number_type(DURATION), DURATION.summary)}
     run |= quantity_fields((STEP,))

@@ -135,7 +135,7 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
 
 def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:
     """The events of a part of the samples."""
-    return {name: found[(found >= part.start) & (found < part.stop)] for name, found in events.items()}
+    return {name: times[(times >= part.start) & (times < part.stop)] for name, times in events.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -192,23 +192,23 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
     vents = np.diff(ventings, prepend=0.0) > 0.0
     helps = np.diff(level, prepend=HELPS) < 0.0
     places = np.flatnonzero(vents | helps).tolist()
-    quantities = {item.name: item for item in law_of(configuration).quantities}
-    found = []
-    for place in places:
-        event = SafetyEvent(float(time[place]), float(level[place]))
-        if vents[place] and level[place] > HELPS:
-            flag = FAULT_FLAGS[float(record[f"{FINDING_ROW}.fault_flag"][place])]
+    quantities = {quantity.name: quantity for quantity in law_of(configuration).quantities}
+    events = []
+    for sample in places:
+        event = SafetyEvent(float(time[sample]), float(level[sample]))
+        if vents[sample] and level[sample] > HELPS:
+            flag = FAULT_FLAGS[float(record[f"{FINDING_ROW}.fault_flag"][sample])]
             event = replace(
                 event,
                 fault_flag=flag,
-                readings={name: float(record[f"{FINDING_ROW}.{name}"][place]) for name in flag.readings},
+                readings={name: float(record[f"{FINDING_ROW}.{name}"][sample]) for name in flag.readings},
                 settings={name: configuration.controller.settings[name] for name in flag.settings},
                 units={name: quantities[name].unit for name in flag.settings},
                 atmosphere=configuration.device.supply.atmospheric_pressure,
             )
-        found.append(event)
+        events.append(event)
     # A watchdog that has acted stays, whatever the controller does when it comes back.
-    return (*(event for event in found if not watchdog or event.time < watchdog[0].time), *watchdog)
+    return (*(event for event in events if not watchdog or event.time < watchdog[0].time), *watchdog)
 
 
 def _text(value: float, si_unit: str, atmosphere: float) -> str:

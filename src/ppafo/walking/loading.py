@@ -124,11 +124,11 @@ def load_walk(
     'solenoid'
     """
     name_plugins(plugins)
-    file, given = label(str(scenario)), tuple(overrides)
+    file, words = label(str(scenario)), tuple(overrides)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
-    instead = {path: str(item) for path, item in named.items() if item is not None}
+    instead = {path: str(value) for path, value in named.items() if value is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
-    for override in given:
+    for override in words:
         path, text = split_override(override, ScenarioError)
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
@@ -139,7 +139,7 @@ def load_walk(
     content = FILE.parse(FILE.read(scenario), file)
     folder = Path(scenario).parent
     return scenario_of(
-        ScenarioRequest(file, str(scenario), folder, content, given, set_or_load(parameter_set), instead), WALKING
+        ScenarioRequest(file, str(scenario), folder, content, words, set_or_load(parameter_set), instead), WALKING
     )
 
 
@@ -219,11 +219,9 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
     )
-    named = tuple(
-        # The path of a file in full means the same from any folder.
-        f"{path}={Path(name).absolute() if Path(name).suffix == '.toml' else name}"
-        for path, name in instead.items()
-    )
+    # The path of a file in full means the same from any folder.
+    full = {path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in instead.items()}
+    named = tuple(f"{path}={name}" for path, name in full.items())
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     room = device.supply.atmospheric_pressure
@@ -305,7 +303,7 @@ def _fault(reading: Reading, part: str) -> FaultSettings:
 
 def _broken(reading: Reading, line: SupplyLine | None) -> dict[str, FaultSettings]:
     """Return the parts of the plant that fail; ScenarioError for one that a walk with supply lines does not have."""
-    found = {}
+    faults = {}
     for part in PLANT_FAULTS:
         fault = _fault(reading, part)
         if not fault.kind:
@@ -314,27 +312,30 @@ def _broken(reading: Reading, line: SupplyLine | None) -> dict[str, FaultSetting
             raise reading.refusal(
                 f"faults.{part}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
             )
-        found[part] = fault
-    return found
+        faults[part] = fault
+    return faults
 
 
 def _shut_off(reading: Reading) -> dict[str, float]:
     """Return the settings of the shut-off valve [SI], {} where none is fitted."""
     if "shut_off" not in reading.document:
         return {}
-    found = reading.section("shut_off", SHUT_OFF)
-    if found["area"] <= 0.0:
+    numbers = reading.section("shut_off", SHUT_OFF)
+    if numbers["area"] <= 0.0:
         raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
-    return found
+    return numbers
 
 
 def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
     """Return what a walk assumes: its file says it, its lines and its bottle."""
     own = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
     values = ((path, value_at(reading.document, path), note) for path, note in own.items())
-    found = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
-    lines = {item.path: replace(item, note=f"{item.value}, {item.note}") for item in assumed_lines(reading)}
-    return tuple({**found, **lines}.values())
+    assumed = {path: Assumption(path, "" if value is None else str(value), note) for path, value, note in values}
+    lines = {
+        assumption.path: replace(assumption, note=f"{assumption.value}, {assumption.note}")
+        for assumption in assumed_lines(reading)
+    }
+    return tuple({**assumed, **lines}.values())
 
 
 def _duration(reading: Reading, scenario: Scenario) -> float:
@@ -363,7 +364,7 @@ def lag_of_bandwidth(bandwidth: float) -> float:
 
 def _terms(valve: Valve) -> dict[str, Term]:
     kind = VALVES[valve.kind]
-    names = tuple(item.name for item in kind.quantities)
+    names = tuple(quantity.name for quantity in kind.quantities)
     paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay
     return {
         VALVE_LAG: Term(paths, kind.lag or delay, (kind.settings,)),

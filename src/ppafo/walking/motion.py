@@ -15,9 +15,8 @@ from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.model.plant_faults import SHUT_OFF
-from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import THERMAL, line_paths
-from ppafo.simulation.motion_kind import MotionKind
+from ppafo.simulation.motion_kind import Clock, MotionKind
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle import BottleSupply
 from ppafo.walking.declaration import (
@@ -47,7 +46,7 @@ class WalkMotion:
     It, and numbers of wearer, ``forces`` and ``faults``, may be arrays (runs,).
     """
 
-    motion_kind: MotionKind = field(compare=False)
+    motion_kind: MotionKind[Scenario] = field(compare=False)
     gait: Gait
     wearer: Wearer
     timing: str
@@ -86,21 +85,27 @@ SHORTEST_TASK_SEQUENCE = 1.0
 LONGEST_MINUTES = 60.0
 
 PLACES: Mapping[str, tuple[str, ...]] = {
-    **{f"wearer.{item.name}": ("motion", "wearer", item.name) for item in WEARER},
+    **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},
     f"wearer.{PERSON.name}": ("motion", PERSON.name),
     **{
-        f"timing.{item.name}": ("controller", "settings", item.name)
+        f"timing.{quantity.name}": ("controller", "settings", quantity.name)
         for kind in TIMINGS.values()
-        for item in kind.quantities
+        for quantity in kind.quantities
     },
     **{f"sensors.{name}": ("motion", "forces", name) for name in FORCES},
     **{
-        f"faults.{part}.{item.name}": ("motion", "faults" if part in FAULTY else "broken", part, "numbers", item.name)
+        f"faults.{part}.{quantity.name}": (
+            "motion",
+            "faults" if part in FAULTY else "broken",
+            part,
+            "numbers",
+            quantity.name,
+        )
         for part, kinds in FAULTS.items()
         for fault in kinds.values()
-        for item in fault.quantities
+        for quantity in fault.quantities
     },
-    **{f"shut_off.{item.name}": ("motion", "shut_off", item.name) for item in SHUT_OFF},
+    **{f"shut_off.{quantity.name}": ("motion", "shut_off", quantity.name) for quantity in SHUT_OFF},
 }
 """The attributes, or keys, that lead to the numbers of a walk that other scenarios have not."""
 
@@ -108,13 +113,13 @@ PLACES: Mapping[str, tuple[str, ...]] = {
 def numbers_of_scenario(scenario: Scenario) -> dict[str, Quantity]:
     """Return the declaration of every number of a walk beside its device's, by path."""
     motion, control = walk_of(scenario), scenario.controller
-    found = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
+    declared = sections(control.kind, motion.timing, "" if scenario.gas_model is None else THERMAL)
     # An object in charge has no settings, and a timing is one of a controller that has some.
-    found["timing"] = tuple(item for item in found["timing"] if item.name in control.settings)
+    declared["timing"] = tuple(quantity for quantity in declared["timing"] if quantity.name in control.settings)
     for part, fault in {**motion.faults, **motion.broken}.items():
-        found[f"faults.{part}"] = fault_numbers(part, fault.kind)
-    found["shut_off"] = SHUT_OFF if motion.shut_off else ()
-    return by_path(found) | ({} if scenario.supply_lines is None else line_paths())
+        declared[f"faults.{part}"] = fault_numbers(part, fault.kind)
+    declared["shut_off"] = SHUT_OFF if motion.shut_off else ()
+    return by_path(declared) | ({} if scenario.supply_lines is None else line_paths())
 
 
 def record_interval(seconds: float) -> float:
@@ -135,10 +140,11 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     shortest = SHORTEST_TASK_SEQUENCE if has_task_sequence else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time
     fits = np.logical_and(seconds >= shortest, seconds <= 60.0 * LONGEST_MINUTES)
 
+    least = "a second of a task sequence" if has_task_sequence else f"{SHORTEST_STRIDES} strides"
+
     def line(run: int) -> str:
         return (
-            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min "
-            f"({'a second of a task sequence' if has_task_sequence else f'{SHORTEST_STRIDES} strides'}) or more, and "
+            f"a walk of {at(seconds, run) / 60.0:.6g} min: must be {shortest / 60.0:.2g} min ({least}) or more, and "
             f"at most {LONGEST_MINUTES:g} min"
         )
 

@@ -103,7 +103,7 @@ def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator
 def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> dict[str, Floats]:
     """What ``gait_events`` finds, by field of ``GaitTiming``; some people at a time, to need less memory."""
     sine, cosine = sine_and_cosine(np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES))
-    found = []
+    events = []
     for first in range(0, stance_share.size, _AT_ONCE):
         part = slice(first, first + _AT_ONCE)
         level = shank.mean[part] - ankle.mean[part] + 0.5 * np.pi
@@ -111,8 +111,8 @@ def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> d
         foot = np.repeat(level[:, None], EVENT_PHASES.size, axis=1)
         for order in range(HARMONICS):
             foot += cosines[:, order, None] * cosine[order] + sines[:, order, None] * sine[order]
-        found.append(gait_events(foot, stance_share[part]))
-    return {name: np.concatenate([part[name] for part in found]) for name in found[0]}
+        events.append(gait_events(foot, stance_share[part]))
+    return {name: np.concatenate([part[name] for part in events]) for name in events[0]}
 
 
 class Person(NamedTuple):

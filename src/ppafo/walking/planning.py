@@ -60,8 +60,7 @@ def plan_walk(scenario: Scenario) -> Run:
 
     ScenarioError where it cannot be.
     """
-    planned: tuple[Run, tuple[Problem, ...]] = walk_of(scenario).motion_kind.plan(scenario)
-    run, problems = planned
+    run, problems = walk_of(scenario).motion_kind.plan(scenario)
     for is_bad, line in problems:
         if is_bad:
             raise ScenarioError(f"{scenario.origin.file or scenario.name}: {line(0)}")
@@ -183,7 +182,7 @@ def of_each(function: Any, *rows: Any) -> Any:
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:
     """The sensors of a walk with their faults, at the sample period of its controller."""
     numbers, faults = sensor_numbers(scenario), walk_of(scenario).faults
-    given = [*numbers.values(), *(value for fault in faults.values() for value in fault.numbers.values())]
+    values = [*numbers.values(), *(value for fault in faults.values() for value in fault.numbers.values())]
 
     def made(period: float, *values: float) -> GaitSensors:
         left = iter(values)
@@ -194,7 +193,7 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
         }
         return gait_sensors(own, period, **failing)
 
-    return over_runs(made, scenario.controller.period, *given)
+    return over_runs(made, scenario.controller.period, *values)
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
@@ -218,7 +217,7 @@ def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
 
 def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
     """The settings of the sensors of a walk in SI units, by name; any may be an array (runs,)."""
-    shared = (item.name for item in WALK_SENSORS if item.name not in FORCES)
+    shared = (quantity.name for quantity in WALK_SENSORS if quantity.name not in FORCES)
     return {**{name: getattr(scenario.sensors, name) for name in shared}, **walk_of(scenario).forces}
 
 

@@ -266,12 +266,12 @@ class FaultSettings:
 
 def fault_of(fault: FaultSettings, period: float) -> Fault:
     """Return the fault of a sensor with its numbers [SI], at a sample period [s] of the controller."""
-    given = fault.numbers
+    settings = fault.numbers
     if not fault.kind:
         # A sound sensor has a fault that never begins, so that one program serves both.
         return fixed_fault(NEVER, 0.0, 0.0, 0.0)
     if fault.kind != DISTORTED:
         holds = 1.0 if fault.kind == FROZEN else 0.0
-        return fixed_fault(given["time"], holds, given.get("reading", 0.0), given["period"])
-    numbers = [given.get(name, 0.0) for name in DISTORTING]
+        return fixed_fault(settings["time"], holds, settings.get("reading", 0.0), settings["period"])
+    numbers = [settings.get(name, 0.0) for name in DISTORTING]
     return distorting_fault(*[*numbers, period])

@@ -17,6 +17,7 @@ from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
 from ppafo.simulation import at_hand
+from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.oscillation import Oscillation, oscillation_of
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
@@ -94,8 +95,8 @@ def recording_of_walk(
 
 def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
     """Channels of the bottle of a walk with their units, straight between the times at which it met the device."""
-    found = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
-    return found | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
+    channels = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
+    return channels | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
 
 
 def with_cold_gas(run: Run, supply: SupplyCourse | None, time: Floats) -> Run:
@@ -123,13 +124,13 @@ def _task_sequence_channels(
         phase, truncate(gait.shank_angle).values_at(phase), truncate(gait.ankle_angle).values_at(phase)
     )
     above = path.toes_over_ankle(shank, record["state.angle"]) - path.toes_over_ankle(shank, record["walk.now.ankle"])
-    found: dict[str, tuple[Any, str]] = {
+    channels: dict[str, tuple[Any, str]] = {
         "toe_height": (pace.stride * healthy + above, "m"),
         "stride_frequency": (pace.frequency, "Hz"),
     }
     if gait.walking_speed is not None:
-        found["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
-    return found
+        channels["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
+    return channels
 
 
 def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:
@@ -215,7 +216,7 @@ class WalkResult:
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
         width = max((len(name) for name in self.metrics), default=0)
-        lines = [f"  {name:<{width}}  {item.value:.4g} {item.unit}" for name, item in self.metrics.items()]
+        lines = [f"  {name:<{width}}  {metric.value:.4g} {metric.unit}" for name, metric in self.metrics.items()]
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
         return "\n".join([head, *lines])
 
@@ -314,12 +315,11 @@ def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
         return Status("completed", None, "completed")
     # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.
     time = failed if failed < NEVER_FAILED else 0.0
-    return Status("diverged", time, f"diverged at t = {time:.6g} s; {TOO_MANY_PARTS if too_many_parts else REMEDY}")
+    remedy = TOO_MANY_PARTS if too_many_parts else REMEDY
+    return Status("diverged", time, f"diverged at t = {time:.6g} s; {remedy}")
 
 
-def measured(
-    scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]
-) -> tuple[Recording, Mapping[str, Metric], str]:
+def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Floats]) -> Measured:
     """Recording and metrics of a walk from its rows (samples,) by path, at these times [s]; and how it ended."""
     check_no_bottle(scenario)
     completed = Status("completed", None, "completed")

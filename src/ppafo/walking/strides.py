@@ -45,7 +45,7 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
     """Numbers of each whole stride [SI], shape (strides,), from running totals at the heel strikes."""
     # A landing on the toes is counted in the step of the strike, of which ``starts`` has the sample after it.
     firsts = {name: starts - 1 if name == "toe_landing" else starts for name in PER_STRIDE}
-    return {name: np.diff(totals[item.total][firsts[name]]) for name, item in PER_STRIDE.items()}
+    return {name: np.diff(totals[quantity.total][firsts[name]]) for name, quantity in PER_STRIDE.items()}
 
 
 def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -77,11 +77,11 @@ def mean_curves(
     times = times_of_phases(recording.time, starts)
     times = times if chosen is None else times[chosen]
     names = [name for name in recording.names if not (name in CHANNELS and CHANNELS[name].is_held)]
-    found = {}
+    curves = {}
     for name in names:
         strides = np.interp(times, recording.time, recording[name])
-        found[name] = Curves(strides.mean(axis=0), strides.std(axis=0), recording.unit(name))
-    return found
+        curves[name] = Curves(strides.mean(axis=0), strides.std(axis=0), recording.unit(name))
+    return curves
 
 
 def times_of_phases(time: Floats, starts: NDArray[np.intp]) -> Floats:
@@ -105,7 +105,7 @@ def walk_metrics(
     all are for means. ``averages`` are over the counted strides with help.
     """
     chosen = helped & counted
-    found = stride_metrics(configuration, strides, averages, chosen) | counts_of_strides(recording, helped)
+    metrics = stride_metrics(configuration, strides, averages, chosen) | counts_of_strides(recording, helped)
     # A controller that requests a torque is judged by how well it gets it in push-off.
     if "reference" in recording and chosen.any():
         pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
@@ -113,20 +113,20 @@ def walk_metrics(
         if error.size:
             rms = float(np.sqrt(np.mean(error**2)))
             summary = "RMS of requested torque less actuator torque in push-off"
-            found["push_off_error"] = Metric(rms, "N m", summary)
-    return found | torque_metrics(recording) | first_less_help(recording)
+            metrics["push_off_error"] = Metric(rms, "N m", summary)
+    return metrics | torque_metrics(recording) | first_less_help(recording)
 
 
 def torque_metrics(recording: Recording) -> dict[str, Metric]:
     """How well the torque follows what is requested, how high it gets, and how often the command turns."""
-    found: dict[str, float | None] = {
+    metrics: dict[str, float | None] = {
         "torque_error": torque_error(recording) if "reference" in recording else None,
         "peak_torque": peak_torque(recording),
         "command_reversals": command_reversals(recording),
     }
     return {
         name: Metric(value, METRICS[name].unit, METRICS[name].summary)
-        for name, value in found.items()
+        for name, value in metrics.items()
         if value is not None
     }
 
@@ -155,34 +155,36 @@ def stride_metrics(
     chosen: NDArray[np.bool_],
 ) -> dict[str, Metric]:
     """Means over the chosen strides (strides,), and what they are of a healthy ankle; ``averages`` are theirs too."""
-    found = {}
+    metrics = {}
     over = "" if walk_of(configuration).task_sequence is None else " over the strides at an even speed on level ground"
-    for name, item in PER_STRIDE.items():
+    for name, quantity in PER_STRIDE.items():
         values = strides[name][chosen]
         if values.size:
-            found[name] = Metric(float(values.mean()), item.unit, f"{item.summary}, mean{over}")
-    found["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
+            metrics[name] = Metric(float(values.mean()), quantity.unit, f"{quantity.summary}, mean{over}")
+    metrics["counted_strides"] = Metric(float(chosen.sum()), "-", "strides over which the means are taken")
     healthy = healthy_positive_work(configuration)
     if healthy > 0.0:
-        found["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
-        if "positive_push_off_work" in found:
-            fraction = found["positive_push_off_work"].value / healthy
-            found["push_off_share"] = Metric(
+        metrics["healthy_positive_work"] = Metric(healthy, "J", "positive work of the healthy ankle in one stride")
+        if "positive_push_off_work" in metrics:
+            fraction = metrics["positive_push_off_work"].value / healthy
+            metrics["push_off_share"] = Metric(
                 fraction, "-", "positive work of T_ex in push-off over the healthy ankle's positive work"
             )
     if "dorsiflexor_moment" in averages:
         # Phase 1 is phase 0 of the next stride, and counts once.
         moment = float(averages["dorsiflexor_moment"].mean[:-1].mean())
-        found["dorsiflexor_moment"] = Metric(moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride")
+        metrics["dorsiflexor_moment"] = Metric(
+            moment, "N m", "moment of the wearer's dorsiflexors, mean over the stride"
+        )
     if "toe_height" in averages:
-        found["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
+        metrics["lowest_toes"] = lowest_toes(configuration, averages["toe_height"].mean)
     if "angle" in averages:
         # Of the mean curves: what differs from stride to stride is in their deviation.
         away = averages["angle"].mean - averages["healthy_angle"].mean
-        found["angle_difference"] = Metric(
+        metrics["angle_difference"] = Metric(
             float(np.sqrt(np.mean(away**2))), "rad", "RMS difference of the mean ankle angle to the healthy one"
         )
-    return found
+    return metrics
 
 
 def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
@@ -267,7 +269,7 @@ def segment_results(
     time, contact = recording.time, recording["contact"]
     strikes, end = time[starts], float(time[-1])
     heel = recording["heel_force"] > LOADED_HEEL * walk_of(configuration).wearer.body_mass * STANDARD_GRAVITY
-    found = []
+    results = []
     for span in planned.spans:
         start, last = float(span.start), min(float(span.end), end)
         if start >= end:
@@ -299,8 +301,8 @@ def segment_results(
             flat_push=max(float(push.max()), 0.0) if push.size else 0.0,
             safe_time=safe_time,
         )
-        found.append(result)
-    return tuple(found)
+        results.append(result)
+    return tuple(results)
 
 
 def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.bool_]) -> float | None:
@@ -308,14 +310,14 @@ def _lowest_toes(configuration: Scenario, recording: Recording, own: NDArray[np.
     timing = gait_timing(walk_of(configuration).gait)
     swing = recording["contact"] == SWING
     edges = np.flatnonzero(np.diff(swing.astype(np.int8))) + 1
-    found = []
+    heights = []
     for first, last in pairwise(edges.tolist()):
         if not (swing[first] and own[first]):
             continue
         span = 1.0 - timing.toe_off
         middle = [first + round((last - first) * (at - timing.toe_off) / span) for at in timing[4:6]]
-        found.append(float(recording["toe_height"][middle[0] : middle[1] + 1].min()))
-    return min(found, default=None)
+        heights.append(float(recording["toe_height"][middle[0] : middle[1] + 1].min()))
+    return min(heights, default=None)
 
 
 def task_sequence_metrics(
@@ -326,28 +328,30 @@ def task_sequence_metrics(
     # A walk may go on after its task sequence.
     end = min(float(recording.time[-1]), float(planned.duration))
     gas = float(np.interp(end, recording.time, recording["supplied_mass"]))
-    found = {
+    metrics = {
         "task_sequence_time": Metric(end, "s", "length of the task sequence, as far as it was walked"),
         "task_sequence_planned_time": Metric(float(planned.duration), "s", "length of the whole task sequence"),
         "steady_strides": Metric(float(steady), "-", "whole strides at an even speed on level ground"),
         "task_sequence_strides": Metric(
-            float(sum(item.strides for item in segments)), "-", "strides of the task sequence"
+            float(sum(segment.strides for segment in segments)), "-", "strides of the task sequence"
         ),
         "task_sequence_gas": Metric(gas, "kg", "gas taken from the supply over the task sequence"),
         "task_sequence_work": Metric(
-            sum(item.net_push_off_work for item in segments), "J", "net work of T_ex while the foot rolls over the toes"
+            sum(segment.net_push_off_work for segment in segments),
+            "J",
+            "net work of T_ex while the foot rolls over the toes",
         ),
         "task_sequence_flat_push": Metric(
-            max((item.flat_push for item in segments), default=0.0),
+            max((segment.flat_push for segment in segments), default=0.0),
             "N m",
             "largest torque in plantarflexion with a loaded heel",
         ),
     }
     if toes:
-        found["task_sequence_lowest_toes"] = Metric(
+        metrics["task_sequence_lowest_toes"] = Metric(
             min(toes), "m", "lowest toes over the ground in the middle of a swing"
         )
     if "walking_speed" in recording:
         way = float(np.trapezoid(recording["walking_speed"], recording.time))
-        found["task_sequence_length"] = Metric(way, "m", "distance walked in the task sequence")
-    return found
+        metrics["task_sequence_length"] = Metric(way, "m", "distance walked in the task sequence")
+    return metrics

@@ -109,19 +109,19 @@ def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
     # What is in the segments is checked segment by segment.
     validate(_task_sequence_table(dict[str, Any], "TaskSequenceOutline"), document, file, ScenarioError)
     segments = []
-    for number, given in enumerate(document["segment"], start=1):
-        kind = given.get("kind")
+    for number, segment in enumerate(document["segment"], start=1):
+        kind = segment.get("kind")
         if not isinstance(kind, str) or kind not in KINDS:
             allowed = f"allowed: {', '.join(KINDS)}"
             if kind is None:
                 raise ScenarioError(f"{file}: segment {number}: 'kind' is missing; {allowed}")
             hint = nearest_name(str(kind), KINDS)
             raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
-        place = f"{file}: segment {number} ({kind})"
-        validate(_segment_table(kind), given, place, ScenarioError)
-        reading = Reading(place, given)
-        present = [item for item in KINDS[kind][1] if item not in _OPTIONAL or item.name in given]
-        values = {item.name: reading.number(item.name, item) for item in present}
+        where = f"{file}: segment {number} ({kind})"
+        validate(_segment_table(kind), segment, where, ScenarioError)
+        reading = Reading(where, segment)
+        present = [quantity for quantity in KINDS[kind][1] if quantity not in _OPTIONAL or quantity.name in segment]
+        values = {quantity.name: reading.number(quantity.name, quantity) for quantity in present}
         strides = values.get("strides")
         if strides is not None and strides != int(strides):
             raise reading.refusal("strides", "must be a whole number")
@@ -147,7 +147,7 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
             yield index, f"radius must be at least {TIGHTEST:g} m, either way"
         lengths = [name for name in ("duration", "strides") if name in values]
         if segment.kind in ("walk", "ramp", "stairs", "turn") and len(lengths) != 1:
-            yield index, f"give either duration or strides{', not both' if lengths else ''}"
+            yield index, "give either duration or strides" + (", not both" if lengths else "")
         if segment.kind == "ramp" and not {"speed", "cadence"} & values.keys():
             yield index, "give the speed or the cadence at its end"
         walks = segment.kind not in _STANDING
@@ -156,9 +156,13 @@ def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
 @functools.cache
 def _segment_table(kind: str) -> type[BaseModel]:
     summary, quantities = KINDS[kind]
-    given = tuple(item for item in quantities if item not in _OPTIONAL)
-    free = {item.name: optional(number_type(item), item.summary) for item in quantities if item in _OPTIONAL}
-    return table(f"{model_name(kind)}Segment", kind_field(kind, summary) | quantity_fields(given) | free)
+    required = tuple(quantity for quantity in quantities if quantity not in _OPTIONAL)
+    free = {
+        quantity.name: optional(number_type(quantity), quantity.summary)
+        for quantity in quantities
+        if quantity in _OPTIONAL
+    }
+    return table(f"{model_name(kind)}Segment", kind_field(kind, summary) | quantity_fields(required) | free)
 
 
 @functools.cache

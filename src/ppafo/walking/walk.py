@@ -78,7 +78,7 @@ def walk(
     """
     name_plugins(plugins)
     if isinstance(scenario, Scenario):
-        if any(item is not None for item in (gait, task_sequence, bottle)) or tuple(overrides):
+        if any(choice is not None for choice in (gait, task_sequence, bottle)) or tuple(overrides):
             raise ScenarioError(
                 "overrides, a gait, a task sequence and a bottle go with a name or a file; a Scenario takes them in "
                 "load_walk"
@@ -225,7 +225,7 @@ def without_device(configuration: Scenario) -> Scenario:
 def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     """The metrics of a walk with a healthy ankle, SI units; without a moment curve there is no work."""
     gait, wearer = walk_of(configuration).gait, walk_of(configuration).wearer
-    found = {
+    metrics = {
         "toe_clearance": Metric(0.0, "m", "0 by definition: measured from the healthy gait"),
         "lowest_toes": lowest_toes(configuration, healthy_toe_height(configuration)),
         "toe_landing": Metric(0.0, "-", "the heel comes first"),
@@ -233,15 +233,15 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
     }
     if gait.ankle_moment is not None:
         work = healthy_positive_work(configuration)
-        found["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
+        metrics["positive_push_off_work"] = Metric(work, "J", "positive work of the ankle moment in one stride")
         if wearer.keeps_gait >= 0.5:
             # Muscles that lift the foot without any device give what the measured moment asks beyond tissue.
             torque: Any = passive_torque  # plain arithmetic, of arrays too
             tissue = torque(wearer.leg(), gait.ankle_angle.values_at(PHASES))
             moment = np.maximum(tissue - wearer.body_mass * gait.ankle_moment.values_at(PHASES), 0.0)
             summary = "moment of the wearer's dorsiflexors, mean over the stride"
-            found["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
-    return found
+            metrics["dorsiflexor_moment"] = Metric(float(moment[:-1].mean()), "N m", summary)
+    return metrics
 
 
 MAXIMUM_WEARERS = 1_000_000
@@ -272,7 +272,8 @@ class Number:
 
 
 OUTCOMES: dict[str, Number] = {
-    name: Number(item.unit, f"{item.summary}, mean over all strides of a wearer") for name, item in PER_STRIDE.items()
+    name: Number(quantity.unit, f"{quantity.summary}, mean over all strides of a wearer")
+    for name, quantity in PER_STRIDE.items()
 }
 TRAITS: dict[str, Number] = {
     "body_mass": Number("kg", "mass of the body"),
@@ -362,7 +363,7 @@ def walk_population(
     # Who never strikes must not divide by zero.
     strikes = np.maximum(rows["walk.strides"], 1.0)
     over = {"toe_clearance": strikes, "toe_landing": strikes}
-    outcomes = {name: rows[item.total] / over.get(name, strides) for name, item in PER_STRIDE.items()}
+    outcomes = {name: rows[quantity.total] / over.get(name, strides) for name, quantity in PER_STRIDE.items()}
     traits = {
         "body_mass": walk_of(configuration).wearer.body_mass * build.mass,
         "shank_length": walk_of(configuration).wearer.shank_length * build.stature,
@@ -383,10 +384,10 @@ def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
     """Final states, in groups small enough for an interrupt to be seen and for progress to be reported."""
     count = batch.states.shape[1]
     group = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
-    found = []
+    results = []
     for first in range(0, count, group):
         part = slice(first, first + group)
         one = Batch(batch.program, batch.clock, batch.parameters[:, part], batch.states[:, part])
-        found.append(run_batch(one).states)
+        results.append(run_batch(one).states)
         progress(float(min(first + group, count)), float(count))
-    return np.concatenate(found, axis=1)
+    return np.concatenate(results, axis=1)

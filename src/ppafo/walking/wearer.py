@@ -93,8 +93,8 @@ class Wearer:
         return leg_parameters(self, HeelRocker(self.heel_lever, self.heel_lever, 1.0))
 
 
-_DECLARED = FOOT | {item.name: item for item in quantities_of(Wearer)}
-WEARER = tuple(_DECLARED[item.name] for item in fields(Wearer))
+_DECLARED = FOOT | {quantity.name: quantity for quantity in quantities_of(Wearer)}
+WEARER = tuple(_DECLARED[number.name] for number in fields(Wearer))
 """Numbers of ``[wearer]``, in the order of the fields."""
 
 SCALING = {
@@ -145,7 +145,7 @@ def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
 
 def paper_subject() -> Wearer:
     """The wearer of the defaults."""
-    return Wearer(**{item.name: float(item.default or 0.0) for item in WEARER})
+    return Wearer(**{quantity.name: float(quantity.default or 0.0) for quantity in WEARER})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -249,13 +249,13 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
     """Return how the segments of a walk file follow stature and body mass: now, or once the stature is given."""
     later = value_at(document, STATURE) is None
-    found: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[Follows, ...]] = {}
     for name, function in _FOLLOWING.items():
         # A link waits until its first source is given, so the stature comes first for masses too.
         sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
         if value_at(document, f"wearer.{name}") is None:
-            found[f"wearer.{name}"] = (Follows((Term(sources, function),), when_set=later),)
-    return found
+            links[f"wearer.{name}"] = (Follows((Term(sources, function),), when_set=later),)
+    return links
 
 
 def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
@@ -271,21 +271,24 @@ def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
         segments = scaled(paper, gait.body_mass / paper.body_mass, stature)
         subject = replace(paper, stature=paper.stature if gait.stature is None else gait.stature, **segments)
     if value_at(reading.document, STATURE) is not None:
-        known = {item.name: replace(item, default=getattr(subject, item.name)) for item in WEARER}
-        given = {path: reading.number(path, known[path.partition(".")[2]]) for path in (STATURE, BODY_MASS)}
+        known = {quantity.name: replace(quantity, default=getattr(subject, quantity.name)) for quantity in WEARER}
+        stated = {path: reading.number(path, known[path.partition(".")[2]]) for path in (STATURE, BODY_MASS)}
         links = links_of_stature(reading.document)
-        found = {path.partition(".")[2]: float(of[0].number(given.__getitem__)) for path, of in links.items()}
-        subject = replace(subject, **found)
-    quantities = tuple(replace(item, default=getattr(subject, item.name)) for item in WEARER)
+        scaled_numbers = {path.partition(".")[2]: float(of[0].number(stated.__getitem__)) for path, of in links.items()}
+        subject = replace(subject, **scaled_numbers)
+    quantities = tuple(replace(quantity, default=getattr(subject, quantity.name)) for quantity in WEARER)
     if not is_named:
         return Wearer(**reading.section("wearer", quantities))
-    for item in quantities:
-        value = getattr(subject, item.name)
-        if not item.minimum <= value <= item.maximum and value_at(reading.document, f"wearer.{item.name}") is None:
+    for quantity in quantities:
+        value = getattr(subject, quantity.name)
+        if (
+            not quantity.minimum <= value <= quantity.maximum
+            and value_at(reading.document, f"wearer.{quantity.name}") is None
+        ):
             raise ScenarioError(
                 f"{reading.file}: gait '{gait.name}' is of a subject of {gait.body_mass:g} kg, which makes "
-                f"wearer.{item.name} {value:.3g} {item.unit}; a wearer has {item.minimum:g} to {item.maximum:g} "
-                f"{item.unit}: give wearer.{item.name}"
+                f"wearer.{quantity.name} {value:.3g} {quantity.unit}; a wearer has {quantity.minimum:g} to "
+                f"{quantity.maximum:g} {quantity.unit}: give wearer.{quantity.name}"
             )
     return Wearer(**reading.section("wearer", quantities))
 
@@ -296,11 +299,10 @@ def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:
     if abs(wearer.stature - (own or paper_subject().stature)) <= _SAME * wearer.stature:
         return ""
     low, high = STATURES
-    known = f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
-    return (
-        f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
-        f"{'' if low <= wearer.stature <= high else known}; the curves of the gait are not scaled by stature"
-    )
+    remark = f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
+    if not low <= wearer.stature <= high:
+        remark += f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
+    return f"{remark}; the curves of the gait are not scaled by stature"
 
 
 SCALED_MASS = (0.6, 1.7)

@@ -41,13 +41,6 @@ def words(page: str) -> str:
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", page)).split())
 
 
-def test_the_table_has_a_line_for_every_claim_and_fits_a_terminal(reproduction: Reproduction) -> None:
-    lines = text_of(finding_of(reproduction)).splitlines()
-    for claim in reproduction.claims:
-        assert sum(line.startswith(f"{claim.id} ") for line in lines) == 1
-    assert max(len(line) for line in lines) <= 125
-
-
 def test_the_table_aligns_its_columns(reproduction: Reproduction) -> None:
     _, _, head, *rows = text_of(finding_of(reproduction)).splitlines()[: 3 + len(reproduction.claims)]
     column = head.index("verdict")
@@ -224,7 +217,3 @@ def test_figure_8_shows_the_synthetic_experiment_with_both_valves(reproduction: 
     figure = torque_task_figure(*runs, 5.0, (1.1, 0.4), (evidence.solenoid, evidence.proportional))
     for axes in (figure.axes[0], figure.axes[2]):
         assert "torque, synthetic experiment" in {line.get_label() for line in axes.lines}
-
-
-def test_the_same_reproduction_gives_the_same_page(reproduction: Reproduction, page: str) -> None:
-    assert reproduction_page(reproduction, DRAWN) == page

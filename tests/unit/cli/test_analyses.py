@@ -129,11 +129,6 @@ def test_an_interval_that_stays_too_wide_is_exit_code_1(
     assert "the target width was not reached with the maximum of 64 draws" in capsys.readouterr().out
 
 
-def test_tunings_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["tune", "--list"]) == 0
-    assert capsys.readouterr().out.startswith("pid-gains ")
-
-
 def test_an_interruption_leaves_nothing(
     tuning: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -145,14 +140,3 @@ def test_an_interruption_leaves_nothing(
         assert main([*words, "--out", str(tmp_path / "out")]) == 130
         assert not (tmp_path / "out").exists()
     assert "interrupted; nothing is half written" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("command", ["compare", "statistic", "sensitivity", "tune"])
-def test_an_output_that_cannot_be_written_is_refused_before_anything_runs(
-    command: str, tuning: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "out").write_text("a file")
-    assert main([*commands(tuning)[command], "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert str(tmp_path / "out") in said
-    assert "runs" not in said

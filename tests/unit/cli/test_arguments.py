@@ -13,6 +13,7 @@ from ppafo.arguments import whole_number
 from ppafo.cli.command_line import Group, parameters_of
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
+from ppafo.parameters.bottles.bottle import list_bottles
 
 FULL = Path("/dev/full")
 SHIPPED = {"SCENARIO", "STUDY", "SET", "GAIT", "WALK", "TUNING", "DESIGN", "BOTTLE", "KIND"}
@@ -31,6 +32,31 @@ def test_every_command_that_begins_with_a_shipped_name_has_list() -> None:
     assert lacking == []
 
 
+@pytest.mark.parametrize(
+    ("words", "names"),
+    [
+        ("simulate", ("step-response", "torque-task-solenoid")),
+        ("bottle", tuple(list_bottles())),
+        ("tune", ("pid-gains",)),
+        ("design", ("push-off", "torque-task")),
+        ("rig simulate", ("step-response", "vane-leak")),
+        ("sweep", ("pressure-and-area",)),
+        ("sets", ("ppafo2011", "ppafo2011-printed")),
+        ("gait", ("falisse2019-subject1",)),
+    ],
+)
+def test_what_comes_with_the_package_is_listed_by_name_with_what_it_is(
+    words: str, names: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    listing = [*words.split(), "list" if words in ("sets", "gait") else "--list"]
+    assert main(listing) == 0
+    printed = capsys.readouterr().out
+    assert all(re.search(rf"^ *{name} +\S", printed, re.MULTILINE) for name in names)
+    assert main([*listing, "--json"]) == 0
+    rows = next(value for value in json.loads(capsys.readouterr().out).values() if isinstance(value, list))
+    assert {row["name"] for row in rows} >= set(names)
+
+
 @pytest.mark.parametrize("words", [["find"], ["validate"], ["export", "c"], ["gait", "record"], ["new"]], ids=" ".join)
 def test_list_needs_nothing_of_what_the_command_needs(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*words, "--list", "--json"]) == 0
@@ -47,11 +73,23 @@ def test_without_a_command_it_says_where_to_start(capsys: pytest.CaptureFixture[
     assert "All commands: ppafo --help" in said
 
 
-def test_a_line_break_in_a_command_does_not_break_the_line_of_the_message(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["si\nmulate"]) == 2
-    said = capsys.readouterr().err
-    assert "there is no command 'si mulate', did you mean 'simulate'?" in said
-    assert said.count("\n") == 1
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["si\nmulate"], "there is no command 'si mulate', did you mean 'simulate'?"),
+        (["export", "figure", "a\nb"], "a b"),
+        (["sets", "audit", "a\nb"], "a b"),
+        (["simulate", "a\nb.toml"], "a b"),
+        (["doctor", "--schema", "a\nb"], "a b"),
+    ],
+)
+def test_a_line_break_in_a_word_does_not_break_the_line_of_the_message(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(

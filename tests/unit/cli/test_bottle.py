@@ -8,7 +8,6 @@ import pytest
 
 from ppafo.cli.command_line import RENAMED
 from ppafo.cli.main import main
-from ppafo.parameters.bottles.bottle import list_bottles
 from ppafo.signals import Channel, Recording
 from ppafo.storage.comma_separated import read_csv, write_csv
 
@@ -21,12 +20,6 @@ def walk(tmp_path: Path) -> Path:
     time = np.linspace(0.0, 4.0, 101)
     recording = Recording("walk", time, {"supplied_mass": Channel(time * 5e-4, "kg")}, kind="simulated")
     return write_csv(tmp_path / "walk.csv", recording)
-
-
-def test_the_bottles_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bottle", "--list"]) == 0
-    listed = capsys.readouterr().out
-    assert all(name in listed for name in list_bottles())
 
 
 def test_text_says_run_time_steps_and_why_it_ended(capsys: pytest.CaptureFixture[str]) -> None:
@@ -117,27 +110,7 @@ def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pyte
     assert (out / "endurance.png").stat().st_size > 10_000
 
 
-def test_a_folder_of_somebody_else_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "mine.txt").write_text("mine")
-    assert main([*QUICK, "--out", str(tmp_path)]) == 2
-    (tmp_path / "mine.txt").rename(tmp_path / "endurance.json")
-    (tmp_path / "endurance.json").write_text("{}")
-    assert main([*QUICK, "--out", str(tmp_path)]) == 2
-    assert [path.name for path in tmp_path.iterdir()] == ["endurance.json"]
-    assert capsys.readouterr().err.count("\n") == 2
-
-
 @pytest.mark.parametrize("old", ["--gas-per-step", "--step-time"])
 def test_an_old_option_answers_with_its_new_name(old: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bottle", f"{old}=1"]) == 2
     assert f"{old} is now called {RENAMED[old]}" in capsys.readouterr().err
-
-
-def test_a_largest_flow_beside_a_recording_is_refused(walk: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bottle", str(walk), "--peak-flow", "5 g/s"]) == 2
-    assert "--peak-flow belongs to --gas-per-stride" in capsys.readouterr().err
-
-
-def test_the_schema_of_a_bottle_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "--schema", "bottle"]) == 0
-    assert json.loads(capsys.readouterr().out)["title"] == "ppafo bottle"

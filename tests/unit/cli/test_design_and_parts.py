@@ -84,14 +84,6 @@ def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: p
     assert "<script" not in report
 
 
-def test_the_json_of_a_design_is_the_same_for_the_same_seed(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    fronts = []
-    for seed in ("5", "5", "6"):
-        assert main(["design", str(folder / "design.toml"), "--seed", seed, "--json"]) == 0
-        fronts.append(json.loads(capsys.readouterr().out)["front"])
-    assert fronts[0] == fronts[1] != fronts[2]
-
-
 def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = folder / "out"
     assert main(["design", str(folder / "sizing.toml"), "--out", str(out)]) == 0
@@ -120,25 +112,6 @@ def test_a_sizing_without_a_suggestion_ends_with_1_and_says_why(
     assert "no valve keeps the error limit" in (folder / "out" / "report.html").read_text()
 
 
-@pytest.mark.parametrize("way", ["front", "profile"])
-def test_an_interrupted_study_writes_nothing_and_ends_with_130(
-    way: str, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("ppafo.analyses.design.trials.run_ensemble", interrupted)
-    file = folder / ("design.toml" if way == "front" else "sizing.toml")
-    assert main(["design", str(file), "--out", str(folder / "out")]) == 130
-    assert not (folder / "out").exists()
-    assert "interrupted; nothing is half written" in capsys.readouterr().err
-
-
-def test_files_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["design", "--list"]) == 0
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["push-off", "torque-task"]
-
-
 def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sets", "parts"]) == 0
     printed = capsys.readouterr().out
@@ -147,9 +120,3 @@ def test_parts_are_listed_with_what_is_doubtful_and_what_is_not_known(capsys: py
     printed = capsys.readouterr().out
     assert "31.6 mm^2  published" in printed
     assert "not known: largest_pressure, nominal_flow, spool_frequency" in printed
-
-
-@pytest.mark.parametrize("name", ["parts", "design"])
-def test_the_layouts_of_the_files_are_published(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "--schema", name]) == 0
-    assert json.loads(capsys.readouterr().out)["$schema"].startswith("https://json-schema.org")

@@ -5,9 +5,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import jsonschema  # type: ignore[import-untyped]
 import pytest
 
 from ppafo import golden_bits
+from ppafo.cli import doctor
 from ppafo.cli.completion import completion_script
 from ppafo.cli.main import main
 from ppafo.engine import loading
@@ -79,6 +81,14 @@ def test_bits_are_compared_with_the_golden_ones_and_another_is_named(
     said = capsys.readouterr().out
     assert "1 of 2 runs" in said
     assert "swing-foot: other bits" in said
+
+
+@pytest.mark.parametrize("name", doctor.FORMATS)
+def test_the_schema_of_each_format_is_printed_and_valid(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--schema", name]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert schema["title"].startswith("ppafo ")
 
 
 def test_two_orders_to_the_doctor_at_once_are_refused(capsys: pytest.CaptureFixture[str]) -> None:

@@ -77,10 +77,3 @@ def test_one_is_written_whole_with_its_folders(capsys: pytest.CaptureFixture[str
     folder = Path("add-a-controller")
     written = {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*.*")}
     assert written == {str(path): content for path, content in example_files("add-a-controller").items()}
-
-
-def test_what_is_there_is_not_touched(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("mine").mkdir()
-    assert main(["new", "example", "study", "--out", "mine"]) == 2
-    assert "mine: already exists" in capsys.readouterr().err
-    assert list(Path("mine").iterdir()) == []

@@ -3,7 +3,6 @@
 import json
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 from ppafo.cli.main import main
@@ -16,11 +15,6 @@ def walk(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     assert main(["gait", "record", "falisse2019-subject1", "--strides", "4", "--out", str(path)]) == 0
     capsys.readouterr()
     return path
-
-
-def test_the_list_names_the_gaits(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["gait", "list", "--json"]) == 0
-    assert [item["name"] for item in json.loads(capsys.readouterr().out)["gaits"]] == ["falisse2019-subject1"]
 
 
 def test_a_gait_is_shown_in_numbers(capsys: pytest.CaptureFixture[str]) -> None:
@@ -71,14 +65,6 @@ def test_the_option_of_other_commands_is_answered_with_the_list_of_a_group(capsy
     assert "'ppafo gait list' shows what there is" in capsys.readouterr().err
 
 
-def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixture[str]) -> None:
-    for name, table in (("gait", "stride"), ("gait-map", "vertical_force")):
-        assert main(["doctor", "--schema", name]) == 0
-        schema = json.loads(capsys.readouterr().out)
-        jsonschema.Draft202012Validator.check_schema(schema)
-        assert table in schema["properties"]
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -93,18 +79,15 @@ def test_the_schemas_describe_a_gait_file_and_a_map(capsys: pytest.CaptureFixtur
         ),
         (["import", "WALK", "--body-mass", "62 kg", "--minimum-strides", "9"], "has 3 whole strides within"),
         (["import", "WALK", "--body-mass", "62 kg", "--map", "none.toml"], "none.toml: cannot be read"),
+        (["import", "WALK", "--body-mass", "6000 kg"], "6000 kg"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(
-    walk: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str
+def test_what_is_wrong_is_said_in_one_line_and_nothing_is_written(
+    walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], message: str
 ) -> None:
-    assert main(["gait", *(str(walk) if word == "WALK" else word for word in words)]) == 2
+    given = [str(walk) if word == "WALK" else word for word in words]
+    assert main(["gait", *given, "--out", str(tmp_path / "gait")]) == 2
+    assert not (tmp_path / "gait").exists()
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert message in said
-
-
-def test_nothing_is_written_where_the_import_is_refused(walk: Path, tmp_path: Path) -> None:
-    out = tmp_path / "gait"
-    assert main(["gait", "import", str(walk), "--body-mass", "6000 kg", "--out", str(out)]) == 2
-    assert not out.exists()

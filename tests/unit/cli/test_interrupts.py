@@ -14,6 +14,19 @@ from pyarrow import parquet
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="signals work differently there")
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")
+THOROUGH = (pytest.mark.long, pytest.mark.thorough)
+
+
+def each_signal(**middles: str) -> pytest.MarkDecorator:
+    """Parameters of each middle with one signal, another for each, and with the others among the thorough tests."""
+    pairs = [
+        pytest.param(middle, name, id=f"{words}-{name}", marks=() if number == place % 3 else THOROUGH)
+        for place, (words, middle) in enumerate(middles.items())
+        for number, name in enumerate(SIGNALS)
+    ]
+    return pytest.mark.parametrize(("middle", "name"), pairs)
+
+
 START = """
 import os, signal, sys
 # Whoever runs the tests in the background lets them ignore interrupts, and a child would inherit that.
@@ -84,8 +97,7 @@ simulate.simulate = interrupted
 """A signal of which somebody makes a mistake of the user."""
 
 
-@pytest.mark.parametrize("name", SIGNALS)
-@pytest.mark.parametrize("middle", [MODEL, REFUSED], ids=["while a model is built", "taken for a mistake"])
+@each_signal(while_a_model_is_built=MODEL, taken_for_a_mistake=REFUSED)
 def test_a_signal_that_became_another_error_is_one_line(middle: str, name: str, tmp_path: Path) -> None:
     code = START.replace("MIDDLE", middle.replace("NAME", name))
     words = [sys.executable, "-c", code, str(tmp_path / "run")]
@@ -93,10 +105,7 @@ def test_a_signal_that_became_another_error_is_one_line(middle: str, name: str, 
     assert (done.returncode, done.stderr) == (130, "ppafo: interrupted; nothing is half written\n")
 
 
-@pytest.mark.parametrize("name", SIGNALS)
-@pytest.mark.parametrize(
-    "middle", [LOST, CAUGHT, COMPILED], ids=["lost in a finaliser", "caught by a library", "dropped by compiled code"]
-)
+@each_signal(lost_in_a_finaliser=LOST, caught_by_a_library=CAUGHT, dropped_by_compiled_code=COMPILED)
 def test_a_signal_whose_exception_got_lost_ends_the_run_all_the_same(middle: str, name: str, tmp_path: Path) -> None:
     code = START.replace("MIDDLE", middle.replace("NAME", name))
     words = [sys.executable, "-c", code, str(tmp_path / "run")]

@@ -128,13 +128,6 @@ def test_the_next_command_is_one_that_there_is(kind: str, capsys: pytest.Capture
     assert build_parser(words[1:]).parse_args(words[1:]).command == words[1]
 
 
-def test_a_file_that_is_there_is_not_overwritten(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("mine.toml").write_text("mine")
-    assert main(["new", "scenario", "mine"]) == 2
-    assert "mine.toml: already exists" in capsys.readouterr().err
-    assert Path("mine.toml").read_text() == "mine"
-
-
 def test_a_copy_that_does_not_load_is_not_left(capsys: pytest.CaptureFixture[str]) -> None:
     main(["new", "set", "bench"])
     main(["new", "scenario", "task"])

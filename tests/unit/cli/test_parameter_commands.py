@@ -9,13 +9,6 @@ import pytest
 from ppafo.cli.main import main
 
 
-def test_the_list_names_every_set(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sets", "list"]) == 0
-    printed = capsys.readouterr().out
-    assert "ppafo2011 " in printed
-    assert "ppafo2011-printed" in printed
-
-
 def test_a_set_is_shown_with_the_source_of_every_value(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sets", "show", "ppafo2011", "--set", "valve.area=12.6mm^2"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -41,27 +34,6 @@ def test_the_audit_takes_overrides_and_prints_json(capsys: pytest.CaptureFixture
     assert main(["sets", "audit", "ppafo2011", "--json", "--set", "friction.static_torque=9 N m"]) == 1
     document = json.loads(capsys.readouterr().out)
     assert [finding["id"] for finding in document["findings"] if finding["severity"] == "error"] == ["torque-ceiling"]
-
-
-def test_out_writes_text_json_and_page_and_leaves_nothing_else(tmp_path: Path) -> None:
-    folder = tmp_path / "new" / "folder"
-    main(["sets", "audit", "ppafo2011", "--out", str(folder)])
-    assert sorted(item.name for item in folder.iterdir()) == [
-        "audit-ppafo2011.json",
-        "audit-ppafo2011.txt",
-        "ppafo.json",
-        "report.html",
-    ]
-
-
-def test_an_unwritable_folder_is_one_line_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "file"
-    file.write_text("")
-    assert main(["sets", "audit", "ppafo2011", "--out", str(file)]) == 2
-    captured = capsys.readouterr()
-    assert captured.err.startswith(f"ppafo: --out {file}: is a file; a result of 'ppafo sets audit' needs a folder")
-    assert captured.err.count("\n") == 1
-    assert captured.out == ""
 
 
 @pytest.mark.parametrize(
@@ -91,34 +63,6 @@ def test_a_place_that_cannot_be_written_is_found_before_any_work(
     assert captured.err.count("\n") == 1
     assert captured.out == ""
     assert file.read_text() == "mine"
-
-
-@pytest.mark.parametrize(("command", "name"), [(["reproduce"], "report.html"), (["simulate", "step-response"], "x")])
-def test_a_folder_in_the_place_of_a_file_is_found_before_any_work(
-    command: list[str], name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / name).mkdir()
-    assert main([*command, "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert [entry.name for entry in tmp_path.iterdir()] == [name]
-
-
-def test_a_line_break_in_a_name_does_not_break_the_line_of_the_message(capsys: pytest.CaptureFixture[str]) -> None:
-    for words in (
-        ["export", "figure", "a\nb"],
-        ["sets", "audit", "a\nb"],
-        ["simulate", "a\nb.toml"],
-        ["doctor", "--schema", "a\nb"],
-    ):
-        assert main(words) == 2
-        error = capsys.readouterr().err
-        assert "a b" in error
-        assert error.count("\n") == 1
-
-
-def test_the_schema_is_printed_as_json(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "--schema", "parameters"]) == 0
-    assert json.loads(capsys.readouterr().out)["title"] == "ppafo parameter set"
 
 
 def test_several_sets_are_audited_side_by_side(capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,16 +9,11 @@ from ppafo.cli.main import main
 from ppafo.storage import read_csv
 
 
-def test_the_list_names_experiments_and_presets(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_list_names_the_presets_too(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["rig", "simulate", "--list"]) == 0
     printed = capsys.readouterr().out
     assert "synthetic" in printed
-    assert "vane-leak" in printed
-    assert "worn-seals" in printed
-    assert main(["rig", "simulate", "--list", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)
-    assert "step-response" in [item["name"] for item in listed["experiments"]]
-    assert [item["name"] for item in listed["presets"]] == ["ideal-laboratory", "paper-bench", "worn-seals"]
+    assert all(name in printed for name in ("ideal-laboratory", "paper-bench", "worn-seals"))
 
 
 def test_recordings_of_one_bench_share_a_folder_and_its_truth(
@@ -47,17 +42,9 @@ def test_the_same_command_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_device_and_overrides_reach_the_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = [
-        "--device",
-        "ppafo2011",
-        "--valve",
-        "solenoid",
-        "--set",
-        "valve.area=10mm^2",
-        "--set",
-        "rig.flow_sensor.noise=0 kg/s",
-    ]
-    assert main(["rig", "simulate", "open-valve-flow", *words, "--json", "--out", str(tmp_path)]) == 0
+    words = ["--device", "ppafo2011", "--valve", "solenoid", "--set", "valve.area=10mm^2"]
+    words += ["--set", "rig.flow_sensor.noise=0 kg/s", "--json", "--out", str(tmp_path)]
+    assert main(["rig", "simulate", "open-valve-flow", *words]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["device"]["valve"]["area"] == pytest.approx(1e-5)
     assert document["preset"]["values"]["flow_sensor.noise"] == 0.0

@@ -1,7 +1,9 @@
 """``ppafo simulate`` and ``ppafo export figure``."""
 
+import contextlib
 import dataclasses
 import html
+import io
 import json
 import os
 import signal
@@ -34,19 +36,25 @@ def names(folder: Path) -> list[str]:
 
 
 @pytest.fixture(scope="module")
-def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A result folder of a run that is shared by the tests below; they do not change its files."""
-    folder = tmp_path_factory.mktemp("results") / "step"
-    assert main(["simulate", "step-response", "--out", str(folder)]) == 0
-    return folder
+def ran(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A run that is shared by the tests below: its folder, and what it printed."""
+    folder, printed = tmp_path_factory.mktemp("results") / "step", io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        assert main(["simulate", "step-response", "--out", str(folder)]) == 0
+    return folder, printed.getvalue()
 
 
-def test_a_run_prints_its_metrics_and_where_the_files_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["simulate", "step-response", "--out", str(tmp_path / "step")]) == 0
-    printed = capsys.readouterr().out
+@pytest.fixture
+def saved(ran: tuple[Path, str]) -> Path:
+    """The folder of that run, whose files the tests do not change."""
+    return ran[0]
+
+
+def test_a_run_prints_its_metrics_and_where_the_files_are(ran: tuple[Path, str]) -> None:
+    folder, printed = ran
     assert printed.startswith("step-response: completed\n")
     assert "angle_range" in printed
-    assert str(tmp_path / "step") in printed.splitlines()[-1]
+    assert str(folder) in printed.splitlines()[-1]
 
 
 def test_a_run_writes_a_whole_result_folder_and_nothing_else(saved: Path) -> None:
@@ -65,55 +73,17 @@ def test_the_report_has_the_metrics_the_figure_and_the_run_to_drag(saved: Path) 
     assert "default-src 'none'" in page
 
 
-def test_without_a_folder_the_result_goes_to_out_and_the_name_of_the_scenario(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_the_same_command_gives_the_same_files_without_a_folder_under_out_and_json_alone_is_printed(
+    saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["simulate", "step-response"]) == 0
-    assert names(tmp_path / "out" / "step-response") == FILES
-
-
-def test_json_is_the_only_thing_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["simulate", "step-response", "--json", "--out", str(tmp_path / "step")]) == 0
+    assert main(["simulate", "step-response", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["metrics"]["gas_supplied"]["unit"] == "kg"
-    assert document["folder"] == str(tmp_path / "step")
-
-
-def test_an_override_reaches_the_device_of_the_saved_scenario(tmp_path: Path) -> None:
-    folder = tmp_path / "step"
-    assert main(["simulate", "step-response", "--set", "valve.area=12.6mm^2", "--out", str(folder)]) == 0
-    scenario = read_result(folder).document["scenario"]
-    assert scenario["device"]["valve"]["area"] == 12.6e-6
-    assert scenario["origin"]["overrides"] == ["valve.area=12.6mm^2"]
-
-
-def test_the_same_command_gives_the_same_files(saved: Path, tmp_path: Path) -> None:
-    assert main(["simulate", "step-response", "--out", str(tmp_path / "again")]) == 0
+    assert document["folder"] == "out/step-response"
+    assert names(tmp_path / "out" / "step-response") == FILES
     for name in FILES:
-        assert (tmp_path / "again" / name).read_bytes() == (saved / name).read_bytes(), name
-
-
-def test_the_list_names_every_scenario_with_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["simulate", "--list"]) == 0
-    assert "step-response " in capsys.readouterr().out
-    assert main(["simulate", "--list", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["scenarios"]
-    assert all(item["description"] for item in listed)
-    assert "torque-task-solenoid" in [item["name"] for item in listed]
-
-
-def test_a_folder_with_other_files_is_refused_before_anything_runs(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def never(*arguments: object) -> None:
-        raise AssertionError("it ran")
-
-    monkeypatch.setattr("ppafo.simulation.simulate.simulate", never)
-    (tmp_path / "thesis.txt").write_text("years of work")
-    assert main(["simulate", "step-response", "--out", str(tmp_path)]) == 2
-    assert "is not empty and not a ppafo result" in capsys.readouterr().err
-    assert names(tmp_path) == ["thesis.txt"]
+        assert (tmp_path / "out" / "step-response" / name).read_bytes() == (saved / name).read_bytes(), name
 
 
 def test_a_saved_result_is_drawn_again_without_running_it(
@@ -224,12 +194,15 @@ def test_a_mark_that_says_its_files_in_another_form_is_refused(
     assert names(tmp_path) == ["ppafo.json", "recording.nc"]
 
 
-def test_a_pressure_is_shown_above_the_atmosphere_of_the_device(
+def test_overrides_reach_the_saved_device_and_a_pressure_is_shown_above_its_atmosphere(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["supply.atmospheric_pressure=83 kPa_a", "supply.pressure=55 psi_g", "run.duration=0.2 s"]
     sets = [part for word in words for part in ("--set", word)]
     assert main(["simulate", "step-response", *sets, "--check", "--out", str(tmp_path / "high")]) == 0
+    scenario = read_result(tmp_path / "high").document["scenario"]
+    assert scenario["device"]["supply"]["atmospheric_pressure"] == 83e3
+    assert scenario["origin"]["overrides"] == words
     shown = [line.split()[:3] for line in capsys.readouterr().out.splitlines() if "largest_pressure" in line]
     assert [row[0] for row in shown[:2]] == ["largest_pressure", "largest_pressure"]
     assert {tuple(row[1:]) for row in shown[:2]} == {("55", "psi_g")}
@@ -271,7 +244,7 @@ def test_a_damaged_result_is_one_line_and_exit_code_2(
 def test_a_diverged_run_is_written_and_told_on_the_side_with_exit_code_1(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    simulated = simulate(load_scenario("step-response"))
+    simulated = simulate(load_scenario("step-response", ["run.duration=0.1 s"]))
 
     def diverging(scenario: Scenario) -> Result:
         assert scenario.name == "step-response"

@@ -2,7 +2,6 @@
 
 import os
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -10,8 +9,6 @@ import pytest
 from ppafo.engine.cache.folder import TEXTS
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.cache.tidying import clear, kept_sizes
-
-Make = Callable[[], bytes]
 
 
 class Maker:

@@ -35,7 +35,7 @@ from tests.built_once import shared_library
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
-DRAWS, RUNS = 40, 4
+DRAWS, RUNS = 20, 3
 SPREAD = (0.9, 1.1)
 """Smallest and largest factor on a setting of a draw; one that is 0 stays 0, as another program would be needed."""
 Values = dict[str, float]

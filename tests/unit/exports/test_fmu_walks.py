@@ -1,9 +1,6 @@
 """A walk as a functional mock-up unit: the closed loop and the plant on its leg have the bits of the lanes."""
 
 import importlib
-import subprocess
-import sys
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -65,26 +62,6 @@ def test_fmpy_finds_no_fault_and_every_output_is_that_of_the_lanes(loop: str, wa
     assert {name: float(np.abs(found[name] - recording[name]).max()) for name in shown} == dict.fromkeys(shown, 0.0)
 
 
-def test_the_toolbox_for_units_finds_nothing(loop: str, plant: str) -> None:
-    pytest.importorskip("fmu_manipulation_toolbox", reason="fmu-manipulation-toolbox is not installed")
-    for unit in (loop, plant):
-        command = [sys.executable, "-m", "fmu_manipulation_toolbox", "-input", unit, "-check"]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        said = (done.stdout + done.stderr).splitlines()
-        assert done.returncode == 0
-        assert not [line for line in said if line.startswith(("ERROR", "WARNING", "CRITICAL"))]
-
-
-def test_the_units_hold_sources_that_build_them_without_a_warning(loop: str, plant: str, tmp_path: Path) -> None:
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-fsyntax-only"]
-    for number, unit in enumerate((loop, plant)):
-        folder = tmp_path / str(number)
-        with zipfile.ZipFile(unit) as archive:
-            archive.extractall(folder)
-        subprocess.run(["gcc", *flags, *map(str, (folder / "sources").glob("fmi?.c"))], check=True)
-        assert "@" not in (folder / "documentation" / "index.html").read_text()
-
-
 def test_wearer_controller_and_sensors_are_parameters_and_metrics_can_be_read(loop: str, walked: WalkResult) -> None:
     found = {item.name: item for item in fmpy.read_model_description(loop).modelVariables}
     changes = {name: found[name].variability for name in ("wearer.foot_mass", "wearer.residual_share", "run.duration")}
@@ -98,19 +75,6 @@ def test_wearer_controller_and_sensors_are_parameters_and_metrics_can_be_read(lo
     }
     assert read == pytest.approx({name: walked.metrics[name].value for name in read}, rel=1e-12)
     instance.close()
-
-
-def test_a_state_that_is_restored_goes_on_with_the_same_bits(loop: str) -> None:
-    instance = Instance(loop)
-    instance.go_to(1.5)
-    kept = instance.kept()
-    first = instance.course(1.5, 1.7)
-    later = Instance(loop)
-    for other in (instance, later):
-        state = other.restored(kept)
-        assert other.course(1.5, 1.7) == first
-        other.drop(state)
-        other.close()
 
 
 def test_a_parameter_that_is_tuned_acts_and_one_that_would_change_the_steps_is_refused(

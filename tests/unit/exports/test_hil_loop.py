@@ -205,19 +205,6 @@ def test_no_disturbance_of_the_wire_crashes_or_holds_pressure(fault: Fault, seed
     assert replayed_is_same(found)
 
 
-def test_a_wire_that_carries_nothing_any_more_leaves_no_pressure() -> None:
-    partner = ProportionalPartner()
-    dead = faults(lost=1.0, late=0.0, doubled=0.0, garbled=0.0)
-
-    def cut(draw: random.Random, arrival: float, data: bytes) -> list[tuple[float, bytes]]:
-        return (undisturbed if partner.seen[-1].sequence < 100 else dead)(draw, arrival, data)
-
-    found = run_on(VirtualWire(partner.answers, fault=cut), plant("run.duration=1.2 s", *AT_REST))
-    recording = found.result.recording
-    assert recording["pressure_1"].max() > 1.2 * recording["pressure_1"][-1]
-    assert recording["pressure_1"][-1] == pytest.approx(101_325.0, rel=0.02)
-
-
 def test_a_run_that_is_stopped_vents_and_its_log_is_whole() -> None:
     partner = ProportionalPartner()
     wire = VirtualWire(partner.answers)

@@ -20,7 +20,6 @@ from ppafo.errors import DataError
 from ppafo.exports.hil.recording import Collector, Recorded, kept_aside, record
 from ppafo.exports.hil.wire import COMPUTED, OVER, WRAP, Answer, Reader, Sample, answer_bytes, count_of, sample_bytes
 from ppafo.storage import read_recording
-from ppafo.storage.comma_separated import write_csv
 from tests.virtual_wire import free_port, sending_bench
 
 START = WRAP - 50_000
@@ -221,19 +220,10 @@ def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(
     stranger = threading.Thread(target=send_garbage)
     stranger.start()
     time.sleep(0.05)
-    words = [
-        "rig",
-        "record",
-        "--port",
-        f"udp:127.0.0.1:{port}",
-        "--patience",
-        "20 s",
-        "--out",
-        str(tmp_path / "bench.csv"),
-    ]
+    words = ["rig", "record", "--port", f"udp:127.0.0.1:{port}", "--patience", "20 s"]
     try:
         with sending_bench(port, 0.5):
-            assert main(words) == 0
+            assert main([*words, "--out", str(tmp_path / "bench.csv")]) == 0
     finally:
         stop.set()
         stranger.join()
@@ -257,15 +247,6 @@ def test_a_place_that_cannot_be_written_is_refused_before_anything_is_recorded(
     said = capsys.readouterr().err
     assert "/dev/null" in said
     assert len(said.splitlines()) == 1  # it has not even listened
-
-
-def test_a_file_that_is_there_is_not_replaced(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    recording = played([packet(number) for number in range(3)]).recording
-    path = write_csv(tmp_path / "mine.csv", recording)
-    before = path.read_bytes()
-    assert main(["rig", "record", "--port", "udp:127.0.0.1:5000", "--out", str(path)]) == 2
-    assert "already exists" in capsys.readouterr().err
-    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("order", ["as sent", "shuffled"])

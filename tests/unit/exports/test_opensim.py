@@ -59,14 +59,6 @@ def test_times_that_are_no_heel_strikes_are_refused(walked: WalkResult, strikes:
         device_torque(walked, "right", strikes)
 
 
-def test_the_command_writes_the_folder(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = tmp_path / "for opensim"
-    words = ["export", "opensim", "solenoid", "--minutes", "0.1", "--strikes", "0.5,1.6", "--out", str(folder)]
-    assert main(words) == 0
-    assert {path.name for path in folder.iterdir()} == {"device_torque.sto", "walk.sto", "ppafo.json"}
-    assert "load '" in capsys.readouterr().out
-
-
 def test_a_recording_is_written_with_what_it_has(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_csv(tmp_path / "walk.csv", walk_recording(load_gait("falisse2019-subject1"), 2))
     words = ["export", "opensim", str(tmp_path / "walk.csv"), "--out", str(tmp_path / "out")]
@@ -123,9 +115,12 @@ def test_a_motion_may_begin_below_0_s_and_the_help_says_how(tmp_path: Path, caps
     with pytest.raises(SystemExit):
         main(["export", "opensim", "--help"])
     assert "--strikes=-0.4,0.8" in capsys.readouterr().out
-    words = ["export", "opensim", "solenoid", "--minutes", "0.1", "--strikes=-0.4,0.8", "--out", str(tmp_path / "out")]
+    folder = tmp_path / "for opensim"
+    words = ["export", "opensim", "solenoid", "--minutes", "0.1", "--strikes=-0.4,0.8", "--out", str(folder)]
     assert main(words) == 0
-    times = read_opensim(tmp_path / "out" / "device_torque.sto").time
+    assert {path.name for path in folder.iterdir()} == {"device_torque.sto", "walk.sto", "ppafo.json"}
+    assert "load '" in capsys.readouterr().out
+    times = read_opensim(folder / "device_torque.sto").time
     assert (times[0], times[-1]) == (-0.4, 0.8)
 
 

@@ -21,7 +21,7 @@ from ppafo.walking import list_walks, load_walk
 from scripts.wasm_programs import FOLDER, shipped_programs
 from tests.modules_under_node import DIVERGED, REFUSED, assert_alike, assert_same, compared, drawn, drawn_walks, driven
 
-DRAWS, WALKS = 50, 10
+DRAWS, WALKS = 20, 10
 MOVED = (
     *("valve.area=20 mm^2", "run.step=0.5 ms", "run.duration=2 s", "controller.period=2 ms", "motion.angle=80 deg"),
     "sensors.seed=3",

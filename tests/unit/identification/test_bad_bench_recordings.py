@@ -1,7 +1,6 @@
 """Every procedure of the bench refuses or flags what its recording cannot carry, by file, channel and sample."""
 
 from collections.abc import Callable
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -9,9 +8,6 @@ import pytest
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import (
     BenchResult,
-    OpenValveFlowSettings,
-    ValveMapSettings,
-    VaneLeakSettings,
     free_decay,
     open_valve_flow,
     static_torque,
@@ -20,6 +16,7 @@ from ppafo.identification.bench import (
 )
 from ppafo.identification.source import Source
 from ppafo.signals import Recording
+from tests.unit.identification import planted
 
 VOLUME = 60e-6
 NEEDED = {
@@ -33,17 +30,16 @@ Solve = Callable[[Source], BenchResult]
 
 
 @pytest.fixture
-def bench(planted: ModuleType) -> dict[str, tuple[Source, Solve]]:
+def bench() -> dict[str, tuple[Source, Solve]]:
     """A good recording for each procedure, and the procedure."""
     co2 = planted.CO2
     leak = planted.leak("orifice", 3.39e-8)
-    leak_settings = VaneLeakSettings(co2, VOLUME, VOLUME / 1.3, 0.113)
     return {
         "static-torque": (planted.static(), lambda source: static_torque((source,))),
         "free-decay": (planted.decay(), lambda source: free_decay((source,))),
-        "open-valve-flow": (planted.flow(), lambda source: open_valve_flow((source,), OpenValveFlowSettings(co2))),
-        "valve-map": (planted.sweep(), lambda source: valve_map((source,), ValveMapSettings(co2))),
-        "vane-leak": (leak, lambda source: vane_leak((source,), leak_settings)),
+        "open-valve-flow": (planted.flow(), lambda source: open_valve_flow((source,), co2)),
+        "valve-map": (planted.sweep(), lambda source: valve_map((source,), co2)),
+        "vane-leak": (leak, lambda source: vane_leak((source,), co2, VOLUME, VOLUME / 1.3, 0.113)),
     }
 
 
@@ -70,7 +66,9 @@ def test_a_missing_channel_is_named(bench: dict[str, tuple[Source, Solve]], kind
     source, solve = bench[kind]
     kept = {name: item for name, item in source.recording.channels.items() if name != channel}
     bare = Source(Recording(source.recording.label, source.recording.time, kept))
-    assert f"needs a channel '{channel} [" in refusal(solve, bare)
+    text = refusal(solve, bare)
+    assert f"needs a channel '{channel} [" in text
+    assert "the file has " in text
 
 
 @pytest.mark.parametrize("kind", NEEDED)
@@ -160,7 +158,7 @@ def test_noise_alone_is_no_decay(bench: dict[str, tuple[Source, Solve]]) -> None
 
 
 def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
-    bench: dict[str, tuple[Source, Solve]], planted: ModuleType
+    bench: dict[str, tuple[Source, Solve]],
 ) -> None:
     _, solve = bench["free-decay"]
     smooth = planted.decay(noise=0.0)

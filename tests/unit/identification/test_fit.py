@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.fit import SMOOTH, Block, Fit, Free, Noise, burg, fit, noise_of, whiten
+from ppafo.identification.conflict import SMOOTH
+from ppafo.identification.fit import Fit, fit
+from ppafo.identification.noise import Noise, burg, noise_of, whiten
+from ppafo.identification.residuals import Block, Free
 from ppafo.signals.recording import Floats
 
 _COUNT = 300
@@ -216,3 +219,18 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
 def test_a_fit_that_cannot_begin_says_why(numbers: tuple[Free, ...], blocks: tuple[Block, ...], said: str) -> None:
     with pytest.raises(IdentificationError, match=said):
         fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
+
+
+def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_ends() -> None:
+    # Of the two the samples tell the product alone: at the upper end the exponent is at the lower one of its prior.
+    measured = 2.0 * np.ones((_COUNT, 1)) + 0.01 * np.random.default_rng(1).normal(size=(_COUNT, 1))
+    numbers = (Free("size", 1.0, 0.1, 100.0, 1.0), Free("exponent", 0.0, -5.0, 5.0, 0.8, 0.8))
+
+    found = fit(
+        lambda points: measured - points[0] * np.exp(points[1]) * np.ones((_COUNT, 1)),
+        numbers,
+        (Block("only", "first", slice(0, _COUNT)),),
+    )
+
+    assert found.high[0] == pytest.approx(2.0 * math.exp(1.96 * 0.8), rel=0.1)
+    assert found.low[0] <= 2.0 * math.exp(-1.96 * 0.8)

@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from types import ModuleType
 
 import pytest
 
@@ -29,6 +28,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 from ppafo.storage.result_folder import read_recording
 from ppafo.units import to_si
+from tests.unit.identification import planted
 
 HEAD = 'schema_version = 1\nname = "twin"\ndevice.set = "ppafo2011"\n'
 STATIC = '[[procedure]]\nkind = "static-torque"\nrecordings = ["static.csv"]\n'
@@ -43,7 +43,7 @@ Solve = Callable[[str], Identification]
 
 
 @pytest.fixture
-def bench(tmp_path: Path, planted: ModuleType) -> Path:
+def bench(tmp_path: Path) -> Path:
     """A folder with one recording for each procedure."""
     leak = planted.leak("orifice", 0.3e-6 * 0.113)
     growing = planted.static(growth=8.0e-7)
@@ -71,7 +71,7 @@ def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(
     assert names == ["static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"]
 
 
-def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solved: Solve, planted: ModuleType) -> None:
+def test_every_planted_value_gets_into_the_new_set_with_interval_and_origin(solved: Solve) -> None:
     outcome = solved(ALL)
     new = outcome.new_set.parameter_set
     assert set(outcome.new_set.written) == {
@@ -122,9 +122,7 @@ def test_the_new_set_reads_back_and_makes_a_device(solved: Solve, bench: Path) -
     assert outcome.is_good
 
 
-def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(
-    solved: Solve, bench: Path, planted: ModuleType
-) -> None:
+def test_a_value_that_is_not_identified_is_written_as_fitted_and_not_counted(solved: Solve, bench: Path) -> None:
     bent = planted.static().recording
     pressure = bent["pressure_difference"]
     write_csv(bench / "bent.csv", bent.with_channel("torque", bent["torque"] + 2.0 * (pressure / 6.5e5) ** 2, "N m"))
@@ -359,16 +357,17 @@ def test_bench_and_trajectory_hold_a_number_alike() -> None:
     experiment = Experiment("step", scenario, simulate(scenario).recording)
     stated = stated_by(chosen.parameter_set, scenario)
     held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
-    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg").settings(chosen)
-    decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",)).settings(chosen)
-    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2").settings(chosen)
-    assert decay.inertia_deviation == held["foot_plate.inertia"] == told.inertia_deviation
-    assert leak.gas.temperature_deviation == held["gas.temperature"]
+    leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg")
+    decay = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",))
+    told = FreeDecayProblem(kind="free-decay", recordings=("decay.csv",), inertia="8.4 g m^2")
+    assert decay.inertia_of(chosen)[1] == held["foot_plate.inertia"] == told.inertia_of(chosen)[1]
+    assert chosen.gas(leak).temperature_deviation == held["gas.temperature"]
     # The displacement is known as well as the torque constant, which it follows.
     swept = math.radians(60.0) - device.actuator.angle_min
     volume = math.hypot(held["actuator.dead_volume_1"], swept * held["actuator.torque_constant"])
-    assert leak.volume_1 is not None
-    assert leak.volume_deviation == pytest.approx(volume / leak.volume_1)
+    first, _, deviation = leak.volumes_of(chosen)
+    assert first is not None
+    assert deviation == pytest.approx(volume / first)
 
 
 def test_a_measured_gas_temperature_takes_the_place_of_the_set_s(solved: Solve) -> None:

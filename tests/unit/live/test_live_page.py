@@ -24,36 +24,6 @@ from scripts.live_page import check_bits, check_damage, check_refusals, missing,
 from scripts.page_states import address_of
 
 MOST_BYTES = 250_000
-HARD_TEXTS = (
-    *(
-        "",
-        " ",
-        "ambient",
-        "supply",
-        "1 mm²",
-        "1 mm**2",
-        "1 mm ^ 2",
-        "1mm^2 ",
-        "\u00a01\u00a0mm^2",
-        "1\u2028mm^2",
-        "1 m m",
-    ),
-    *(
-        "1 µs",
-        "1 us",
-        "1 μs",
-        "5 % ",
-        "1 \u00b0",
-        "1\tms",
-        "1\x1cms",
-        "1\x85ms",
-        "\ufeff1 ms",
-        "1 ms\n",
-        "1;2",
-        "1e5 Pa_g",
-    ),
-    *("5 psi_g", "5psi_g", "5 psi", "5 psi_d", "1_0 ms", "\u0661 ms", "1e-3 s", "1.e-3s", ".001 s", "+.001 s", "--1 s"),
-)
 SOURCES = Path(__file__).parents[3] / "page"
 TOOLS = SOURCES / "node_modules"
 has_browser = pytest.mark.skipif(bool(missing()), reason=missing() or "there is a browser")

@@ -18,11 +18,6 @@ def document_of(name: str) -> dict[str, Any]:
     return tomllib.loads((resources.files("ppafo.parameters") / "sets" / f"{name}.toml").read_text(encoding="utf-8"))
 
 
-def test_the_schema_is_itself_valid() -> None:
-    validator = jsonschema.Draft202012Validator
-    assert not list(validator(validator.META_SCHEMA).iter_errors(json_schema()))
-
-
 @pytest.mark.parametrize("name", list_sets())
 def test_every_set_of_the_package_fits_the_schema(name: str) -> None:
     assert not list(jsonschema.Draft202012Validator(json_schema()).iter_errors(document_of(name)))

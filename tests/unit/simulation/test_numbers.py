@@ -1,6 +1,8 @@
 """Numbers of a scenario by dotted path."""
 
+from collections import Counter
 from dataclasses import replace
+from functools import cache
 
 import pytest
 
@@ -10,6 +12,18 @@ from ppafo.parameters.overrides import over
 from ppafo.simulation.loading import list_scenarios, load_scenario
 from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.scenario import scenario_document
+
+
+@cache
+def looked_at() -> dict[str, set[str]]:
+    """Numbers by scenario: each in the first two that have it, and a fifth of the others, in turn."""
+    seen: Counter[str] = Counter()
+    chosen: dict[str, set[str]] = {}
+    for number, name in enumerate(list_scenarios()):
+        declared = list(declared_numbers(load_scenario(name)))
+        chosen[name] = {path for place, path in enumerate(declared) if seen[path] < 2 or place % 5 == number % 5}
+        seen.update(declared)
+    return chosen
 
 
 @pytest.mark.parametrize("name", list_scenarios())
@@ -22,8 +36,9 @@ def test_a_replaced_number_is_the_single_run_with_it(name: str) -> None:
     }
     declared = declared_numbers(scenario)
     paths = [path for path in declared if path not in {*TIMES, *absent}]
-    assert len(paths) > 35
-    for path in paths:
+    chosen = looked_at()[name] & set(paths)
+    assert len(chosen) > 8
+    for path in chosen:
         before, quantity = number_at(scenario, path), declared[path]
         # A pressure that is wanted stays above the atmosphere.
         part = 1.001 if path == "reference.start_level" else 0.999

@@ -1,6 +1,5 @@
 """The published schema says the same as the loader."""
 
-import json
 import tomllib
 from importlib import resources
 from typing import Any
@@ -8,7 +7,6 @@ from typing import Any
 import jsonschema  # type: ignore[import-untyped]
 import pytest
 
-from ppafo.cli.main import main
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.schema import json_schema
@@ -16,11 +14,6 @@ from ppafo.simulation.schema import json_schema
 
 def document_of(name: str) -> dict[str, Any]:
     return tomllib.loads((resources.files("ppafo") / "scenarios" / f"{name}.toml").read_text(encoding="utf-8"))
-
-
-def test_the_schema_is_itself_valid() -> None:
-    validator = jsonschema.Draft202012Validator
-    assert not list(validator(validator.META_SCHEMA).iter_errors(json_schema()))
 
 
 @pytest.mark.parametrize("name", list_scenarios())
@@ -52,8 +45,3 @@ def test_the_schema_knows_every_controller_and_profile_and_their_settings() -> N
         assert (controller.name, frozenset(names)) in described
     for profile in PROFILES.values():
         assert (profile.name, frozenset({"kind", *(quantity.name for quantity in profile.quantities)})) in described
-
-
-def test_the_command_line_prints_the_schema(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", "--schema", "scenario"]) == 0
-    assert json.loads(capsys.readouterr().out)["title"] == "ppafo scenario"

@@ -116,7 +116,7 @@ def test_a_cylinder_brings_the_ankle_near_to_the_healthy_one() -> None:
 
 @pytest.mark.parametrize("actuator", [CYLINDER, BLADDER], ids=["cylinder", "bladder"])
 def test_compiled_and_in_python_a_walk_has_the_same_bits(actuator: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    batch = batch_of(plan_walk(with_duration(load_walk("proportional", [actuator, *NOISY]), 1.4)))
+    batch = batch_of(plan_walk(with_duration(load_walk("proportional", [actuator, *NOISY]), 0.4)))
     compiled = run_batch(batch)
     monkeypatch.setenv(BACKEND_VARIABLE, PYTHON)
     assert run_batch(batch).states.tobytes() == compiled.states.tobytes()

@@ -173,7 +173,9 @@ NOISE = [
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
-@pytest.mark.parametrize("sensors", [IDEAL, STEPS, NOISE], ids=["ideal", "steps", "noise"])
+@pytest.mark.parametrize(
+    "sensors", [pytest.param(IDEAL, marks=pytest.mark.thorough), STEPS, NOISE], ids=["ideal", "steps", "noise"]
+)
 def test_nobody_of_two_hundred_wearers_is_vented_without_a_fault(name: str, sensors: list[str]) -> None:
     configuration = load_walk(name, [f"sensors.{text}" for text in sensors])
     people = walk_population(configuration, minutes=0.4, wearers=200, seed=1)

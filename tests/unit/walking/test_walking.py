@@ -14,7 +14,6 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk
 
 CONTROLLERS = ("off", "event_on_off", "event_proportional")
-STRIDE = 1.0384
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.analyses.compare.pairs import Paired, pareto_front
+from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Interval, Kind, of_metric
@@ -55,8 +56,8 @@ class Case:
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run, nan where it has none."""
-        found = self.metrics.get(metric)
-        return math.nan if found is None else found.value
+        values = self.metrics.get(metric)
+        return math.nan if values is None else values.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,33 +120,33 @@ _PARETO = (
 )
 
 
-@in_units(lambda found: found.tasks[0].cases[0].scenario.device.shown)
-def finding_of(found: Compared) -> Finding[Compared]:
+@in_units(lambda comparison: comparison.tasks[0].cases[0].scenario.device.shown)
+def finding_of(comparison: Compared) -> Finding[Compared]:
     """Return a comparison in words, tables and panels."""
-    names = found.configurations
-    has_errors = _ERROR in found.metrics
-    said = [_READING] if found.draws else []
-    counts = ((len(found.tasks), "task"), (len(found.varied), "uncertain value"))
-    tasks, values = (f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts)
-    lead = f"{len(names)} configurations on {tasks}, baseline {found.baseline}; "
-    if not found.draws:
+    names = comparison.configurations
+    has_errors = _ERROR in comparison.metrics
+    said = [_READING] if comparison.draws else []
+    tasks, values = count_of(len(comparison.tasks), "task"), count_of(len(comparison.varied), "uncertain value")
+    lead = f"{len(names)} configurations on {tasks}, baseline {comparison.baseline}; "
+    if not comparison.draws:
         lead += "the nominal device, without uncertainty"
-    elif not found.varied:
-        lead += f"the nominal device, over {found.draws:,} draws of the sensor noise"
+    elif not comparison.varied:
+        lead += f"the nominal device, over {comparison.draws:,} draws of the sensor noise"
     else:
-        lead += f"{found.draws:,} draws of {values}{' and of the sensor noise' if found.has_noise else ''}, the same "
-        lead += f"for all; each interval with {100.0 * found.confidence:g} % confidence"
+        beside = " and of the sensor noise" if comparison.has_noise else ""
+        lead += f"{comparison.draws:,} draws of {values}{beside}, the same for all; each "
+        lead += f"interval with {100.0 * comparison.confidence:g} % confidence"
     pareto, change = (
         Part(
             "Error against gas",
-            panels=partial(_pareto_panels, found),
+            panels=partial(_pareto_panels, comparison),
             name="pareto",
             caption=_PARETO,
             is_detail=True,
         ),
         Part(
             "Spread of the change",
-            panels=partial(_change_panels, found),
+            panels=partial(_change_panels, comparison),
             name="change",
             caption="Change against the baseline in each draw; the dashed line is the nominal device.",
             across=2,
@@ -156,29 +157,29 @@ def finding_of(found: Compared) -> Finding[Compared]:
     return Finding(
         name="compare",
         kicker="Comparison",
-        title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {found.baseline}",
+        title=" and ".join(names) if len(names) == 2 else f"{len(names)} configurations against {comparison.baseline}",
         said=(lead,),
         parts=(
-            *(part for task in found.tasks for part in _parts(found, task)),
+            *(part for task in comparison.tasks for part in _parts(comparison, task)),
             *([pareto] if has_errors else []),
-            *([change] if has_errors and found.draws else []),
-            Part(remarks=found.remarks),
+            *([change] if has_errors and comparison.draws else []),
+            Part(remarks=comparison.remarks),
             Part("How to read it" if said else "", said=said, is_detail=True),
         ),
-        found=found,
-        passed=all(case.status.is_completed for task in found.tasks for case in task.cases),
-        live=partial(live_part, [case.scenario for task in found.tasks for case in task.cases]),
+        found=comparison,
+        passed=all(case.status.is_completed for task in comparison.tasks for case in task.cases),
+        live=partial(live_part, [case.scenario for task in comparison.tasks for case in task.cases]),
     )
 
 
-def _parts(found: Compared, task: OnTask) -> list[Part]:
+def _parts(comparison: Compared, task: OnTask) -> list[Part]:
     """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
-    where = "" if len(found.tasks) == 1 else f", {task.task}"
-    kinds = [(name, of_metric(name)) for name in found.metrics]
+    where = "" if len(comparison.tasks) == 1 else f", {task.task}"
+    kinds = [(name, of_metric(name)) for name in comparison.metrics]
     best = {
         metric: ", ".join(f"{name} {_PROBABILITY.interval(each)}" for name, each in task.best[metric].items())
         for metric in (_ERROR, _GAS)
-        if len(found.configurations) > 2 and task.best.get(metric)
+        if len(comparison.configurations) > 2 and task.best.get(metric)
     }
     return [
         Part(
@@ -190,7 +191,7 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
             ],
         ),
         *(
-            Part(f"{name} against {found.baseline}{where}", _paired(found, task, name))
+            Part(f"{name} against {comparison.baseline}{where}", _paired(comparison, task, name))
             for name, pairs in task.pairs.items()
             if pairs
         ),
@@ -201,52 +202,52 @@ def _parts(found: Compared, task: OnTask) -> list[Part]:
 _PROBABILITY = Kind(form=".4g")
 
 
-def _paired(found: Compared, task: OnTask, name: str) -> list[Column]:
+def _paired(comparison: Compared, task: OnTask, name: str) -> list[Column]:
     """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
     pairs = task.pairs[name]
-    kinds = [of_metric(item.metric, "+.3g") for item in pairs]
+    kinds = [of_metric(pair.metric, "+.3g") for pair in pairs]
     nominal = []
-    for item in pairs:
-        first, other = (task.case(each).value(item.metric) for each in (found.baseline, name))
+    for pair in pairs:
+        first, other = (task.case(each).value(pair.metric) for each in (comparison.baseline, name))
         nominal.append(_percent((other - first) / abs(first)) if first else "")
     spread = [
-        f"{_percent(item.change)} ({_percent(item.change_low)} to {_percent(item.change_high)})"
-        if math.isfinite(item.change)
+        f"{_percent(pair.change)} ({_percent(pair.change_low)} to {_percent(pair.change_high)})"
+        if math.isfinite(pair.change)
         else ""
-        for item in pairs
+        for pair in pairs
     ]
     better = [
-        "" if item.better is None else "equal in all" if item.equal == 1.0 else _PROBABILITY.interval(item.better)
-        for item in pairs
+        "" if pair.better is None else "equal in all" if pair.equal == 1.0 else _PROBABILITY.interval(pair.better)
+        for pair in pairs
     ]
-    differences = [kind.change_interval(item.difference) for kind, item in zip(kinds, pairs, strict=True)]
+    differences = [kind.change_interval(pair.difference) for kind, pair in zip(kinds, pairs, strict=True)]
     columns = [
-        Column("metric", [item.metric for item in pairs]),
+        Column("metric", [pair.metric for pair in pairs]),
         Column("unit", [kind.shown_unit if kind.quantity else "" for kind in kinds]),
         Column("nominal change", nominal),
         Column("change over the draws: median (5 to 95 %)", spread),
         Column("mean difference", differences),
         Column("probability of being better", better),
     ]
-    noise = ["-" if item.noise is None else fraction_text(item.noise) for item in pairs]
-    return [*columns, Column("spread due to noise", noise)] if found.has_noise else columns
+    noise = ["-" if pair.noise is None else fraction_text(pair.noise) for pair in pairs]
+    return [*columns, Column("spread due to noise", noise)] if comparison.has_noise else columns
 
 
 def _percent(fraction: float) -> str:
     return "" if math.isnan(fraction) else f"{100.0 * fraction:+.3g} %"
 
 
-def remarks_of(found: Compared) -> list[str]:
+def remarks_of(comparison: Compared) -> list[str]:
     """Return what is not as one would expect: other tasks, runs that failed, means that few draws decide, noise."""
     said, failed, carried = [], [], []
-    for task in found.tasks:
+    for task in comparison.tasks:
         asked = {case.configuration: (case.scenario.reference, case.scenario.run.duration) for case in task.cases}
         # Compared by what they follow and not by file: two configurations may name one task differently.
-        others = [name for name, what in asked.items() if what != asked[found.baseline]]
+        others = [name for name, what in asked.items() if what != asked[comparison.baseline]]
         if others:
             said.append(
                 f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, "
-                f"than {found.baseline}: the differences come partly from the task"
+                f"than {comparison.baseline}: the differences come partly from the task"
             )
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
@@ -255,18 +256,18 @@ def remarks_of(found: Compared) -> list[str]:
                 said.append(f"{where}: {case.oscillation.sentence}; it is not among the best")
             if case.failed_draws:
                 failed.append(
-                    f"{where}: {case.failed_draws:,} of {found.draws:,} draws failed and are left out of every pair; "
-                    f"the first: {case.reason}"
+                    f"{where}: {case.failed_draws:,} of {comparison.draws:,} draws failed and are left out of every "
+                    f"pair; the first: {case.reason}"
                 )
         carried += [
-            f"{name}, task '{task.task}': the mean difference of {item.metric} has an effective sample size of "
-            f"{item.effective_size:.3g} of {item.pairs:,} draws: do not trust its interval; the probability of being "
+            f"{name}, task '{task.task}': the mean difference of {pair.metric} has an effective sample size of "
+            f"{pair.effective_size:.3g} of {pair.pairs:,} draws: do not trust its interval; the probability of being "
             "better is not affected"
             for name, pairs in task.pairs.items()
-            for item in pairs
-            if not is_carried(item.effective_size, item.pairs)
+            for pair in pairs
+            if not is_carried(pair.effective_size, pair.pairs)
         ]
-    return [*said, *failed, *carried, *([_NOISE] if found.has_noise else [])]
+    return [*said, *failed, *carried, *([_NOISE] if comparison.has_noise else [])]
 
 
 def front_of(cases: Sequence[Case]) -> list[str]:
@@ -283,15 +284,15 @@ _SHOWN = (0.5, 99.5)
 """Percentiles between which changes are drawn: a few far ones would make all others one bar."""
 
 
-def _pareto_panels(found: Compared) -> list[Panel]:
-    return [_pareto(found, task) for task in found.tasks]
+def _pareto_panels(comparison: Compared) -> list[Panel]:
+    return [_pareto(comparison, task) for task in comparison.tasks]
 
 
-def _change_panels(found: Compared) -> list[Panel]:
-    return [_change(found, task, metric) for task in found.tasks for metric in (_ERROR, _GAS)]
+def _change_panels(comparison: Compared) -> list[Panel]:
+    return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
 
 
-def _pareto(found: Compared, task: OnTask) -> Panel:
+def _pareto(comparison: Compared, task: OnTask) -> Panel:
     """Return error over gas, a mark for each configuration that completed and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
@@ -311,16 +312,16 @@ def _pareto(found: Compared, task: OnTask) -> Panel:
     # From left to right, so that the front is a line and no zigzag.
     x_front, y_front = np.array(sorted(on_front)).reshape(-1, 2).T
     marks.append(Mark("line", x_front, y_front, colour=GREY, style={"linewidth": 1.0, "zorder": 1}))
-    title = f"Task: {task.task}" if len(found.tasks) > 1 else ""
+    title = f"Task: {task.task}" if len(comparison.tasks) > 1 else ""
     return Panel(of_metric(_GAS), of_metric(_ERROR), marks, title, legend="inside")
 
 
-def _change(found: Compared, task: OnTask, metric: str) -> Panel:
+def _change(comparison: Compared, task: OnTask, metric: str) -> Panel:
     """Return histograms of the change of a metric against the baseline; dashed: the nominal device."""
-    baseline, marks, ends = task.case(found.baseline), [], []
-    for number, name in enumerate(found.configurations):
+    baseline, marks, ends = task.case(comparison.baseline), [], []
+    for number, name in enumerate(comparison.configurations):
         own, colour = task.case(name), COLOURS[number % len(COLOURS)]
-        if name == found.baseline or own.rows is None or baseline.rows is None:
+        if name == comparison.baseline or own.rows is None or baseline.rows is None:
             continue
         change = _relative(baseline.rows[metric], own.rows[metric])
         if change.size == 0:
@@ -333,9 +334,9 @@ def _change(found: Compared, task: OnTask, metric: str) -> Panel:
         dashed = {"linestyle": "--", "linewidth": 1.2}
         marks += [Mark("at", value, label="as declared", colour=colour, style=dashed) for value in nominal]
         ends += [float(low), float(high), *nominal.tolist()]
-    words = f"{of_metric(metric).words}, change from {found.baseline}"
+    words = f"{of_metric(metric).words}, change from {comparison.baseline}"
     is_first = metric == _ERROR
-    title = f"Task: {task.task}" if len(found.tasks) > 1 and is_first else ""
+    title = f"Task: {task.task}" if len(comparison.tasks) > 1 and is_first else ""
 
     def reach(axes: "Axes") -> None:
         # Zero is shown where it is near: far from all changes it would squeeze them into a few pixels.

@@ -91,14 +91,16 @@ def compare(
     check_fraction(maximum_failed, "maximum_failed")
     known = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, known, overrides)
-    names = [item.name for item in chosen]
+    names = [configuration.name for configuration in chosen]
     reference = names[0] if baseline is None else baseline
     if reference not in names:
         hint = nearest_name(reference, names)
         raise StudyError(f"baseline: no configuration '{reference}'{hint}; available: {', '.join(names)}")
     wanted = overrides_by_task(taken_tasks(tasks))
     scenarios = {
-        (task, item.name): with_overrides(item.scenario, texts) for task, texts in wanted.items() for item in chosen
+        (task, configuration.name): with_overrides(configuration.scenario, texts)
+        for task, texts in wanted.items()
+        for configuration in chosen
     }
     metrics = compared_metrics(scenarios.values())
     distributions = Uncertainty(()) if known is None or not known.paths else uncertainty_of(known)
@@ -124,7 +126,7 @@ def compare(
                 renoised=renoised,
             )
         )
-    found = Compared(
+    comparison = Compared(
         units="SI: N m, kg, J; fractions from 0 to 1",
         configurations=names,
         baseline=reference,
@@ -136,6 +138,6 @@ def compare(
         tasks=[on_task(task, texts, cases[task], reference, metrics, confidence) for task, texts in wanted.items()],
         metrics=metrics,
     )
-    said = finding_of(replace(found, remarks=remarks_of(found)))
+    said = finding_of(replace(comparison, remarks=remarks_of(comparison)))
     steady = all(case.oscillation is None for of_task in cases.values() for case in of_task)
     return replace(said, passed=said.passed and steady) if check else said

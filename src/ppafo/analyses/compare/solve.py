@@ -58,7 +58,7 @@ def drawn_runs(
     columns = uncertainty.replicated_columns(0, draws, seed)
     again = with_new_noise(columns) if uncertainty.has_noise else {}
     tally = Tally((draws + len(again.get(NOISE, ()))) * len(scenarios), progress)
-    found: dict[tuple[str, str], _Drawn] = {}
+    drawn: dict[tuple[str, str], _Drawn] = {}
     for (task, name), scenario in scenarios.items():
         runs = Runs(scenario, metrics, tally, uncertainty.gauge, threads)
         # The noise is in all configurations, whatever a study says of its paths.
@@ -66,8 +66,8 @@ def drawn_runs(
         rows = runs.run({path: columns[path] for path in own} or unvaried(scenario, draws))
         runs.check(rows, maximum_failed, f"configuration '{name}', task '{task}'")
         reason = runs.reason
-        found[task, name] = rows, runs.run({path: again[path] for path in own}) if again else None, reason
-    return found
+        drawn[task, name] = rows, runs.run({path: again[path] for path in own}) if again else None, reason
+    return drawn
 
 
 def _check_same(study: Study, scenarios: Scenarios) -> None:
@@ -97,8 +97,8 @@ def on_task(
             again = None
             if first.renoised is not None and other.renoised is not None:
                 again = (first.renoised[name], other.renoised[name])
-            found = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
-            pairs[other.configuration] += [] if found is None else [found]
+            compared = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
+            pairs[other.configuration] += [] if compared is None else [compared]
     best: dict[str, dict[str, Interval]] = {}
     judged = [case for case in cases if case.oscillation is None]
     rows = [case.rows for case in judged if case.rows is not None]

@@ -88,9 +88,9 @@ def design(
         wish = Wish(mass, stature, torque, pressure, 60.0 * minutes, toes)
         return wearer.finding_of(size_for_wearer(wish, report, DEFAULT if catalogue is None else catalogue))
     of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
-    given = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
-    if given:
-        raise StudyError(f"{', '.join(given)}: the design file states what is wanted; give one or the other")
+    named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
+    if named:
+        raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
     chosen = load_design(problem, seed=seed) if isinstance(problem, str | Path) else problem
     if isinstance(chosen, SizingProblem):
         return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -56,5 +56,5 @@ def run_trials(
         parts.append(
             {name: np.where(unusable, np.nan, result.metrics[name]).reshape(streams, size) for name in metrics}
         )
-    found = {name: np.concatenate([part[name] for part in parts], axis=1) for name in metrics}
-    return Outcome(metrics=found, runs=streams * count, failed=failed, reasons=reasons)
+    values = {name: np.concatenate([part[name] for part in parts], axis=1) for name in metrics}
+    return Outcome(metrics=values, runs=streams * count, failed=failed, reasons=reasons)

@@ -93,7 +93,7 @@ class Endurances:
 
     def json_document(self) -> dict[str, Any]:
         """Return each as plain data in SI."""
-        return {"recordings": {name: one.json_document() for name, one in self.uses.items()}}
+        return {"recordings": {name: use.json_document() for name, use in self.uses.items()}}
 
 
 FORMAT = "ppafo bottle"
@@ -104,60 +104,60 @@ _LEFT_OUT = (
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
 
 
-@in_units(lambda found: found.shown)
-def finding_of(found: Endurance) -> Finding[Endurance]:
+@in_units(lambda endurance: endurance.shown)
+def finding_of(endurance: Endurance) -> Finding[Endurance]:
     """Return how long the bottle lasts for one gas use, in words, tables and panels."""
     values = [
         (path, format_quantity(entry.value, entry.unit), entry.origin, entry.source)
-        for path, entry in found.bottle.entries.items()
+        for path, entry in endurance.bottle.entries.items()
     ]
     return Finding(
         name="endurance",
         kicker="Endurance",
         title=_TITLE,
-        said=(found.bottle.title, f"gas use: {found.draw.origin}"),
+        said=(endurance.bottle.title, f"gas use: {endurance.draw.origin}"),
         parts=(
-            Part(columns=facts(_facts(found))),
+            Part(columns=facts(_facts(endurance))),
             Part(
                 "The bottle over time",
-                panels=partial(endurance_panels, found),
+                panels=partial(endurance_panels, endurance),
                 name="endurance",
                 caption=_CAPTION,
                 size=(7.0, 1.9),
-                title=f"{found.bottle.name}: {_MASS.text(found.draw.mass_per_stride)} per {_counted(found)} of "
-                f"{TIME.text(found.draw.stride_time, '.3g')}",
-                note=f"End: {found.discharge.ending.message}.",
+                title=f"{endurance.bottle.name}: {_MASS.text(endurance.draw.mass_per_stride)} per "
+                f"{_counted(endurance)} of {TIME.text(endurance.draw.stride_time, '.3g')}",
+                note=f"End: {endurance.discharge.ending.message}.",
                 remarks=(_LEFT_OUT,),
                 is_detail=True,
             ),
             Part(
                 "Values",
                 columns_of(("value", "", "origin", "source"), values),
-                remarks=(f"Gas properties: {found.bottle.fluid.source}.",),
+                remarks=(f"Gas properties: {endurance.bottle.fluid.source}.",),
                 left=4,
                 is_detail=True,
             ),
         ),
-        found=found,
-        files={"bottle.csv": partial(marked_csv_bytes, found.discharge.recording)},
+        found=endurance,
+        files={"bottle.csv": partial(marked_csv_bytes, endurance.discharge.recording)},
     )
 
 
 @in_units(lambda several: next(iter(several.uses.values())).shown)
 def finding_of_several(several: Endurances) -> Finding[Endurances]:
     """Return how long the bottle lasts for several gas uses, side by side."""
-    are_strides = all(_counted(one) == "stride" for one in several.uses.values())
+    are_strides = all(_counted(use) == "stride" for use in several.uses.values())
     counted, time = ("stride", "walking") if are_strides else ("repetition", "run time")
     titles = ("gas use", (f"gas per {counted}", _MASS), (time, _DURATION), f"{counted}s", "ended")
     rows = [
         (
             name,
-            one.draw.mass_per_stride,
-            one.discharge.walking_time,
-            strides_text(one.discharge.strides),
-            one.discharge.ending.kind,
+            use.draw.mass_per_stride,
+            use.discharge.walking_time,
+            strides_text(use.discharge.strides),
+            use.discharge.ending.kind,
         )
-        for name, one in several.uses.items()
+        for name, use in several.uses.items()
     ]
     return Finding(
         name="endurance",
@@ -172,16 +172,16 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
     )
 
 
-def _counted(found: Endurance) -> str:
-    return "repetition" if found.is_of_task_sequence or found.is_of_recording else "stride"
+def _counted(endurance: Endurance) -> str:
+    return "repetition" if endurance.is_of_task_sequence or endurance.is_of_recording else "stride"
 
 
 _TITLE = "How long the bottle lasts"
 
 
-def endurance_panels(found: Endurance) -> list[Panel]:
+def endurance_panels(endurance: Endurance) -> list[Panel]:
     """Return temperature, pressure and gas of the bottle over the requested course."""
-    recording, bottle = found.discharge.recording, found.bottle
+    recording, bottle = endurance.discharge.recording, endurance.bottle
     time, needed = recording.time, bottle.regulator.set_pressure + bottle.regulator.pressure_margin
     dotted, dashed = ({"linestyle": style, "linewidth": 1.2} for style in (":", "--"))
     lines = (
@@ -206,15 +206,15 @@ def endurance_panels(found: Endurance) -> list[Panel]:
     ]
 
 
-def _facts(found: Endurance) -> list[tuple[str, str]]:
+def _facts(endurance: Endurance) -> list[tuple[str, str]]:
     """Return name and value of everything that a reader wants first."""
-    course, draw = found.discharge, found.draw
-    recording, bottle, room = course.recording, found.bottle, found.bottle.room_temperature
+    course, draw = endurance.discharge, endurance.draw
+    recording, bottle, room = course.recording, endurance.bottle, endurance.bottle.room_temperature
     # What warms the gas of the full bottle to the room's temperature behind the regulator.
     content = bottle_content(bottle.fluid.table, bottle.mass, bottle.volume, room)
     heat = heat_to_warm(bottle.fluid.table, content, room, bottle.regulator.set_pressure)
-    counted, repeated = _counted(found), "recording" if found.is_of_recording else "task sequence"
-    use = "of use" if found.is_of_recording else "of walking"
+    counted, repeated = _counted(endurance), "recording" if endurance.is_of_recording else "task sequence"
+    use = "of use" if endurance.is_of_recording else "of walking"
     rows = [
         ("run time", f"{minutes_text(course.walking_time)} {use}, {minutes_text(course.total_time)} in total"),
         (
@@ -223,7 +223,7 @@ def _facts(found: Endurance) -> list[tuple[str, str]]:
         ),
         (
             f"{counted}s without cooling",
-            f"{strides_text(found.strides_when_warm)} (a bottle that stays at room temperature)",
+            f"{strides_text(endurance.strides_when_warm)} (a bottle that stays at room temperature)",
         ),
         ("ended", course.ending.message),
         (

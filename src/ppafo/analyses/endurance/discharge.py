@@ -246,9 +246,9 @@ def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
     ends = np.array([stretch.end for stretch in stretches])
     # The last time may be beyond the last end by rounding.
     places = np.minimum(np.searchsorted(ends, times, side="left"), len(stretches) - 1)
-    rows = np.array([stretches[place].solution(time) for place, time in zip(places, times, strict=True)])
+    rows = np.array([stretches[stretch].solution(time) for stretch, time in zip(places, times, strict=True)])
     contents = [content_of(bottle, float(row[0]), float(row[1])) for row in rows]
-    flows = [stretches[place].draw for place in places]
+    flows = [stretches[stretch].draw for stretch in places]
     supply = [
         delivered_pressure(bottle.regulator, content.pressure, flow)
         for content, flow in zip(contents, flows, strict=True)

@@ -10,8 +10,8 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import plain
-from ppafo.errors import DataError
-from ppafo.identification.bench.result import BenchResult, bench_figure, count_of, figure_3
+from ppafo.errors import DataError, count_of
+from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
@@ -45,7 +45,7 @@ class Identification:
     def estimates(self) -> tuple[Estimate, ...]:
         """All estimates of all procedures, the trajectory fit's last."""
         fitted = () if self.trajectory is None else self.trajectory.fit.estimates
-        return (*(item for result in self.results for item in result.estimates), *fitted)
+        return (*(estimate for result in self.results for estimate in result.estimates), *fitted)
 
     @property
     def is_good(self) -> bool:
@@ -66,7 +66,7 @@ class Identification:
                 "procedure": result.procedure,
                 "summary": result.summary,
                 "recordings_are": result.kind,
-                "estimates": [plain(item) for item in result.estimates],
+                "estimates": [plain(estimate) for estimate in result.estimates],
                 "conflict": result.conflict,
                 "remarks": list(result.remarks),
             }
@@ -136,7 +136,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         kind = "" if result.kind == "measured" else f" ({result.kind})"
         remarks = [
             *_conflict(result.conflict),
-            *(f"{item.path}: {item.explanation}" for item in result.estimates),
+            *(f"{estimate.path}: {estimate.explanation}" for estimate in result.estimates),
             *_far_from(before, result.estimates),
             *(f"remark: {remark}" for remark in result.remarks),
         ]
@@ -146,8 +146,9 @@ def finding_of(identification: Identification) -> Finding[Identification]:
     written, fitted = new_set.written, new_set.fitted
     # What holds for this model only is in the set as well, and is never counted with what is identified.
     # Other numbers may be identified too, such as the zero of a scale, for which a set has no place.
-    number = count_of(len(written), "value") if written else "no value"
-    count = f"{number} of the set identified{': ' if written else ''}{', '.join(written)}"
+    count = "no value of the set identified"
+    if written:
+        count = f"{count_of(len(written), 'value')} of the set identified: {', '.join(written)}"
     rest = f"; for this model only: {', '.join(fitted)}" if fitted else ""
     problem = (f"it makes no device yet: {new_set.problem}",) if new_set.problem else ()
     return Finding(
@@ -168,7 +169,7 @@ def _toml_bytes(parameter_set: ParameterSet) -> bytes:
 
 
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Part:
-    rows = (estimate_row(item, before) for item in estimates)
+    rows = (estimate_row(estimate, before) for estimate in estimates)
     return Part(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
 
 
@@ -178,15 +179,15 @@ _FAR_FROM_SET = 5.0
 
 def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[str]:
     """Yield a remark on each value that is many times what the set had, or a small part of it."""
-    for item in estimates:
-        entry = before.numbers.get(item.path)
-        value, unit = in_set_unit(item.value, item.path, item.unit, before)
-        if entry is None or not item.is_usable or not (entry.value > 0.0 and value > 0.0):
+    for estimate in estimates:
+        entry = before.numbers.get(estimate.path)
+        value, unit = in_set_unit(estimate.value, estimate.path, estimate.unit, before)
+        if entry is None or not estimate.is_usable or not (entry.value > 0.0 and value > 0.0):
             continue
         ratio = value / entry.value
         if not 1.0 / _FAR_FROM_SET < ratio < _FAR_FROM_SET:
             yield (
-                f"remark: {item.path} is {ratio:.3g} times the value before, {entry.value:.4g} {unit}".rstrip()
+                f"remark: {estimate.path} is {ratio:.3g} times the value before, {entry.value:.4g} {unit}".rstrip()
                 + ": check the units of the recording"
             )
 
@@ -202,15 +203,19 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Part:
     remarks = [
         *_conflict(fit.conflict),
         # Of a conflict the explanation of each number is the one sentence that stands above.
-        *(f"{item.path}: {item.explanation}" for item in fit.estimates if item.explanation != fit.conflict),
+        *(
+            f"{estimate.path}: {estimate.explanation}"
+            for estimate in fit.estimates
+            if estimate.explanation != fit.conflict
+        ),
         *_tolerances(fit.known, before),
         *(f"remark: {remark}" for remark in outcome.remarks),
     ]
-    for number, one in enumerate(outcome.expected, start=1):
-        fraction = 1.0 - one.shrinkage[one.most_helped]
+    for number, experiment in enumerate(outcome.expected, start=1):
+        fraction = 1.0 - experiment.shrinkage[experiment.most_helped]
         remarks.append(
-            f"next experiment {number}: {one.label}: gain {one.gain:.2f}; largest for {one.most_helped}, "
-            f"whose interval would shrink by {fraction:.0%}"
+            f"next experiment {number}: {experiment.label}: gain {experiment.gain:.2f}; largest for "
+            f"{experiment.most_helped}, whose interval would shrink by {fraction:.0%}"
         )
     heading = (
         f"trajectory{origin}: {count_of(len(fit.estimates), 'number')} fitted to "
@@ -221,40 +226,43 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Part:
 
 def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
     """Return the tolerances that widen an interval or that the recordings contradict, largest first."""
-    is_far = {one.name: abs(one.after - one.before) > _FAR * one.before_error for one in known}
-    shown = sorted((one for one in known if one.share >= _SHOWN or is_far[one.name]), key=lambda one: -one.share)
-    found = []
+    is_far = {number.name: abs(number.after - number.before) > _FAR * number.before_error for number in known}
+    shown = sorted(
+        (number for number in known if number.share >= _SHOWN or is_far[number.name]), key=lambda number: -number.share
+    )
+    rows = []
     for one in shown:
-        place = one.name.partition(" of ")[0]
+        quantity = one.name.partition(" of ")[0]
         numbers = (one.before, one.before_error, one.after, one.after_error)
         (start, unit), (error, _), (after, _), (after_error, _) = (
-            _shown(number, place, one.unit, before) for number in numbers
+            _shown(number, quantity, one.unit, before) for number in numbers
         )
-        zero, _ = _shown(0.0, place, one.unit, before)
+        zero, _ = _shown(0.0, quantity, one.unit, before)
         stated, fitted = with_error(start, error - zero), with_error(after, after_error - zero)
         text = f"tolerance: {one.name}: stated {stated} {unit}".rstrip(" -") + f", fitted {fitted} {unit}".rstrip(" -")
-        found.append(
+        rows.append(
             f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
         )
     rest = len(known) - len(shown)
-    return (
-        [*found, f"{count_of(rest, 'other tolerance')} {'does' if rest == 1 else 'do'} not affect the intervals"]
-        if rest
-        else found
-    )
+    if rest:
+        do = "does" if rest == 1 else "do"
+        rows.append(f"{count_of(rest, 'other tolerance')} {do} not affect the intervals")
+    return rows
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:
     """Return a number in the unit of the set, one that the set does not have in the unit that people read."""
-    found, own = in_set_unit(number, path, unit, before)
-    return in_shown_unit(number, unit) if own == unit else (found, own)
+    reported, own = in_set_unit(number, path, unit, before)
+    return in_shown_unit(number, unit) if own == unit else (reported, own)
 
 
-def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
+def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
     """Return path, value, interval and verdict of an estimate in the unit of the set, digits that tell its ends."""
-    if math.isnan(item.value):
-        return item.path, "no value", "", item.verdict
-    shown = [_shown(one, item.path, item.unit, before) for one in (item.value, item.low, item.high)]
+    if math.isnan(estimate.value):
+        return estimate.path, "no value", "", estimate.verdict
+    shown = [
+        _shown(number, estimate.path, estimate.unit, before) for number in (estimate.value, estimate.low, estimate.high)
+    ]
     (value, unit), (low, _), (high, _) = shown
     half_width, digits = 0.5 * abs(high - low), _MINIMUM_DIGITS
     if half_width > 0.0 and math.isfinite(half_width) and value != 0.0:
@@ -262,30 +270,30 @@ def estimate_row(item: Estimate, before: ParameterSet) -> tuple[str, ...]:
         needed = math.ceil(math.log10(abs(value) / half_width)) + 1
         digits = min(max(needed, _MINIMUM_DIGITS), _MAXIMUM_DIGITS)
     text = f"{value:#.{digits}g} {unit}".removesuffix(" -").rstrip()
-    return item.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", item.verdict
+    return estimate.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", estimate.verdict
 
 
 def _figures(identification: Identification) -> list[Part]:
     """Return a figure for each procedure and recording, figure 3 where both of its panels are there."""
-    found = []
+    figures = []
     counts: dict[str, int] = {}
     for result in identification.results:
         counts[result.procedure] = counts.get(result.procedure, 0) + 1
         number = counts[result.procedure]
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
         draw = partial(bench_figure, result.panels, result.kind)
-        found.append(Part(name=name, caption=result.summary, is_detail=True, draw=draw))
+        figures.append(Part(name=name, caption=result.summary, is_detail=True, draw=draw))
     fit = None if identification.trajectory is None else identification.trajectory.fit
     for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True) if fit else ():
         label, atmosphere = measurement.label, scenario.device.supply.atmospheric_pressure
         panels = partial(trajectory_panels, measurement, model, atmosphere)
         name, caption = f"trajectory-fit-{label}", f"{label} and the fit."
-        found.append(Part(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
+        figures.append(Part(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
     first = {result.procedure: result for result in reversed(identification.results)}
     if {"static-torque", "free-decay"} <= first.keys():
         draw = partial(figure_3, first["static-torque"], first["free-decay"])
-        found.append(Part(name="figure-3", caption="Like figure 3 of the paper.", is_detail=True, draw=draw))
-    return found
+        figures.append(Part(name="figure-3", caption="Like figure 3 of the paper.", is_detail=True, draw=draw))
+    return figures
 
 
 def kind_of_fit(fit: TrajectoryFit) -> RecordingKind:
@@ -314,13 +322,13 @@ def _trajectory_data(outcome: TrajectoryOutcome) -> dict[str, Any]:
         "confidence": fit.problem.confidence,
         "evaluations": fit.fit.evaluations,
         "has_converged": fit.fit.has_converged,
-        "estimates": [plain(item) for item in fit.estimates],
+        "estimates": [plain(estimate) for estimate in fit.estimates],
         "covariance": fit.covariance.tolist(),
         "correlation": fit.correlation.tolist(),
-        "tolerances": [plain(item) for item in fit.known],
-        "channels": [plain(item) for item in fit.channels],
+        "tolerances": [plain(tolerance) for tolerance in fit.known],
+        "channels": [plain(channel) for channel in fit.channels],
         "conflict": None if fit.fit.conflict is None else plain(fit.fit.conflict),
-        "not_identifiable": [dict(item) for item in fit.fit.unidentified],
+        "not_identifiable": [dict(combination) for combination in fit.fit.unidentified],
         "remarks": list(outcome.remarks),
-        "next_experiments": [plain(item) for item in outcome.expected],
+        "next_experiments": [plain(experiment) for experiment in outcome.expected],
     }

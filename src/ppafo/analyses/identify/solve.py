@@ -50,11 +50,11 @@ def _solved(problem: ProblemFile, before: ParameterSet, folder: Path, file: str,
     current, results = before, list[BenchResult]()
     tasks = [
         _Task(
-            item,
-            tuple(_source(folder, name, item.columns, problem, before, file) for name in item.recordings),
-            f"{file}: procedure {number}, {item.kind}",
+            use,
+            tuple(_source(folder, name, use.columns, problem, before, file) for name in use.recordings),
+            f"{file}: procedure {number}, {use.kind}",
         )
-        for number, item in sorted(
+        for number, use in sorted(
             enumerate(problem.procedure, start=1), key=lambda pair: PROCEDURES.index(pair[1].kind)
         )
     ]
@@ -81,7 +81,7 @@ def _solved(problem: ProblemFile, before: ParameterSet, folder: Path, file: str,
         current = with_estimates(current, result.estimates).parameter_set
     of_bench = [estimate for result in results for estimate in result.estimates]
     setting = FitSetting(
-        lambda item: _source(folder, item.recording, item.columns, problem, current, file),
+        lambda use: _source(folder, use.recording, use.columns, problem, current, file),
         folder,
         f"{file}: trajectory",
         current,
@@ -134,8 +134,8 @@ _FILES_IN_TITLE = 4
 _REPORTED = "reported."
 
 
-def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
-    old, new = found.new_set.parameter_set, found.new_set
+def _name_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
+    old, new = identification.new_set.parameter_set, identification.new_set
     files = recording_files(problem)
     left_out = len(files) - _FILES_IN_TITLE
     shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {left_out} more" if left_out > 0 else "")
@@ -143,13 +143,15 @@ def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
     changes = f" with {', '.join(problem.device.overrides)}" if problem.device.overrides else ""
     origins = (
         f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', on the set '{old.name}'"
-        f"{changes} from {found.kind} recordings: {', '.join(files)}; the fitted are true for this model only, the "
-        f"others from '{old.name}'."
+        f"{changes} from {identification.kind} recordings: {', '.join(files)}; the fitted are true for this model "
+        f"only, the others from '{old.name}'."
     )
     if new.written or new.fitted:
         # Of a device that was measured, what others report of another one says nothing.
         is_of_report = {
-            one.id for one in audit(found.before) if any(value.path.startswith(_REPORTED) for value in one.values)
+            finding.id
+            for finding in audit(identification.before)
+            if any(value.path.startswith(_REPORTED) for value in finding.values)
         }
         old = replace(
             old,
@@ -170,8 +172,10 @@ def _name_set(found: Identification, problem: ProblemFile) -> ParameterSet:
 
 def recording_files(problem: ProblemFile) -> list[str]:
     """Return the names of the recordings of a problem, with the folder where two have one name."""
-    named = [name for item in problem.procedure for name in item.recordings]
-    named += [] if problem.trajectory is None else [item.recording for item in problem.trajectory.experiments]
+    named = [name for use in problem.procedure for name in use.recordings]
+    named += (
+        [] if problem.trajectory is None else [experiment.recording for experiment in problem.trajectory.experiments]
+    )
     paths = dict.fromkeys(map(Path, named))
     names = [path.name for path in paths]
     return ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]

@@ -91,8 +91,8 @@ class LinearModel:
     @property
     def poles(self) -> "np.ndarray[Any, np.dtype[np.complex128]]":
         """Poles [1/s], the slowest first."""
-        found = np.linalg.eigvals(self.a).astype(np.complex128)
-        return found[np.argsort(np.abs(found))]
+        eigenvalues = np.linalg.eigvals(self.a).astype(np.complex128)
+        return eigenvalues[np.argsort(np.abs(eigenvalues))]
 
     def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
         """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
@@ -100,7 +100,7 @@ class LinearModel:
         ScenarioError for a name that is no output or input, and for a frequency at which the model has a pole.
         """
         row, column = _place(output, self.outputs, "output"), _place(source, self.inputs, "input")
-        eye, found = np.eye(len(self.states)), []
+        eye, responses = np.eye(len(self.states)), []
         for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist():
             matrix = scaled = 2.0j * np.pi * frequency * eye - self.a
             # States and their rates differ by powers of ten in SI: rank is taken with rows and columns of one size.
@@ -112,8 +112,8 @@ class LinearModel:
                     f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response has no "
                     "end; give another frequency"
                 )
-            found.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
-        return np.array(found)
+            responses.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
+        return np.array(responses)
 
     def json_document(self) -> dict[str, Any]:
         """Return point, matrices, poles and sides as plain data in SI."""
@@ -125,9 +125,9 @@ class LinearModel:
             "scenario": self.scenario.name,
             "overrides": list(self.scenario.origin.overrides),
             "at": "equilibrium" if self.time is None else self.time,
-            "states": [{**asdict(item), "rate": rate} for item, rate in zip(self.states, rates, strict=True)],
-            "inputs": [asdict(item) for item in self.inputs],
-            "outputs": [asdict(item) for item in self.outputs],
+            "states": [{**asdict(variable), "rate": rate} for variable, rate in zip(self.states, rates, strict=True)],
+            "inputs": [asdict(variable) for variable in self.inputs],
+            "outputs": [asdict(variable) for variable in self.outputs],
             "A": self.a.tolist(),
             "B": self.b.tolist(),
             "C": self.c.tolist(),
@@ -148,7 +148,7 @@ class LinearModel:
             raise ScenarioError(MISSING_CONTROL)
         import control
 
-        names = {kind: [item.name for item in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
+        names = {kind: [variable.name for variable in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
         return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
 
 
@@ -158,7 +158,7 @@ _SINGULAR = 1.0e13
 
 def _place(name: str, items: Sequence[Variable], kind: str) -> int:
     """Number of a variable; ScenarioError for a name that is none."""
-    names = [item.name for item in items]
+    names = [variable.name for variable in items]
     if name not in names:
         hint = nearest_name(name, names)
         raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
@@ -202,15 +202,15 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
     amplitudes: Floats = command * np.array(shares, dtype=np.float64)
     from scipy.signal import StateSpace, step
 
-    column = [item.name for item in model.inputs].index("command")
-    row = [item.name for item in model.outputs].index("torque")
+    column = [variable.name for variable in model.inputs].index("command")
+    row = [variable.name for variable in model.outputs].index("torque")
     system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
     linear = amplitudes[:, None] * step(system, T=times)[1]
     return Steps(amplitudes, times, np.array(runs) - still, linear)
 
 
 def _value(model: LinearModel, name: str) -> float:
-    return next(item.value for item in (*model.states, *model.inputs) if item.name == name)
+    return next(variable.value for variable in (*model.states, *model.inputs) if variable.name == name)
 
 
 def _torque(model: LinearModel, command: float) -> Floats:
@@ -326,19 +326,27 @@ _SEVERAL = 1.0e-6
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model in words, tables and panels."""
     responds = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))
-    states = {item.name for item in model.states}
+    states = {variable.name for variable in model.states}
     kinds = (("state", model.states), ("input", model.inputs), ("output", model.outputs))
     # An output that is a state is in the table once.
-    shown = [(kind, item) for kind, items in kinds for item in items if kind != "output" or item.name not in states]
-    point = []
-    for kind, item in shown:
-        of_item = Kind("", "" if item.unit == "1" else item.unit, quantity_of_unit(item.unit), ".5g")
-        point.append((kind, item.name, item.unit, of_item.text(item.value)))
-    edges = [
-        f"the point lies on an edge, with another linear model beyond: `{edge.place.partition(': ')[2]}` in "
-        f"{edge.place.partition(': ')[0]} was taken to be {'true' if edge.is_true else 'false'}"
-        for edge in model.edges
+    shown = [
+        (kind, variable)
+        for kind, items in kinds
+        for variable in items
+        if kind != "output" or variable.name not in states
     ]
+    point = []
+    for kind, variable in shown:
+        of_item = Kind("", "" if variable.unit == "1" else variable.unit, quantity_of_unit(variable.unit), ".5g")
+        point.append((kind, variable.name, variable.unit, of_item.text(variable.value)))
+    edges = []
+    for edge in model.edges:
+        function, _, comparison = edge.place.partition(": ")
+        taken = "true" if edge.is_true else "false"
+        edges.append(
+            f"the point lies on an edge, with another linear model beyond: `{comparison}` in {function} was taken to "
+            f"be {taken}"
+        )
     parts = [
         Part("The point", columns_of(("", "name", "unit in the model", "at the point"), point), left=3),
         Part("Which side was taken", facts(model.sides.items()), remarks=edges),
@@ -359,13 +367,13 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     )
     for name, values, rows, columns in matrices:
         cells = zip(columns, values.T.tolist(), strict=True)
-        own = [Column(item.name, column, Kind(form=".5g")) for item, column in cells]
-        table = [Column("", [item.name for item in rows]), *own]
+        own = [Column(variable.name, column, Kind(form=".5g")) for variable, column in cells]
+        table = [Column("", [variable.name for variable in rows]), *own]
         parts.append(Part(f"Matrix {name} (SI)", table, is_detail=name in "CD"))
     # For a steady state of a locked ankle whose valve follows at once and is open: the runs can begin there.
     motion = model.scenario.motion
     is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
-    is_gas_alone = all(item.name.startswith("pressure") for item in model.states)
+    is_gas_alone = all(variable.name.startswith("pressure") for variable in model.states)
     if model.is_steady and is_locked and is_gas_alone and 0.0 < abs(_value(model, "command")) < 0.7:
         steps = Part("How far it holds", panels=partial(steps_panels, model), name="steps", caption=_STEPS_CAPTION)
         parts.append(replace(steps, across=2, size=(4.4, 3.4)))
@@ -414,9 +422,9 @@ def _arrays(model: LinearModel) -> bytes:
     arrays: dict[str, Any] = {"A": model.a, "B": model.b, "C": model.c, "D": model.d, "rates": model.rates}
     for kind in ("states", "inputs", "outputs"):
         items = getattr(model, kind)
-        arrays[kind] = np.array([item.name for item in items])
-        arrays[f"{kind}_units"] = np.array([item.unit for item in items])
-        arrays[f"{kind}_values"] = np.array([item.value for item in items])
+        arrays[kind] = np.array([variable.name for variable in items])
+        arrays[f"{kind}_units"] = np.array([variable.unit for variable in items])
+        arrays[f"{kind}_values"] = np.array([variable.value for variable in items])
     written = io.BytesIO()
     np.savez(written, allow_pickle=False, **arrays)
     return written.getvalue()

@@ -26,7 +26,7 @@ class Sides:
         self._values, self._other_side = values, other_side
         self.edges: dict[str, Edge] = {}
 
-    def __call__(self, sign: str, left: Any, right: Any, place: str) -> bool:
+    def __call__(self, sign: str, left: Any, right: Any, where: str) -> bool:
         """Return whether the comparison of two expressions that stands at a place counts as true."""
         import casadi
 
@@ -44,8 +44,8 @@ class Sides:
         # Signs that are not in the table are == and !=: they have no edge.
         is_true = tests.get(sign, (left_value == right_value) == (sign == "=="))
         if sign in tests and abs(difference) <= ON_THE_EDGE * larger:
-            self.edges[place] = Edge(place, is_true)
-        return is_true != (place == self._other_side)
+            self.edges[where] = Edge(where, is_true)
+        return is_true != (where == self._other_side)
 
 
 def _direction(name: str, values: Mapping[str, float]) -> float:
@@ -81,8 +81,11 @@ def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
     if point.way == 0.0:
         is_at_stop = not plant.angle_min < at["angle"] < plant.angle_max
         vane = "against a stop" if is_at_stop else "sticks: friction holds it"
-    valve = f"feeds chamber {1 if openings.source_1 > 0.0 else 2}, open by {max(openings):.4g}" if any(openings) else ""
-    return {"valve": valve or "closed", joint.name: vane, **said}
+    valve = "closed"
+    if any(openings):
+        chamber = 1 if openings.source_1 > 0.0 else 2
+        valve = f"feeds chamber {chamber}, open by {max(openings):.4g}"
+    return {"valve": valve, joint.name: vane, **said}
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:

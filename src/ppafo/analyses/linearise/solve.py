@@ -56,8 +56,8 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     plant = plant_of(run, point.way, decided, time)
     matrices = _matrices(plant, values)
     edges = []
-    for place, edge in decided.edges.items():
-        others = _matrices(plant_of(run, point.way, Sides(values, place), time), values)
+    for comparison, edge in decided.edges.items():
+        others = _matrices(plant_of(run, point.way, Sides(values, comparison), time), values)
         # An edge counts only where the linear model on its other side is another one, or of other states.
         pairs = list(zip(matrices[:4], others[:4], strict=True))
         is_same = all(here.shape == beyond.shape for here, beyond in pairs) and all(

@@ -66,7 +66,7 @@ def parts(
     'festo-mpye-5-m5-010-b: Festo MPYE-5-M5-010-B (valves, proportional)'
     """
     loaded = load_catalogue(catalogue)
-    named = {item.name: item for item in loaded.parts}
+    named = {part.name: part for part in loaded.parts}
     if part is not None and part not in named:
         raise ParameterError(
             f"{loaded.file}: there is no part '{part}'{nearest_name(part, named)}; available: {', '.join(named)}"
@@ -78,9 +78,9 @@ def parts(
         said = [f"{loaded.name}: {loaded.title}", *([notes] if notes else [])]
         sections = []
         for group, members in loaded.groups.items():
-            lists = ((item, ", ".join(item.doubtful), ", ".join(item.unknown)) for item in members.values())
+            lists = ((part, ", ".join(part.doubtful), ", ".join(part.unknown)) for part in members.values())
             rows = [
-                (item.name, item.title, item.full_mass, check or "-", unknown or "-") for item, check, unknown in lists
+                (part.name, part.title, part.full_mass, check or "-", unknown or "-") for part, check, unknown in lists
             ]
             sections.append(finding.Part(group.capitalize(), columns_of(_HEAD, rows), left=len(_HEAD)))
     else:

@@ -98,7 +98,7 @@ class Studies:
     def verdicts(self) -> list[Verdict]:
         """The verdicts of all claims, the paper's first."""
         own = [] if self.reproduction is None else [claim.verdict for claim in self.reproduction.claims]
-        return own + [item.verdict for study in self.studies for item in study.claims]
+        return own + [claim.verdict for study in self.studies for claim in study.claims]
 
     def json_document(self) -> dict[str, Any]:
         """Return claims with their verdicts, and how many there are of each, as plain data in SI."""
@@ -108,7 +108,7 @@ class Studies:
             "counts": {verdict: self.verdicts.count(verdict) for verdict in VERDICTS},
             "claims": [
                 *({"study": SEED, **claim.document()} for claim in own),
-                *(item.document(study.publication.name) for study in self.studies for item in study.claims),
+                *(claim.document(study.publication.name) for study in self.studies for claim in study.claims),
             ],
             "versions": {"ppafo": __version__},
         }
@@ -145,7 +145,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     for value in reproduction.assumed:
         groups.setdefault(value.used_by, []).append(value)
     # What all experiments rest on comes first.
-    ordered = sorted(groups.items(), key=lambda item: -len(item[0]))
+    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
     solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
     results = (reproduction.solenoid, reproduction.proportional, reproduction.step)
     steps = sorted({1e3 * float(result.engine["step"]) for result in results})
@@ -263,14 +263,14 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     details = [] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for study in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
-        for item in study.claims:
-            entry = item.claim.entry
+        for claim in study.claims:
+            entry = claim.claim.entry
             # A number that only own arithmetic on published ones gives.
-            published = item.published or (f"{entry.own} (own sum)" if entry.own else None)
-            rows.append((study.publication.name, entry.id, published, item.ours, VERDICTS[item.verdict]))
-            stated = f"{entry.statement} ({item.claim.source})"
+            published = claim.published or (f"{entry.own} (own sum)" if entry.own else None)
+            rows.append((study.publication.name, entry.id, published, claim.ours, VERDICTS[claim.verdict]))
+            stated = f"{entry.statement} ({claim.claim.source})"
             agrees = _agrees(entry.at_least, entry.at_most, entry.unit)
-            stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, item.note or None))
+            stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
         heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
         columns = columns_of(_DETAILS_HEAD, stated_claims)
         details.append(Part(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
@@ -369,9 +369,9 @@ def _figures(reproduction: Reproduction) -> list[Part]:
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
-    step, tasks, found = None, None, reproduction.synthetic
-    if not isinstance(found, NoEvidence):
-        step, tasks = found.step, (found.solenoid, found.proportional)
+    step, tasks, synthetic = None, None, reproduction.synthetic
+    if not isinstance(synthetic, NoEvidence):
+        step, tasks = synthetic.step, (synthetic.solenoid, synthetic.proportional)
     drawn: dict[str, Callable[[], Drawing]] = {
         DEVICE_FIGURE: device_figure,
         STEP_FIGURE: partial(step_response_figure, reproduction.step.recording, levels, reproduction.step_events, step),
@@ -384,6 +384,6 @@ def _figures(reproduction: Reproduction) -> list[Part]:
             tasks,
         ),
     }
-    if not isinstance(found, NoEvidence):
-        drawn[IDENTIFICATION_FIGURE] = partial(figure_3, found.torque, found.decay)
+    if not isinstance(synthetic, NoEvidence):
+        drawn[IDENTIFICATION_FIGURE] = partial(figure_3, synthetic.torque, synthetic.decay)
     return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from ppafo.errors import DataError, SimulationError
-from ppafo.identification.bench import BenchResult, FreeDecaySettings, free_decay, static_torque
+from ppafo.identification.bench import BenchResult, free_decay, static_torque
 from ppafo.identification.source import Source
 from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters import load_device, load_parameter_set
@@ -41,7 +41,8 @@ class AssumedValue:
 
     def sentence(self) -> str:
         """Return the value and its reason on one line."""
-        return f"{self.path} = {self.value}: {self.reason}{f' ({self.source})' if self.source else ''}"
+        source = f" ({self.source})" if self.source else ""
+        return f"{self.path} = {self.value}: {self.reason}{source}"
 
 
 def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...]:
@@ -56,10 +57,18 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         own = [
-            AssumedValue(item.path, summaries.get(item.path, ""), item.value, "assumed", item.note, "", (name,))
-            for item in scenario.assumptions
+            AssumedValue(
+                assumption.path,
+                summaries.get(assumption.path, ""),
+                assumption.value,
+                "assumed",
+                assumption.note,
+                "",
+                (name,),
+            )
+            for assumption in scenario.assumptions
         ]
-        settled = {item.path for item in own}
+        settled = {assumption.path for assumption in own}
         # Reported results are what a run is compared with; of two valves one is in the device.
         settled |= {path for path in in_force.numbers if path.startswith("reported.")}
         valve = f"valves.{origin.valve}."
@@ -136,9 +145,9 @@ def synthetic_evidence(
 def bench_figure() -> tuple[BenchResult, BenchResult]:
     """Identify torque constant and damping as figure 3 does, from synthetic recordings; SimulationError."""
     # Kept: it takes seconds, and no override reaches it.
-    inertia = FreeDecaySettings(inertia=load_device(PLANTED_SET).foot_plate.inertia)
+    inertia = load_device(PLANTED_SET).foot_plate.inertia
     torque, decay = (
         Source(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)
         for experiment in ("static-torque", "free-decay")
     )
-    return static_torque((torque,)), free_decay((decay,), inertia)
+    return static_torque((torque,)), free_decay((decay,), inertia=inertia)

@@ -136,21 +136,21 @@ def told_claim(
     identifier: str, statement: str, observations: Sequence[Observation], assumptions: tuple[str, ...]
 ) -> Claim:
     """Return the claim on what the text tells, statement by statement, of a recording."""
-    missing = [item.id for item in observations if not item.holds]
-    reserved = [item for item in observations if item.holds and item.difference]
+    missing = [observation.id for observation in observations if not observation.holds]
+    reserved = [observation for observation in observations if observation.holds and observation.difference]
     plain = len(observations) - len(missing) - len(reserved)
     notes = [f"Not shown: {', '.join(missing)}."] if missing else []
-    notes += [f"With a reservation: {item.id}, {item.difference}." for item in reserved]
+    notes += [f"With a reservation: {observation.id}, {observation.difference}." for observation in reserved]
     return Claim(
         id=identifier,
         statement=statement,
         value=float(plain),
         verdict="undetermined" if missing else "met_by_fitted_settings",
-        source="; ".join(dict.fromkeys(item.source for item in observations)),
+        source="; ".join(dict.fromkeys(observation.source for observation in observations)),
         note=" ".join((*notes, "Each statement with its numbers is listed below.")),
         assumptions=assumptions,
         words=f"{len(observations)} statements",
-        found=f"{plain} shown{f', {len(reserved)} with a reservation' if reserved else ''}",
+        found=f"{plain} shown, {len(reserved)} with a reservation" if reserved else f"{plain} shown",
     )
 
 
@@ -167,8 +167,8 @@ def verdict_counts(claims: Sequence[Claim]) -> dict[Verdict, int]:
 
 def count_sentence(verdicts: Sequence[Verdict]) -> str:
     """Return how many claims have each verdict, for example ``16 claims: 2 consistent, 3 inconsistent as reported``."""
-    found = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
-    return f"{len(verdicts)} claims: {found}"
+    counts = ", ".join(f"{count} {words}" for key, words in VERDICTS.items() if (count := verdicts.count(key)))
+    return f"{len(verdicts)} claims: {counts}"
 
 
 REPORTED_SET = "ppafo2011-printed"
@@ -244,21 +244,21 @@ def _orifice_constants(reported: Reported) -> Claim:
     """Compare C1, C2 and the critical ratio with the gas as reported; equations (6), (7)."""
     gas = reported.gas()
     k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
-    found = {
+    constants = {
         "reported.choked_flow_constant": choked_flow_constant(k, constant, temperature),
         "reported.subsonic_flow_constant": subsonic_flow_constant(k, constant, temperature),
         "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
     }
     # The reported digits leave a range open; what is computed from the gas does not.
-    holds = all(reported.range(path).meets(Interval(value, value)) for path, value in found.items())
+    holds = all(reported.range(path).meets(Interval(value, value)) for path, value in constants.items())
     return Claim(
         id="orifice_constants",
         statement="C1, C2 and the critical pressure ratio follow from k, molar mass and temperature of the gas.",
         verdict=_verdict(holds),
-        source=", ".join(reported.entry(path).source for path in found),
+        source=", ".join(reported.entry(path).source for path in constants),
         note="To the reported digits, with the exponent (k + 1)/(k - 1) under the root of C1 and not the reported one.",
-        words=", ".join(reported.quotation(path) for path in found),
-        found=", ".join(reported.text(path, value) for path, value in found.items()),
+        words=", ".join(reported.quotation(path) for path in constants),
+        found=", ".join(reported.text(path, value) for path, value in constants.items()),
     )
 
 
@@ -277,7 +277,7 @@ def _step_percentages() -> Claim:
         Interval(*(100.0 * end / full for end in digits(error))).meets(digits(percent))
         for error, full, percent in zip(errors, ranges, percents, strict=True)
     )
-    found = [100.0 * error / full for error, full in zip(errors, ranges, strict=True)]
+    percentages = [100.0 * error / full for error, full in zip(errors, ranges, strict=True)]
     return Claim(
         id="step_percentages",
         statement="The errors of the step response in percent of the full ranges of 110 deg, 55 psi and 110 psi.",
@@ -286,7 +286,7 @@ def _step_percentages() -> Claim:
         source=entries["step_percent_position"].where,
         note="Reported errors over reported ranges; nothing is simulated.",
         words=f"{', '.join(f'{percent:g}' for percent in percents)} %",
-        found=f"{', '.join(f'{percent:.2f}' for percent in found)} %",
+        found=f"{', '.join(f'{percent:.2f}' for percent in percentages)} %",
     )
 
 
@@ -303,7 +303,7 @@ def _damping_and_friction(reported: Reported) -> Claim:
     # The slope of acceleration over velocity is reported with its sign, the damping without.
     rates = {path: abs(reported.in_si(rate)) for path, rate in _RATES.items()}
     holds = all(inertia.times(reported.range(rate)).meets(reported.range(path)) for path, rate in _RATES.items())
-    found = {path: reported.in_reported_unit(path, reported.in_si(_INERTIA) * rate) for path, rate in rates.items()}
+    friction = {path: reported.in_reported_unit(path, reported.in_si(_INERTIA) * rate) for path, rate in rates.items()}
     needed = [reported.in_reported_unit(_INERTIA, reported.in_si(path) / rate) for path, rate in rates.items()]
     unit = reported.entry(_INERTIA).unit
     return Claim(
@@ -316,14 +316,14 @@ def _damping_and_friction(reported: Reported) -> Claim:
         if holds
         else f"The reported products need inertias of {' and '.join(f'{value:.2g}' for value in needed)} {unit}: "
         f"one slip, a factor of ten in the inertia, explains both, so that it counts once.",
-        words=", ".join(reported.quotation(path) for path in found),
-        found=", ".join(reported.text(path, value, 3) for path, value in found.items()),
+        words=", ".join(reported.quotation(path) for path in friction),
+        found=", ".join(reported.text(path, value, 3) for path, value in friction.items()),
     )
 
 
 def _discharge_coefficient(reported: Reported) -> Claim:
     """Compare the reported Cd with what the reported flow needs through each reported area; equation (6)."""
-    found, passed, held, gas = [], [], [], reported.gas()
+    coefficients, passed, held, gas = [], [], [], reported.gas()
     choked = choked_flow_constant(gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature)
     for valve in ("solenoid", "proportional"):
         coefficient, area = f"valves.{valve}.discharge_coefficient", f"valves.{valve}.area"
@@ -335,7 +335,7 @@ def _discharge_coefficient(reported: Reported) -> Claim:
         # The product Cd A follows from the flow; each area asks for a coefficient of its own.
         needed = reported.range(flow).over(reported.range(area)).over(Interval(per_area, per_area))
         held.append(needed.meets(reported.range(coefficient)))
-        found.append(reported.in_si(flow) / (per_area * reported.in_si(area)))
+        coefficients.append(reported.in_si(flow) / (per_area * reported.in_si(area)))
         passed.append(1e3 * reported.in_si(coefficient) * reported.in_si(area) * per_area)
     stated = [reported.quotation(f"reported.valves.solenoid.{name}") for name in ("mass_flow", "flow_pressure")]
     areas = " and ".join(reported.quotation(f"valves.{valve}.area") for valve in ("solenoid", "proportional"))
@@ -355,7 +355,7 @@ def _discharge_coefficient(reported: Reported) -> Claim:
             f"supply.atmospheric_pressure = {STANDARD_ATMOSPHERE:g} Pa_a: not reported; the standard atmosphere",
             "the measured flow leaves into the atmosphere through one opening of the reported area",
         ),
-        found=" and ".join(f"{value:.3g}" for value in found),
+        found=" and ".join(f"{value:.3g}" for value in coefficients),
     )
 
 

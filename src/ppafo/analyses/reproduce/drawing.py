@@ -57,9 +57,9 @@ def _line(
 def _pipe(axes: "Axes", *turns: float, colour: str = BLACK, width: float = 1.3, dashed: bool = False) -> None:
     """A line of level and upright pieces: x and y where it begins, then x, y, x, ... to which it goes in turn."""
     points = [(turns[0], turns[1])]
-    for place, turn in enumerate(turns[2:]):
+    for corner, turn in enumerate(turns[2:]):
         x, y = points[-1]
-        points.append((turn, y) if place % 2 == 0 else (x, turn))
+        points.append((turn, y) if corner % 2 == 0 else (x, turn))
     _line(axes, *points, colour=colour, width=width, dashed=dashed)
 
 

@@ -117,11 +117,11 @@ def _measurement(times: Floats, values: Floats) -> list[Mark]:
     ]
 
 
-def _enlarge(place: tuple[float, float, float, float], ends: tuple[float, float], axes: "Axes") -> None:
+def _enlarge(frame: tuple[float, float, float, float], ends: tuple[float, float], axes: "Axes") -> None:
     """Show a panel between two times [ms], and its first milliseconds enlarged inside it."""
     axes.margins(y=0.06)
     axes.set_xlim(*ends)
-    inset = axes.inset_axes(place)
+    inset = axes.inset_axes(frame)
     for line in axes.lines:
         times, values = (np.asarray(data, dtype=np.float64) for data in line.get_data())
         early = times <= _ENLARGED

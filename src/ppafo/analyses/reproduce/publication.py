@@ -154,48 +154,48 @@ def load_publication(name_or_path: str | Path) -> Publication:
 
 
 def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
-    place = f"{file}: claims.{entry.id}"
+    where = f"{file}: claims.{entry.id}"
     source = f"{entry.source or citation}, {entry.where}"
     if bool(entry.computation) == bool(entry.not_testable):
-        raise ScenarioError(f"{place}: give either computation or not_testable, which says why there is none")
+        raise ScenarioError(f"{where}: give either computation or not_testable, which says why there is none")
     if entry.not_testable:
         return PublishedClaim(entry, None, {}, source)
     if entry.computation not in COMPUTATIONS:
         hint = nearest_name(entry.computation, COMPUTATIONS)
         known = ", ".join(COMPUTATIONS)
-        raise ScenarioError(f"{place}.computation: there is no '{entry.computation}'{hint}; available: {known}")
+        raise ScenarioError(f"{where}.computation: there is no '{entry.computation}'{hint}; available: {known}")
     if entry.at_least is None and entry.at_most is None:
-        raise ScenarioError(f"{place}: give at_least or at_most, or both: what agrees with the claim")
+        raise ScenarioError(f"{where}: give at_least or at_most, or both: what agrees with the claim")
     # A side that the file leaves open.
     low = -math.inf if entry.at_least is None else entry.at_least
     high = math.inf if entry.at_most is None else entry.at_most
     if low > high:
-        raise ScenarioError(f"{place}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
+        raise ScenarioError(f"{where}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
     # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
         raise ScenarioError(
-            f"{place}: published = {entry.published:g} does not agree with itself, {name} = {limit:g}; widen the range"
+            f"{where}: published = {entry.published:g} does not agree with itself, {name} = {limit:g}; widen the range"
         )
     computation = COMPUTATIONS[entry.computation]
-    with refused_as(ScenarioError, f"{place}.unit", UnitError):
+    with refused_as(ScenarioError, f"{where}.unit", UnitError):
         # Only for what it raises: here the place in the file is known.
         from_si(1.0, entry.unit, computation.unit)
-    return PublishedClaim(entry, computation, _arguments(entry, computation, place), source)
+    return PublishedClaim(entry, computation, _arguments(entry, computation, where), source)
 
 
-def _arguments(entry: ClaimEntry, computation: Computation, place: str) -> dict[str, str | float]:
+def _arguments(entry: ClaimEntry, computation: Computation, where: str) -> dict[str, str | float]:
     """Return the arguments of a claim in SI: those that its computation takes, all of them and no other."""
     wanted = ", ".join(computation.arguments)
     for name in entry.arguments:
         if name not in computation.arguments:
             hint = nearest_name(name, computation.arguments)
-            raise ScenarioError(f"{place}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {wanted}")
+            raise ScenarioError(f"{where}.arguments: '{name}' is unknown{hint}; {entry.computation} takes {wanted}")
     values: dict[str, str | float] = {}
     for name, unit in computation.arguments.items():
         if name not in entry.arguments:
-            raise ScenarioError(f"{place}.arguments: '{name}' is missing; {entry.computation} takes {wanted}")
-        key, text = f"{place}.arguments.{name}", entry.arguments[name]
+            raise ScenarioError(f"{where}.arguments: '{name}' is missing; {entry.computation} takes {wanted}")
+        key, text = f"{where}.arguments.{name}", entry.arguments[name]
         with refused_as(ScenarioError, key, UnitError):
             value = values[name] = parse_quantity(text, unit)
         # An absolute pressure and a time: neither lies below 0.

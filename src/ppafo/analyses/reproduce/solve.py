@@ -128,7 +128,7 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
             name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
             for name, earlier in meant.items()
         }
-        known = tuple(dict.fromkeys(known for item in documents.values() for known in OF_A_VANE.paths(item)))
+        known = tuple(dict.fromkeys(known for document in documents.values() for known in OF_A_VANE.paths(document)))
         if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
             raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
         # A scenario that has a section for the value; the device is in all of them.

@@ -11,7 +11,7 @@ import numpy as np
 
 from ppafo.analyses.reproduce.claim import Claim, Observation, Verdict, observation, stated_claim
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.errors import ParameterError, ScenarioError, SimulationError
+from ppafo.errors import ParameterError, ScenarioError, SimulationError, count_of
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import load_scenario
@@ -49,8 +49,8 @@ def phased_runs(solenoid: Result) -> PhasedRuns:
         gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
         return PhasedRuns(np.array([solenoid.metrics["rms_error"].value]), np.array([gas]))
     fine = replace(scenario, run=replace(scenario.run, step=_FINE, output_interval=_FINE))
-    found = [run for tie in (_TIE, -_TIE) for run in _with_first_valve(fine, tie)]
-    errors, gas = np.array(found).T
+    runs = [run for tie in (_TIE, -_TIE) for run in _with_first_valve(fine, tie)]
+    errors, gas = np.array(runs).T
     return PhasedRuns(errors, gas)
 
 
@@ -123,12 +123,14 @@ def torque_task_claims(runs: PhasedRuns, proportional: Result, rests_on: tuple[s
         if not np.isfinite(values).all():
             return stated_claim(identifier, None, "undetermined", note, rests_on, window)
         median, low, high = (float(end) for end in (np.median(values), values.min(), values.max()))
-        found = f"{median:.{decimals}f} {entry.unit}"
+        median_text = f"{median:.{decimals}f} {entry.unit}"
         if high > low:
-            found = f"{found} ({low:.{decimals}f} to {high:.{decimals}f})"
+            median_text = f"{median_text} ({low:.{decimals}f} to {high:.{decimals}f})"
         verdict: Verdict = "met_by_fitted_settings" if window[0] <= median <= window[1] else "undetermined"
         note = f"{note} Accepted from {window[0]:g} to {window[1]:g} {entry.unit}."
-        return replace(stated_claim(identifier, median, verdict, note, rests_on, window, found), range=(low, high))
+        return replace(
+            stated_claim(identifier, median, verdict, note, rests_on, window, median_text), range=(low, high)
+        )
 
     with np.errstate(divide="ignore", invalid="ignore"):
         better, saved = (_PERCENT * (1.0 - own / pair) for own, pair in ((error, runs.errors), (gas, runs.gas)))
@@ -169,10 +171,13 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
         both = [pair, replace(spool, controller=replace(spool.controller, settings=gains))]
         if level is not None:
             both = [
-                replace(item, reference=replace(item.reference, settings={**item.reference.settings, "level": level}))
-                for item in both
+                replace(
+                    scenario,
+                    reference=replace(scenario.reference, settings={**scenario.reference.settings, "level": level}),
+                )
+                for scenario in both
             ]
-        first, second = (simulate(item).metrics for item in both)
+        first, second = (simulate(scenario).metrics for scenario in both)
         names = ("rms_error", "gas_supplied")
         error, gas = (_PERCENT * (1.0 - second[name].value / first[name].value) for name in names)
         return error, gas
@@ -192,7 +197,7 @@ def torque_task_observations(solenoid: Result, proportional: Result) -> list[Obs
     def reversals(number: int | None, part: str) -> str:
         if number is None:
             return f"this reference has no {part}"
-        return f"{number} torque reversal{'' if number == 1 else 's'} on the {part}"
+        return f"{count_of(number, 'torque reversal')} on the {part}"
 
     ramp, hold = count(solenoid, "ramp"), count(solenoid, "hold")
     own_ramp, own_hold = count(proportional, "ramp"), count(proportional, "hold")
@@ -274,9 +279,9 @@ def _limited_by_switching(solenoid: Result, runs: PhasedRuns) -> Claim:
         return stated_claim(entry.id, None, "undetermined", f"{entry.note} {faster}.")
     less = _PERCENT * (1.0 - faster / runs.errors)
     median, low, high = (float(end) for end in (np.median(less), less.min(), less.max()))
-    found = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
+    sentence = f"{median:.0f} % less error at 100 Hz" + (f" ({low:.0f} to {high:.0f})" if high > low else "")
     claim = stated_claim(
-        entry.id, median, "undetermined", entry.note, ("the torque task as completed here",), None, found
+        entry.id, median, "undetermined", entry.note, ("the torque task as completed here",), None, sentence
     )
     return replace(claim, range=(low, high))
 
@@ -287,6 +292,7 @@ def _undetermined(identifier: str, error: float, other: float | str) -> Claim:
     if isinstance(other, str):
         return stated_claim(identifier, None, "undetermined", f"{entry.note} {other}.")
     value = _PERCENT * (other / error - 1.0)
-    found = f"{abs(value):.0f} % {'more' if value > 0.0 else 'less'} error"
+    more = "more" if value > 0.0 else "less"
+    sentence = f"{abs(value):.0f} % {more} error"
     note = f"{entry.note} In this task {other:.3f} instead of {error:.3f} N m."
-    return stated_claim(identifier, value, "undetermined", note, ("the torque task as completed here",), None, found)
+    return stated_claim(identifier, value, "undetermined", note, ("the torque task as completed here",), None, sentence)

@@ -90,11 +90,11 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
 
 
-def _sobol_indices(found: Evaluated, confidence: float) -> Indices:
+def _sobol_indices(evaluated: Evaluated, confidence: float) -> Indices:
     """Return ``first`` and ``total`` with bands."""
     # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
-    table = found.values.reshape(found.blocks.size, -1)
-    scramble = found.blocks % SCRAMBLES
+    table = evaluated.values.reshape(evaluated.blocks.size, -1)
+    scramble = evaluated.blocks % SCRAMBLES
     parts = [scramble != number for number in np.unique(scramble)]
     left_out = np.array([_sobol_total_and_first(table[rest]) for rest in parts])
     reach = jackknife_reach(left_out, confidence)
@@ -161,17 +161,17 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     return np.asarray(np.clip(uniform, _SMALLEST, 1.0 - _SMALLEST))
 
 
-def _shapley_indices(found: Evaluated, confidence: float) -> Indices:
+def _shapley_indices(evaluated: Evaluated, confidence: float) -> Indices:
     """Return ``shapley`` with bands, by the delta method over the orders."""
     from scipy.special import stdtrit
 
-    blocks, count = found.blocks.size, found.fractions.shape[1]
-    table = found.values.reshape(blocks, count - 1, _INNER)
+    blocks, count = evaluated.blocks.size, evaluated.fractions.shape[1]
+    table = evaluated.values.reshape(blocks, count - 1, _INNER)
     whole = np.mean((table - np.mean(table)) ** 2, axis=(1, 2))
     left = np.var(table, axis=2, ddof=1)
     ends = np.zeros((blocks, 1)), whole[:, None]
     gains = np.diff(np.concatenate([ends[0], left, ends[1]], axis=1), axis=1)
-    orders = _orders(count, int(found.blocks.max()) + 1, found.seed)[found.blocks]
+    orders = _orders(count, int(evaluated.blocks.max()) + 1, evaluated.seed)[evaluated.blocks]
     effects = np.take_along_axis(gains, np.argsort(orders, axis=1), axis=1)
     variance = float(np.mean(whole))
     fractions = np.mean(effects, axis=0) / variance
@@ -216,7 +216,7 @@ METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
 """To add a method: its design, its indices, and its value here."""
 
 
-def changes(found: Evaluated, confidence: float) -> tuple[Floats, Floats]:
+def changes(evaluated: Evaluated, confidence: float) -> tuple[Floats, Floats]:
     """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
 
     In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of
@@ -225,28 +225,28 @@ def changes(found: Evaluated, confidence: float) -> tuple[Floats, Floats]:
     without weights): a straight line is off by what the metric bends there, which no band from a spread shows. The
     bands come from the spread between as many parts of the blocks as there are scrambles.
     """
-    own = np.unique(found.blocks % SCRAMBLES, return_inverse=True)[1]
-    part = np.repeat(own, found.values.size // found.blocks.size)
+    own = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
+    part = np.repeat(own, evaluated.values.size // evaluated.blocks.size)
     # About the mean, because the sums of the lines below cancel.
-    values = found.values - np.mean(found.values)
+    values = evaluated.values - np.mean(evaluated.values)
     levels = np.array(
         [
-            [_levels(values, given, end, part) for end in ends]
-            for given, ends in zip(found.inputs.T, found.ends.T, strict=True)
+            [_levels(values, inputs, end, part) for end in ends]
+            for inputs, ends in zip(evaluated.inputs.T, evaluated.ends.T, strict=True)
         ]
     )
     change = levels[:, 1] - levels[:, 0]
     return change[:, 0], jackknife_reach(change[:, 1:].T, confidence)
 
 
-def _levels(values: Floats, given: Floats, end: float, part: NDArray[np.intp]) -> Floats:
+def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp]) -> Floats:
     """Return the mean of the metric where a value is at an end: from all parts, then without each (parts + 1,)."""
     count = int(part.max()) + 1
     if math.isnan(end):
         return np.full(count + 1, math.nan)
-    away = np.abs(given - end)
+    away = np.abs(inputs - end)
     near = away <= np.partition(away, int(_NEAREST * away.size))[int(_NEAREST * away.size)]
-    along = (given[near] - end) / (np.max(away[near]) or 1.0)
+    along = (inputs[near] - end) / (np.max(away[near]) or 1.0)
     powers = np.stack([along**power for power in range(5)])
     moments = np.stack([np.bincount(part[near], power, count) for power in powers])
     mixed = np.stack([np.bincount(part[near], power * values[near], count) for power in powers[:3]])

@@ -102,18 +102,18 @@ class Influences:
 _POLICY = "above the maximum fraction refused; below, every block with a failed run is left out"
 
 
-def overlapping_pairs(found: Influences, metric: OfMetric) -> list[tuple[str, str]]:
+def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[str, str]]:
     """Return neighbours in the order of the first index whose bands overlap: which of the two matters more is open.
 
     Nothing is said of two that both are surely below a hundredth of the largest: neither matters.
     """
-    name, indices = METHODS[found.method].shown[0], metric.indices
+    name, indices = METHODS[influences.method].shown[0], metric.indices
     # In the order of the table, in which only neighbours can be mistaken for each other.
     values, bands = indices.values[name], indices.bands[name]
     order = np.argsort(-values)
     order = order[(values + bands)[order] >= _NEGLIGIBLE * np.max(values)]
     return [
-        (found.paths[first], found.paths[second])
+        (influences.paths[first], influences.paths[second])
         for first, second in pairwise(order)
         if values[first] - bands[first] < values[second] + bands[second]
     ]
@@ -142,14 +142,16 @@ def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Sett
     columns = uncertainty.columns(design)
     rows = runs.run(columns)
     runs.check(rows, settings.maximum_failed, "sensitivity", runs.metrics)
-    ends = np.array([item.distribution.values(np.array(_ENDS)) for item in uncertainty.drawn]).T
+    ends = np.array([number.distribution.values(np.array(_ENDS)) for number in uncertainty.drawn]).T
     # A seed has no order: from its 5 to its 95 % quantile nothing changes.
     ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     blocks = np.repeat(np.arange(settings.samples), design.shape[0] // settings.samples)
     whole = Evaluated(design, inputs, np.empty(0), blocks, ends, settings.seed)
-    found = [_of_metric(name, rows[name], whole, method, settings) for name in runs.metrics]
-    return Influences(study, method.name, settings, list(uncertainty.paths), runs.count, runs.failures, _POLICY, found)
+    metrics = [_of_metric(name, rows[name], whole, method, settings) for name in runs.metrics]
+    return Influences(
+        study, method.name, settings, list(uncertainty.paths), runs.count, runs.failures, _POLICY, metrics
+    )
 
 
 def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
@@ -178,8 +180,10 @@ def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, set
         part = Evaluated(
             design.fractions[places], design.inputs[places], values[places], kept, design.ends, design.seed
         )
-        found = method.indices(part, settings.confidence)
-        indices, bands = ({name: each.tolist() for name, each in item.items()} for item in (found.values, found.bands))
+        estimated = method.indices(part, settings.confidence)
+        indices, bands = (
+            {name: each.tolist() for name, each in values.items()} for values in (estimated.values, estimated.bands)
+        )
         settling.append(Settling(size, kept.size, indices, bands))
     change, band = changes(part, settings.confidence)
     return OfMetric(
@@ -205,43 +209,43 @@ _CAPTION = (
 )
 
 
-def finding_of(found: Influences) -> Finding[Influences]:
+def finding_of(influences: Influences) -> Finding[Influences]:
     """Return the indices in words, a table and two panels for each metric."""
-    settings, method = found.settings, METHODS[found.method]
+    settings, method = influences.settings, METHODS[influences.method]
     said = (
-        f"{found.study}: {found.method}, {settings.samples:,} {method.sizes_label}, {found.runs:,} runs of "
-        f"{len(found.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
-        f"{found.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
+        f"{influences.study}: {influences.method}, {settings.samples:,} {method.sizes_label}, {influences.runs:,} runs "
+        f"of {len(influences.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
+        f"{influences.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
     )
     figure = Part(
         "Indices and their convergence",
-        panels=partial(_panels, found),
+        panels=partial(_panels, influences),
         name="sensitivity",
         caption=_CAPTION,
         across=2,
-        size=(4.8, max(2.9, 0.9 + _LINE * len(found.paths))),
+        size=(4.8, max(2.9, 0.9 + _LINE * len(influences.paths))),
         is_detail=True,
     )
     return Finding(
         name="sensitivity",
         kicker="Sensitivity",
-        title=f"What matters in {found.study}",
+        title=f"What matters in {influences.study}",
         said=said,
-        parts=(*(_part(found, metric) for metric in found.metrics), figure),
-        found=found,
+        parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
+        found=influences,
     )
 
 
-def _panels(found: Influences) -> list[Panel]:
-    return [draw(found, metric) for metric in found.metrics for draw in (_bars, _course)]
+def _panels(influences: Influences) -> list[Panel]:
+    return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
-def _part(found: Influences, metric: OfMetric) -> Part:
+def _part(influences: Influences, metric: OfMetric) -> Part:
     """Return a row for each uncertain value, the most important one first, and what these numbers leave open."""
     kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
-    order = np.argsort(-indices.values[METHODS[found.method].shown[0]])
-    columns = [Column("value", [found.paths[row] for row in order])]
+    order = np.argsort(-indices.values[METHODS[influences.method].shown[0]])
+    columns = [Column("value", [influences.paths[row] for row in order])]
     for name, values in indices.values.items():
         columns.append(Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
         columns.append(Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
@@ -249,15 +253,17 @@ def _part(found: Influences, metric: OfMetric) -> Part:
     ends = [None if math.isnan(change[row]) else f"± {kind.change_number(band[row], '.2g')}" for row in order]
     shown = [None if math.isnan(change[row]) else change[row] for row in order]
     columns += [Column("change, 5 to 95 %", shown, kind, is_change=True), Column("band", ends)]
-    dropped = f"; {metric.dropped_blocks:,} of {found.settings.samples:,} {METHODS[found.method].sizes_label} left out"
-    heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}{dropped if metric.dropped_blocks else ''}"
-    return Part(heading, columns, remarks=remarks(found, metric))
+    heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}"
+    if metric.dropped_blocks:
+        label = METHODS[influences.method].sizes_label
+        heading += f"; {metric.dropped_blocks:,} of {influences.settings.samples:,} {label} left out"
+    return Part(heading, columns, remarks=remarks(influences, metric))
 
 
-def remarks(found: Influences, metric: OfMetric) -> list[str]:
+def remarks(influences: Influences, metric: OfMetric) -> list[str]:
     """Return what these numbers leave open; a rest within the error of the sum may be no interaction."""
     said = []
-    unsettled = overlapping_pairs(found, metric)
+    unsettled = overlapping_pairs(influences, metric)
     if unsettled:
         pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
         said.append(f"not converged at this size, their bands overlap: {pairs}")
@@ -273,9 +279,13 @@ def remarks(found: Influences, metric: OfMetric) -> list[str]:
     return said
 
 
-def _bars(found: Influences, metric: OfMetric) -> Panel:
+def _bars(influences: Influences, metric: OfMetric) -> Panel:
     """Return the indices with their bands; the names of the largest have the colours of the panel beside."""
-    shown, indices, labels = METHODS[found.method].shown, metric.indices, [label_of(path) for path in found.paths]
+    shown, indices, labels = (
+        METHODS[influences.method].shown,
+        metric.indices,
+        [label_of(path) for path in influences.paths],
+    )
     order = np.argsort(indices.values[shown[0]])
     places = np.arange(order.size)
     marks = [
@@ -301,9 +311,9 @@ def _bars(found: Influences, metric: OfMetric) -> Panel:
     return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="inside", then=name_values)
 
 
-def _course(found: Influences, metric: OfMetric) -> Panel:
+def _course(influences: Influences, metric: OfMetric) -> Panel:
     """Return the largest indices from growing parts of the sample."""
-    method = METHODS[found.method]
+    method = METHODS[influences.method]
     name, sizes = method.shown[0], [each.blocks for each in metric.settling]
     order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]
     marks = []

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ppafo.errors import ParameterError, refused_as
+from ppafo.errors import ParameterError, count_of, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.audit import Finding, audit, changed_paths
 from ppafo.parameters.audit.changes import changes
@@ -75,14 +75,11 @@ def _counts(findings: list[Finding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
-
-
 def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Part:
     """Return what a set changes of its parent."""
     rows = [(change["path"], change["before"] or None, change["after"] or None, change["origin"]) for change in changed]
-    said = f"{name} changes {_counted(len(rows), 'value') if rows else 'nothing'} of its parent {parent}"
+    changes = count_of(len(rows), "value") if rows else "nothing"
+    said = f"{name} changes {changes} of its parent {parent}"
     return Part(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
 
 
@@ -106,10 +103,11 @@ def _parts(parameter_set: ParameterSet, findings: list[Finding], changed: frozen
         or not finding.values
         or any(value.path in changed for value in finding.values)
     ]
-    summary = ", ".join(_counted(count, severity) for severity, count in _counts(findings).items())
+    summary = ", ".join(count_of(count, severity) for severity, count in _counts(findings).items())
     left = len(findings) - len(shown)
     if left:
-        summary += f"; {left} of them {'concerns' if left == 1 else 'concern'} no changed value: --all"
+        concern = "concerns" if left == 1 else "concern"
+        summary += f"; {left} of them {concern} no changed value: --all"
     return [*(Part(said=_lines(finding)) for finding in shown), Part(said=[f"{parameter_set.name}: {summary}"])]
 
 

@@ -17,7 +17,7 @@ def values_document(parameter_set: ParameterSet) -> dict[str, Any]:
     """Return every value of a set with its source, as plain data."""
     citation, parameter_set = parameter_set.citation, with_followers(parameter_set)
     # By section only, so that within a section texts come first and numbers as they are declared.
-    entries = sorted(parameter_set.entries().items(), key=lambda item: _SECTIONS.index(item[0].partition(".")[0]))
+    entries = sorted(parameter_set.entries().items(), key=lambda entry: _SECTIONS.index(entry[0].partition(".")[0]))
     return {
         "name": parameter_set.name,
         "title": parameter_set.title,

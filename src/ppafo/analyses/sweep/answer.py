@@ -52,11 +52,13 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     study, runs, first = document["study"], document["runs"], [*summary["failures"][:1]]
     ended = ", ".join(f"{summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if summary[key])
     described = " ".join(study.get("description", "").split())
-    failed = [f"run {item['run']} ({item['configuration']}): {item['reason']}" for item in summary["failures"]]
+    failed = [
+        f"run {failure['run']} ({failure['configuration']}): {failure['reason']}" for failure in summary["failures"]
+    ]
     remarks = [
-        f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run {item['run']}: "
-        f"{item['reason']}"
-        for item in first
+        f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "
+        f"{failure['run']}: {failure['reason']}"
+        for failure in first
     ]
     remarks += [
         f"{name}: in {count:,} runs the torque loop oscillates (column 'oscillates')"
@@ -64,22 +66,22 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         if count
     ]
     said = [
-        f"Correlation of {item['between'][0]} with {item['between'][1]}: {item['coefficient']}, of their normal scores."
-        for item in study.get("correlations", ())
+        f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
+        for pair in study.get("correlations", ())
     ]
     sample = study.get("sample")
     if sample:
         method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
         said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
     varied = []
-    for item in study.get("vary", ()):
-        others = [f"{key.replace('_', ' ')} {value}" for key, value in item.items() if key not in ("path", "kind")]
-        varied.append((item["path"], item["kind"], ", ".join(others)))
+    for number in study.get("vary", ()):
+        others = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
+        varied.append((number["path"], number["kind"], ", ".join(others)))
     # What the base scenarios assume, once where several assume the same.
     names: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in document["scenarios"].items():
-        for item in scenario["assumptions"]:
-            names.setdefault((item["path"], item["value"], item["note"]), []).append(name)
+        for number in scenario["assumptions"]:
+            names.setdefault((number["path"], number["value"], number["note"]), []).append(name)
     assumed = [(*assumption, ", ".join(own)) for assumption, own in names.items()]
     files = (
         ("rows of all runs", "runs/*.parquet"),
@@ -131,23 +133,23 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     >>> ppafo.load_study_results("four").said[0]
     'torque-task-uncertainty: 8 runs: 8 completed'
     """
-    place = place_at(folder)
-    document = read_manifest(place)
+    location = place_at(folder)
+    document = read_manifest(location)
     try:
-        summary = read_document(place, SUMMARY)
+        summary = read_document(location, SUMMARY)
     except (OSError, ValueError) as error:
         raise DataError(
-            f"{place.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
         ) from error
-    whose = f"{place.address}: {SUMMARY} is damaged; run the study again into this folder"
+    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
     described = validate(_Summary, summary, whose, DataError)
-    names = {item["name"] for item in document["study"]["configurations"]}
+    names = {configuration["name"] for configuration in document["study"]["configurations"]}
     metrics = [set(own) for own in described.configurations.values()]
     # A configuration or a metric in one of the two documents alone would be looked up in vain.
     is_same = names == described.configurations.keys() == described.completed_by_configuration.keys()
     if not is_same or any(own != document["metrics"].keys() for own in metrics):
         raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
-    return finding_of(StudyResults(place, document, summary))
+    return finding_of(StudyResults(location, document, summary))
 
 
 _Count = Annotated[int, Field(ge=0)]
@@ -196,16 +198,18 @@ class _Summary(_Part):
 
 
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
-    described = [item for own in results.metrics.values() for item in own.values() if item["count"]]
+    described = [
+        description for own in results.metrics.values() for description in own.values() if description["count"]
+    ]
     fractions = list(described[0]["quantiles"]) if described else []
     head = ("metric", "unit", "runs", "mean", "sd", *(f"{100 * float(fraction):g} %" for fraction in fractions))
     rows = []
-    for metric, item in metrics.items():
+    for metric, description in metrics.items():
         kind = _metric_kind(results, metric)
-        cells = [metric, kind.shown_unit, f"{item['count']:,}"]
-        if item["count"]:
-            deviation = kind.change_number(item["sd"]) if "sd" in item else ""
-            cells += [kind.number(item["mean"]), deviation, *map(kind.number, item["quantiles"].values())]
+        cells = [metric, kind.shown_unit, f"{description['count']:,}"]
+        if description["count"]:
+            deviation = kind.change_number(description["sd"]) if "sd" in description else ""
+            cells += [kind.number(description["mean"]), deviation, *map(kind.number, description["quantiles"].values())]
         rows.append([*cells, *[""] * (len(head) - len(cells))])
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
     return Part(columns=columns_of(head, rows), said=[completed], left=2)
@@ -247,7 +251,7 @@ def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) 
 
 def _grid(results: StudyResults) -> list[str]:
     """Return the paths that vary over a grid."""
-    return [item["path"] for item in results.document["study"].get("vary", ()) if item["kind"] in _GRIDDED]
+    return [number["path"] for number in results.document["study"].get("vary", ()) if number["kind"] in _GRIDDED]
 
 
 def _panels(results: StudyResults) -> list[Panel]:
@@ -325,11 +329,14 @@ def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_
     )
     # A point of the grid may have several draws, some of which failed: the mean of the others.
     values = results.thin(metric, MAXIMUM_DRAWN)[name]
-    place, known = row * columns.size + column, np.isfinite(values)
-    count = np.bincount(place[known], minlength=rows.size * columns.size)
-    total = np.bincount(place[known], weights=values[known], minlength=rows.size * columns.size)
+    cell, known = row * columns.size + column, np.isfinite(values)
+    count = np.bincount(cell[known], minlength=rows.size * columns.size)
+    total = np.bincount(cell[known], weights=values[known], minlength=rows.size * columns.size)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
-    kind, items = _metric_kind(results, metric), {item["path"]: item for item in results.document["study"]["vary"]}
+    kind, items = (
+        _metric_kind(results, metric),
+        {number["path"]: number for number in results.document["study"]["vary"]},
+    )
     kinds, places = [], []
     for path, levels in zip(grid, (columns, rows), strict=True):
         of_axis, is_listed = _kind(results, path), items[path]["kind"] == "list"

@@ -26,8 +26,8 @@ def check_scheduler(address: str) -> None:
     try:
         # The library tries for half a minute, also where the other computer says at once that nothing listens.
         if "://" not in address or address.startswith(_OVER_SOCKETS):
-            place = distributed.comm.get_address_host_port(address)
-            socket.create_connection(place, timeout=_SECONDS_TO_ANSWER).close()
+            host_and_port = distributed.comm.get_address_host_port(address)
+            socket.create_connection(host_and_port, timeout=_SECONDS_TO_ANSWER).close()
         asyncio.run(_reach(address, distributed))
     except (OSError, ValueError, TimeoutError) as error:
         raise _unreachable(address, error) from error

@@ -85,9 +85,9 @@ def sweep_into_folder(
         "confidence": confidence,
         "maximum_failed": maximum_failed,
     }
-    given = {name: value for name, value in of_statistic.items() if value is not None}
+    named = {name: value for name, value in of_statistic.items() if value is not None}
     if statistic is None:
-        unused = [*(["metric"] if metric is not None else []), *given]
+        unused = [*(["metric"] if metric is not None else []), *named]
         if unused:
             raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
         chosen = study_of(study, overrides, draws, seed)
@@ -103,11 +103,11 @@ def sweep_into_folder(
     if scheduler is not None:
         raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
     chosen = study_of(study, overrides)
-    place = Path(out or Path("out") / f"{chosen.name}-{metric}")
-    check_owned_folder(place, marked_folder("sweep"))
+    target = Path(out or Path("out") / f"{chosen.name}-{metric}")
+    check_owned_folder(target, marked_folder("sweep"))
     most = MOST_DRAWS if draws is None else draws
-    found = estimate(
-        chosen, metric=metric, statistic=statistic, seed=seed, draws=most, threads=threads, progress=progress, **given
+    estimated = estimate(
+        chosen, metric=metric, statistic=statistic, seed=seed, draws=most, threads=threads, progress=progress, **named
     )
-    found.save(place)
-    return replace(found, found=replace(found.found, folder=str(place)))
+    estimated.save(target)
+    return replace(estimated, found=replace(estimated.found, folder=str(target)))

@@ -57,7 +57,7 @@ class StudyResults:
     @property
     def configurations(self) -> tuple[str, ...]:
         """Names of the configurations."""
-        return tuple(item["name"] for item in self.document["study"]["configurations"])
+        return tuple(configuration["name"] for configuration in self.document["study"]["configurations"])
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -67,8 +67,8 @@ class StudyResults:
     @property
     def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
         """For each configuration and metric: unit, count, mean, standard deviation, extremes and quantiles."""
-        found: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
-        return found
+        metrics: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
+        return metrics
 
     def table(self, columns: Sequence[str] | None = None) -> Columns:
         """Return the rows of all runs, or some columns of them, as arrays by name; SI units, nan where none.

@@ -67,7 +67,7 @@ Parts = Callable[[], Iterator[Floats]]
 
 def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
     """Return the content of ``summary.json``: counts, the first few runs that failed, and each metric."""
-    completed = dict.fromkeys((item.name for item in study.configurations), 0)
+    completed = dict.fromkeys((configuration.name for configuration in study.configurations), 0)
     failures: list[dict[str, Any]] = []
     for name in completed:
         for part in results.chunks(["run", "configuration", "status", "reason"], name):
@@ -77,7 +77,11 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
                 failures += part.filter(~rows).slice(0, _EXAMPLES - len(failures)).to_pylist()
     # A run that diverged has a time at which it did; one that was refused never began.
     failed = study.runs - sum(completed.values())
-    diverged = sum(part.size for item in study.configurations for part in results.parts(item.name, "failure_time"))
+    diverged = sum(
+        part.size
+        for configuration in study.configurations
+        for part in results.parts(configuration.name, "failure_time")
+    )
     return {
         "study": study.name,
         "runs": study.runs,
@@ -91,12 +95,12 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         "failures": failures,
         "quantile_definition": QUANTILE_DEFINITION,
         "configurations": {
-            item.name: {
+            configuration.name: {
                 metric: {"unit": METRICS[metric].unit, "summary": METRICS[metric].summary}
-                | describe(partial(results.parts, item.name, metric), study.outputs.quantiles)
+                | describe(partial(results.parts, configuration.name, metric), study.outputs.quantiles)
                 for metric in study.outputs.metrics
             }
-            for item in study.configurations
+            for configuration in study.configurations
         },
     }
 
@@ -105,14 +109,14 @@ def bands_file(study: Study, results: StudyResults) -> bytes:
     """Return the content of ``bands.parquet``: quantiles over the runs at each time, exact."""
     fractions = study.outputs.quantiles
     parts: list[Columns] = []
-    for number, item in enumerate(study.configurations):
-        samples = samples_of(study, item)
-        for place, channel in enumerate(study.outputs.bands):
-            counts, levels = _band(study, results, item.name, channel, samples)
+    for number, configuration in enumerate(study.configurations):
+        samples = samples_of(study, configuration)
+        for row, channel in enumerate(study.outputs.bands):
+            counts, levels = _band(study, results, configuration.name, channel, samples)
             parts.append(
                 {
                     "configuration": np.full(samples, number),
-                    "channel": np.full(samples, place),
+                    "channel": np.full(samples, row),
                     "time": study.outputs.every * np.arange(samples),
                     "runs": counts,
                     **{f"q{fraction:g}": level for fraction, level in zip(fractions, levels, strict=True)},
@@ -121,7 +125,7 @@ def bands_file(study: Study, results: StudyResults) -> bytes:
     rows = joined(parts)
     units = {stored_unit(CHANNELS[name].unit) for name in study.outputs.bands}
     unit = units.pop() if len(units) == 1 else "SI unit of the channel"
-    names = [item.name for item in study.configurations]
+    names = [configuration.name for configuration in study.configurations]
     columns = {
         "configuration": TableColumn(encode_texts(rows.pop("configuration"), names), "-", "name of the base scenario"),
         "channel": TableColumn(encode_texts(rows.pop("channel"), study.outputs.bands), "-", "name of the channel"),
@@ -161,19 +165,19 @@ def sorted_quantiles(ordered: Floats, counts: NDArray[np.int64], fractions: Sequ
 def describe(parts: Parts, fractions: Sequence[float]) -> dict[str, Any]:
     """Return count, and unless it is 0 mean, standard deviation (from 2 values on), extremes, quantiles by fraction."""
     sums = [(part.size, float(np.sum(part)), float(part.min()), float(part.max())) for part in parts() if part.size]
-    count = sum(item[0] for item in sums)
+    count = sum(part[0] for part in sums)
     if count == 0:
         return {"count": 0}
     # Squares about the mean, in a second pass: about 0 they would cancel where the spread is small.
-    mean = math.fsum(item[1] for item in sums) / count
+    mean = math.fsum(part[1] for part in sums) / count
     levels = np.quantile(np.concatenate(list(parts())), fractions, method="linear", overwrite_input=True)
     squares = math.fsum(float(np.sum((part - mean) ** 2)) for part in parts())
     return {
         "count": count,
         "mean": mean,
         **({"sd": math.sqrt(squares / (count - 1))} if count > 1 else {}),
-        "minimum": min(item[2] for item in sums),
-        "maximum": max(item[3] for item in sums),
+        "minimum": min(part[2] for part in sums),
+        "maximum": max(part[3] for part in sums),
         "quantiles": dict(zip((f"{fraction:g}" for fraction in fractions), levels.tolist(), strict=True)),
     }
 
@@ -224,15 +228,15 @@ def sweep(
         # Before a folder is made: a wrong address must leave nothing.
         check_scheduler(scheduler)
     kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
-    place = place_at(kept.name if kept is not None else str(out))
-    store = Store.claim(chosen, place, agreed, threads)
-    _work(Task(chosen, place.address, threads), store, scheduler, progress)
-    results = StudyResults(place, read_manifest(place), {}, kept)
+    location = place_at(kept.name if kept is not None else str(out))
+    store = Store.claim(chosen, location, agreed, threads)
+    _work(Task(chosen, location.address, threads), store, scheduler, progress)
+    results = StudyResults(location, read_manifest(location), {}, kept)
     summary = _summary(chosen, results)
     if chosen.outputs.bands:
-        place.write(BANDS, bands_file(chosen, results))
+        location.write(BANDS, bands_file(chosen, results))
     # Last, because a study counts as finished once its summary is there.
-    place.write(SUMMARY, f"{json_text(summary)}\n".encode())
+    location.write(SUMMARY, f"{json_text(summary)}\n".encode())
     return finding_of(replace(results, summary=summary))
 
 
@@ -250,30 +254,30 @@ def studies_of_the_package() -> list[dict[str, Any]]:
 
 def _work(task: Task, store: Store, scheduler: str | None, progress: Report | None) -> None:
     """Compute the chunks that are missing, and add a line on this session to the log."""
-    study, place, started = store.study, store.place, time.monotonic()
+    study, location, started = store.study, store.place, time.monotonic()
     known = store.finished()
-    earlier, missing = sum(item.runs for item in known), set(range(chunk_count(study)))
-    missing -= {item.number for item in known}
-    tally = Tally(study.runs, progress, earlier, sum(item.failed for item in known))
+    earlier, missing = sum(block.runs for block in known), set(range(chunk_count(study)))
+    missing -= {block.number for block in known}
+    tally = Tally(study.runs, progress, earlier, sum(block.failed for block in known))
 
     def count(finished: Finished) -> None:
         tally.add(finished.runs, finished.failed)
 
     # Rows change below: an old summary would pass for a finished study meanwhile.
-    if missing and SUMMARY in place.names():
-        place.remove(SUMMARY)
+    if missing and SUMMARY in location.names():
+        location.remove(SUMMARY)
     if scheduler is None:
         _compute_here(task, store, sorted(missing), count)
     else:
         from ppafo.analyses.sweep.cluster import compute_on_cluster
 
         compute_on_cluster(scheduler, replace(task, plugins=plugins_to_send()), sorted(missing), count)
-        place.tidy()
-        names = place.names()
+        location.tidy()
+        names = location.names()
         if any(note_file(number) not in names for number in missing):
             raise StudyError(
-                f"--scheduler {scheduler}: the workers finished chunks that are not in {place.address}: --out must be "
-                "a folder that they share with this machine, or an address such as s3://bucket/study"
+                f"--scheduler {scheduler}: the workers finished chunks that are not in {location.address}: --out must "
+                "be a folder that they share with this machine, or an address such as s3://bucket/study"
             )
     line = {
         "ended": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
@@ -287,11 +291,11 @@ def _work(task: Task, store: Store, scheduler: str | None, progress: Report | No
         "seconds": round(time.monotonic() - started, 3),
     }
     try:
-        with place.open(LOG) as file:
+        with location.open(LOG) as file:
             before = file.read()
     except OSError:
         before = b""
-    place.write(LOG, before + f"{json.dumps(line)}\n".encode())
+    location.write(LOG, before + f"{json.dumps(line)}\n".encode())
 
 
 def _compute_here(task: Task, store: Store, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:

@@ -182,10 +182,10 @@ class StoppingRule:
     def sizes(self) -> tuple[int, ...]:
         """The numbers of draws at which it is looked at the interval, at most."""
         # Doubled each time: few looks have to share the allowed error, and the last takes half of all draws.
-        found = [self.first]
-        while found[-1] < self.maximum:
-            found.append(min(2 * found[-1], self.maximum))
-        return tuple(found)
+        sizes = [self.first]
+        while sizes[-1] < self.maximum:
+            sizes.append(min(2 * sizes[-1], self.maximum))
+        return tuple(sizes)
 
     @property
     def confidence_of_look(self) -> float:
@@ -412,9 +412,11 @@ def _remarks(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise
             f"if it lay beyond the others by their range, {kind.change(span)}, the mean would move by up to "
             f"{kind.change(share * span)}, and more the further it lies"
         )
+        if are_equal:
+            moved = f"it would move the mean by up to {share:.2g} times its distance"
         said.append(
             f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): "
-            f"{f'it would move the mean by up to {share:.2g} times its distance' if are_equal else moved}"
+            f"{moved}"
         )
     if noise is not None:
         said.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
@@ -426,15 +428,15 @@ _MAXIMUM_BINS = 80
 _CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
 
 
-def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Finding[Estimate]:
+def _finding(estimated: Estimate, statistic: Statistic, rule: StoppingRule) -> Finding[Estimate]:
     """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
-    kind, of_values, looks = _kind(found.metric, statistic), of_metric(found.metric), found.looks
+    kind, of_values, looks = _kind(estimated.metric, statistic), of_metric(estimated.metric), estimated.looks
     unit = kind.shown_unit if kind.quantity else ""
-    ending = "" if rule.is_narrow(found.interval) else "; the target width was not reached with the maximum of "
+    ending = "" if rule.is_narrow(estimated.interval) else "; the target width was not reached with the maximum of "
     ending += f"{rule.maximum:,} draws" if ending else ""
     verdict = (
-        f"{found.statistic} of {found.metric}: {kind.interval(found.interval)} {unit}".rstrip()
-        + f" after {found.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
+        f"{estimated.statistic} of {estimated.metric}: {kind.interval(estimated.interval)} {unit}".rstrip()
+        + f" after {estimated.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
     )
     width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else kind.change(rule.width)
     policy = (
@@ -444,56 +446,57 @@ def _finding(found: Estimate, statistic: Statistic, rule: StoppingRule) -> Findi
     )
     rows = []
     for look in looks:
-        met = "narrow enough" if rule.is_narrow(look.interval) else ""
-        met += "" if look.is_carried else f"{', but ' if met else ''}its effective sample size is small"
+        said_of_look = ["narrow enough"] if rule.is_narrow(look.interval) else []
+        said_of_look += [] if look.is_carried else ["its effective sample size is small"]
+        met = ", but ".join(said_of_look)
         ends = (kind.number(value) for value in (look.interval.value, look.interval.low, look.interval.high))
         reach = kind.change(look.interval.width) if math.isfinite(look.interval.width) else f"{look.interval.width:.3g}"
         rows.append((f"{look.draws:,}", f"{look.missing:,}", *ends, reach, met))
     further = [
         (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
-        for name, mean in found.also.items()
+        for name, mean in estimated.also.items()
     ]
     also = Part(
         "Further metrics",
         columns_of(("mean over the same draws", "with a value", *_ENDS), further),
         said=[f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."],
     )
-    title = f"{found.statistic} of {found.metric}"
+    title = f"{estimated.statistic} of {estimated.metric}"
     return Finding(
         name="statistic",
         command="sweep",
         kicker="Statistic of a study",
         title=title[:1].upper() + title[1:],
-        said=(verdict, *found.remarks),
+        said=(verdict, *estimated.remarks),
         parts=(
             *([also] if further else []),
             Part(
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
-                panels=partial(_panels, found, kind, rule, statistic, of_values),
+                panels=partial(_panels, estimated, kind, rule, statistic, of_values),
                 name="trace",
                 caption=_CAPTION,
                 across=2,
                 size=(4.1, 3.3),
             ),
         ),
-        found=found,
-        passed=found.is_met,
+        found=estimated,
+        passed=estimated.is_met,
     )
 
 
-def _panels(found: Estimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind) -> list[Panel]:
-    return [_trace(found, kind, rule), _histogram(found, statistic, of_values)]
+def _panels(estimated: Estimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind) -> list[Panel]:
+    return [_trace(estimated, kind, rule), _histogram(estimated, statistic, of_values)]
 
 
-def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
+def _trace(estimated: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
     """Return estimate and interval at each look, and the target width."""
-    draws = np.array([look.draws for look in found.looks])
-    values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in found.looks]).T
+    draws = np.array([look.draws for look in estimated.looks])
+    values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in estimated.looks]).T
     known, last = np.isfinite(values).all(axis=0), float(values[0, -1])
     reach = 0.5 * rule.width * (abs(last) if rule.is_relative else 1.0)
-    label = f"{found.statistic[:1].upper()}{found.statistic[1:]}"
+    label = f"{estimated.statistic[:1].upper()}{estimated.statistic[1:]}"
     marks = (
         Mark("upright", draws[known], values[1:, known], style={"linewidth": 3, "alpha": 0.45}),
         Mark("line", draws, values[0], style={"marker": "o", "markersize": 5, "linewidth": 1.0}),
@@ -502,10 +505,10 @@ def _trace(found: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
     return Panel(Kind("Draws"), kind, marks, label, then=lambda axes: axes.set_xscale("log", base=2))
 
 
-def _histogram(found: Estimate, statistic: Statistic, kind: Kind) -> Panel:
+def _histogram(estimated: Estimate, statistic: Statistic, kind: Kind) -> Panel:
     """Return the values of all draws, and the estimate or the value that a probability is about."""
-    bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(found.values.size))))
-    counts, edges = np.histogram(found.values, bins)
-    at = found.interval.value if statistic.threshold is None else statistic.threshold
+    bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(estimated.values.size))))
+    counts, edges = np.histogram(estimated.values, bins)
+    at = estimated.interval.value if statistic.threshold is None else statistic.threshold
     marks = (Mark("bars", edges, counts), Mark("at", at, colour=VERMILION, style={"linewidth": 1.4}))
-    return Panel(kind, Kind("Draws"), marks, f"{found.values.size:,} values")
+    return Panel(kind, Kind("Draws"), marks, f"{estimated.values.size:,} values")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ppafo.analyses.tune.problem import Gains, Problem, Term
+from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -54,8 +55,8 @@ def agreement(starts: Sequence[Start]) -> float:
     best = starts[0]
     # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
     beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
-    as_good = [item for item in starts if item.cost <= best.cost + 0.01 * abs(beyond)]
-    return max(float(np.max(np.abs(np.subtract(item.fractions, best.fractions)))) for item in as_good)
+    as_good = [start for start in starts if start.cost <= best.cost + 0.01 * abs(beyond)]
+    return max(float(np.max(np.abs(np.subtract(start.fractions, best.fractions)))) for start in as_good)
 
 
 FRESH_DRAWS = 1024
@@ -151,7 +152,7 @@ def finding_of(
     problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
 ) -> Finding[Tuned]:
     """Return what a search came to; it has passed where the gains satisfy all constraints, over fresh draws too."""
-    found = [(item.path, item.bound_reached(after.gains[item.path])) for item in problem.searched]
+    found = [(gain.path, gain.bound_reached(after.gains[gain.path])) for gain in problem.searched]
     reached = {path: bound for path, bound in found if bound is not None}
     overrides = over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)
     said, file = verdict(problem, before, after), problem.scenario.origin.file or problem.scenario.name
@@ -159,10 +160,10 @@ def finding_of(
     verb = "simulate" if not problem.scenario.walks else "walk"
     remarks = _remarks(problem, after, starts, runs, reached)
     gains = []
-    for item in problem.searched:
-        numbers = (item.before, after.gains[item.path], item.minimum, item.maximum)
-        end = f"at its {reached[item.path]}" if item.path in reached else ""
-        gains.append((item.path, *map(item.place.quote, numbers), end))
+    for gain in problem.searched:
+        numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
+        end = f"at its {reached[gain.path]}" if gain.path in reached else ""
+        gains.append((gain.path, *map(gain.place.quote, numbers), end))
     listed = ", ".join(f'"{line}"' for line in overrides)
     pasted = (
         f"# {said}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
@@ -263,7 +264,9 @@ def _by_ceiling(problem: Problem, after: Setting) -> str:
 def _metrics(problem: Problem, before: Setting, after: Setting) -> list[Column]:
     """Return a row for each metric of the goals and constraints."""
     names, spread = problem.metrics, problem.spread
-    limits = [", ".join(item.words for item in problem.constraints if item.metric == name) for name in names]
+    limits = [
+        ", ".join(constraint.words for constraint in problem.constraints if constraint.metric == name) for name in names
+    ]
 
     def column(title: str, values: Mapping[str, float]) -> Column:
         return Column(title, [_number(name, values.get(name)) for name in names])
@@ -273,7 +276,7 @@ def _metrics(problem: Problem, before: Setting, after: Setting) -> list[Column]:
     metric, constraint = Column("metric", titles), Column("constraint", limits)
     if spread is None:
         return [metric, column("before", before.values), column("after", after.values), constraint]
-    nominal = [{name: item.value for name, item in side.metrics.items()} for side in (before, after)]
+    nominal = [{name: metric.value for name, metric in side.metrics.items()} for side in (before, after)]
     return [
         metric,
         column(f"before ({spread.measure})", before.values),
@@ -292,7 +295,7 @@ def _remarks(
     """Return how the search went and what it leaves open."""
     settled = sum(start.is_settled for start in starts)
     said = [
-        f"{len(starts)} start{'' if len(starts) == 1 else 's'}, {sum(start.candidates for start in starts):,} "
+        f"{count_of(len(starts), 'start')}, {sum(start.candidates for start in starts):,} "
         f"candidates, {runs:,} runs; {settled} of {len(starts)} converged before the maximum number of "
         "generations"
     ]
@@ -317,9 +320,9 @@ def _remarks(
     if fractions:
         said.append(f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}")
     broken = [
-        f"{item.metric} {item.words}, it is {_number(item.metric, after.fresh[item.metric])}"
-        for item in problem.constraints
-        if item.metric in after.fresh and not item.is_kept(after.fresh[item.metric])
+        f"{constraint.metric} {constraint.words}, it is {_number(constraint.metric, after.fresh[constraint.metric])}"
+        for constraint in problem.constraints
+        if constraint.metric in after.fresh and not constraint.is_kept(after.fresh[constraint.metric])
     ]
     if after.fresh and after.fresh_share_without_value:
         broken.append(f"{percentage(after.fresh_share_without_value, 2)} of the runs fail, oscillate or lack a metric")
@@ -384,12 +387,12 @@ def _places(problem: Problem, after: Setting, starts: Sequence[Start]) -> Panel:
     searched = problem.searched
     rows = np.arange(len(searched))[::-1]
     ends = [
-        item.fraction(float(item.value(np.array(start.fractions[place]))))
+        gain.fraction(float(gain.value(np.array(start.fractions[row]))))
         for start in starts
-        for place, item in enumerate(searched)
+        for row, gain in enumerate(searched)
     ]
-    first = [float(np.clip(item.fraction(item.before), -0.05, 1.05)) for item in searched]
-    last = [item.fraction(after.gains[item.path]) for item in searched]
+    first = [float(np.clip(gain.fraction(gain.before), -0.05, 1.05)) for gain in searched]
+    last = [gain.fraction(after.gains[gain.path]) for gain in searched]
     dots: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 7}
     ticks: dict[str, Any] = {"linestyle": "", "marker": "|", "markersize": 11}
     marks = (
@@ -400,7 +403,7 @@ def _places(problem: Problem, after: Setting, starts: Sequence[Start]) -> Panel:
     )
 
     def name_gains(axes: "Axes") -> None:
-        axes.set_yticks(rows, [label_of(item.path) for item in searched])
+        axes.set_yticks(rows, [label_of(gain.path) for gain in searched])
         axes.set_ylim(-0.6, len(searched) - 0.4)
         axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
 

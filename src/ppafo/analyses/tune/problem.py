@@ -175,7 +175,8 @@ class Spread:
             return f"{100.0 * self.fraction:g} % quantile"
         if self.deviations == 0.0:
             return "mean"
-        return f"mean and {self.deviations:g} standard deviation{'' if self.deviations == 1.0 else 's'}"
+        noun = "standard deviation" if self.deviations == 1.0 else "standard deviations"
+        return f"mean and {self.deviations:g} {noun}"
 
     def bad_end(self, values: Floats, is_high: bool) -> Floats:
         """Return the high, or low, end of values (candidates, draws) [SI], shape (candidates,)."""
@@ -205,37 +206,37 @@ class Problem:
 
     def __repr__(self) -> str:
         """Return name, scenario and what is searched."""
-        return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(item.path for item in self.searched)}"
+        return f"Tuning '{self.name}' of '{self.scenario.name}': {', '.join(gain.path for gain in self.searched)}"
 
     @property
     def metrics(self) -> tuple[str, ...]:
         """Every metric that the goals and constraints need, each once."""
-        wanted = [*(item.metric for item in self.goals), *(item.metric for item in self.constraints)]
+        wanted = [*(goal.metric for goal in self.goals), *(goal.metric for goal in self.constraints)]
         return tuple(dict.fromkeys(wanted))
 
     @property
     def before(self) -> Gains:
         """The values before tuning [SI]."""
-        return {item.path: item.before for item in self.searched}
+        return {gain.path: gain.before for gain in self.searched}
 
     @property
     def gauge(self) -> frozenset[str]:
         """The paths, searched and drawn, whose values count from the atmosphere of their run."""
         drawn = frozenset[str]() if self.spread is None else self.spread.uncertainty.gauge
-        return drawn | {item.path for item in self.searched if item.place.is_gauge}
+        return drawn | {gain.path for gain in self.searched if gain.place.is_gauge}
 
     def gains(self, fractions: Sequence[float]) -> Gains:
         """Return the values [SI] at fractions of the way, rounded as written: what is pasted is what was run."""
         # Through the text that is pasted: a run of that line gives these bits again.
         values = {
-            item.path: float(item.value(np.asarray(fraction)))
-            for item, fraction in zip(self.searched, fractions, strict=True)
+            gain.path: float(gain.value(np.asarray(fraction)))
+            for gain, fraction in zip(self.searched, fractions, strict=True)
         }
-        return {item.path: item.place.level(item.place.quote(values[item.path])) for item in self.searched}
+        return {gain.path: gain.place.level(gain.place.quote(values[gain.path])) for gain in self.searched}
 
     def lines(self, gains: Gains) -> list[str]:
         """Return gains as overrides, ``PATH=VALUE``."""
-        return [f"{item.path}={item.place.quote(gains[item.path])}" for item in self.searched]
+        return [f"{gain.path}={gain.place.quote(gains[gain.path])}" for gain in self.searched]
 
 
 TUNING = TomlKind("tuning", "tuning", resources.files("ppafo") / "analyses" / "tune" / "library", StudyError)
@@ -272,9 +273,9 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
     with refused_as(StudyError, source.file, ScenarioError, ParameterError, StudyError):
         scenario = load_scenario(placed(parsed.scenario, source.folder), parsed.overrides)
         scenario = reloaded(scenario, overrides) if overrides else scenario
-        metrics = [*(item.metric for item in parsed.objective), *(item.metric for item in parsed.constraints)]
+        metrics = [*(goal.metric for goal in parsed.objective), *(goal.metric for goal in parsed.constraints)]
         check_metrics(list(dict.fromkeys(metrics)), scenario)
-        paths = [item.path for item in parsed.search]
+        paths = [gain.path for gain in parsed.search]
         spread = _spread(parsed, source.folder, paths, scenario)
         drawn = () if spread is None else (*spread.uncertainty.paths, *spread.uncertainty.same)
         repeated = first_twice(paths)
@@ -287,56 +288,55 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
             description=" ".join(parsed.description.split()),
             scenario=scenario,
             overrides=scenario.origin.overrides,
-            searched=tuple(_searched(item, scenario, varies) for item in parsed.search),
-            goals=tuple(_goal(item) for item in parsed.objective),
-            constraints=tuple(_constraint(item, atmosphere) for item in parsed.constraints),
+            searched=tuple(_searched(gain, scenario, varies) for gain in parsed.search),
+            goals=tuple(_goal(goal) for goal in parsed.objective),
+            constraints=tuple(_constraint(constraint, atmosphere) for constraint in parsed.constraints),
             spread=spread,
             effort=parsed.effort,
         )
 
 
-def _searched(item: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:
-    with refused_as(StudyError, f"search '{item.path}'", UnitError, ScenarioError):
-        place = varied_path(item.path, scenario)
-        place = in_its_unit(place, (item.minimum, item.maximum)) if atmosphere_varies else place
-        minimum, maximum = place.level(item.minimum), place.level(item.maximum)
-        before = value_at(item.path, scenario)
+def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:
+    with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError):
+        varied = varied_path(gain.path, scenario)
+        varied = in_its_unit(varied, (gain.minimum, gain.maximum)) if atmosphere_varies else varied
+        minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
+        before = value_at(gain.path, scenario)
         if before is None:
-            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{item.path}'; set one with an override")
-    if item.path == NOISE:
-        raise StudyError(f"search '{item.path}': all candidates get the same noise, so it cannot be searched")
+            raise ScenarioError(f"scenario '{scenario.name}' has no value for '{gain.path}'; set one with an override")
+    if gain.path == NOISE:
+        raise StudyError(f"search '{gain.path}': all candidates get the same noise, so it cannot be searched")
     if minimum >= maximum:
         raise StudyError(
-            f"search '{item.path}': minimum = {item.minimum!r} must be less than maximum = {item.maximum!r}"
+            f"search '{gain.path}': minimum = {gain.minimum!r} must be less than maximum = {gain.maximum!r}"
         )
-    is_logarithmic = item.spacing == "logarithmic"
+    is_logarithmic = gain.spacing == "logarithmic"
     if is_logarithmic and minimum <= 0.0:
-        raise StudyError(f"search '{item.path}': spacing = 'logarithmic' needs a minimum above 0, not {item.minimum!r}")
+        raise StudyError(f"search '{gain.path}': spacing = 'logarithmic' needs a minimum above 0, not {gain.minimum!r}")
     # Where the atmosphere varies, gauge bounds count from each run's own; so does the value before.
-    before -= place.atmosphere if place.is_gauge else 0.0
-    return Searched(item.path, minimum, maximum, is_logarithmic, before, place)
+    before -= varied.atmosphere if varied.is_gauge else 0.0
+    return Searched(gain.path, minimum, maximum, is_logarithmic, before, varied)
 
 
-def _goal(item: Goal) -> Term:
-    if item.weight == 0.0:
-        raise StudyError(f"objective '{item.metric}': weight = 0 has no effect; omit it")
-    if item.scale is None:
-        return Term(item.metric, item.weight, None)
-    place = f"objective '{item.metric}': scale = '{item.scale}'"
-    scale = difference_of(item.scale, item.metric, place)
+def _goal(goal: Goal) -> Term:
+    if goal.weight == 0.0:
+        raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit it")
+    if goal.scale is None:
+        return Term(goal.metric, goal.weight, None)
+    where = f"objective '{goal.metric}': scale = '{goal.scale}'"
+    scale = difference_of(goal.scale, goal.metric, where)
     if scale <= 0.0:
-        raise StudyError(f"{place} must be more than 0")
-    return Term(item.metric, item.weight, scale)
+        raise StudyError(f"{where} must be more than 0")
+    return Term(goal.metric, goal.weight, scale)
 
 
-def _constraint(item: Constraint, atmosphere: float | None) -> Limit:
-    given = [text for text in (item.at_most, item.at_least) if text is not None]
-    if len(given) != 1:
-        raise StudyError(
-            f"constraint '{item.metric}': needs either at_most or at_least, it has {'both' if given else 'none'}"
-        )
-    limit = level_of(given[0], item.metric, f"constraint '{item.metric}' = '{given[0]}'", atmosphere)
-    return Limit(item.metric, limit, item.at_most is not None, given[0])
+def _constraint(constraint: Constraint, atmosphere: float | None) -> Limit:
+    bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
+    if len(bounds) != 1:
+        has = "both" if bounds else "none"
+        raise StudyError(f"constraint '{constraint.metric}': needs either at_most or at_least, it has {has}")
+    limit = level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
+    return Limit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 
 
 def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:

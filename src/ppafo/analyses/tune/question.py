@@ -70,10 +70,10 @@ def tune(
     scales = scales_of(problem, rows_of_gains(runs, problem, problem.before, draws))
 
     def costs(fractions: Floats) -> Floats:
-        values = {item.path: item.value(fractions[:, column]) for column, item in enumerate(problem.searched)}
+        values = {gain.path: gain.value(fractions[:, column]) for column, gain in enumerate(problem.searched)}
         return judge(crossed(runs, problem, values, draws), problem, scales).cost
 
-    before = [item.fraction(item.before) for item in problem.searched]
+    before = [gain.fraction(gain.before) for gain in problem.searched]
     starts = search(costs, before, effort)
     first, last = (
         setting_of(runs, problem, scales, gains, draws)

@@ -97,11 +97,11 @@ def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judge
     objective, violation, spread = np.zeros(failing.size), np.zeros(failing.size), problem.spread
     for goal in problem.goals:
         objective += goal.weight * bad_ends(known[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
-    for item in problem.constraints:
-        reached = bad_ends(known[item.metric], spread, item.is_most)
-        beyond = reached - item.limit if item.is_most else item.limit - reached
+    for constraint in problem.constraints:
+        reached = bad_ends(known[constraint.metric], spread, constraint.is_most)
+        beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
-        violation += np.maximum(0.0, beyond) / (abs(item.limit) or 1.0)
+        violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
     return Judgement(objective, violation, failing)
 
 
@@ -119,8 +119,8 @@ def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]
     the bounds. Differential evolution (Storn and Price, 1997) as in SciPy only ever compares costs.
     """
     seeds = np.random.SeedSequence(effort.seed).spawn(effort.starts)
-    found = [_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
-    return sorted(found, key=lambda start: start.cost)
+    finished = [_start(costs, before, effort, np.random.default_rng(seed)) for seed in seeds]
+    return sorted(finished, key=lambda start: start.cost)
 
 
 def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.random.Generator) -> Start:
@@ -133,10 +133,10 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
         nonlocal tried
         # SciPy has a candidate in each column, the costs one in each row.
         fractions = np.clip(np.atleast_2d(columns.T), 0.0, 1.0)
-        found = costs(fractions)
+        outcomes = costs(fractions)
         tried += len(fractions)
-        course.append(min([float(np.min(found)), *course[-1:]]))
-        return found
+        course.append(min([float(np.min(outcomes)), *course[-1:]]))
+        return outcomes
 
     is_settled = False
 
@@ -182,7 +182,7 @@ _NOISE_CONFIDENCE = 0.95
 
 def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:
     """Run one setting of the gains over the draws."""
-    return crossed(runs, problem, {item.path: np.array([gains[item.path]]) for item in problem.searched}, draws)
+    return crossed(runs, problem, {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}, draws)
 
 
 def crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
@@ -203,15 +203,15 @@ def scales_of(problem: Problem, before: Crossed) -> dict[str, float]:
     # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
     for goal in problem.goals:
-        found = goal.scale
-        if found is None:
-            found = abs(float(bad_ends(before.metrics[goal.metric], problem.spread, goal.weight > 0.0)[0]))
-        if not np.isfinite(found) or found == 0.0:
+        scale = goal.scale
+        if scale is None:
+            scale = abs(float(bad_ends(before.metrics[goal.metric], problem.spread, goal.weight > 0.0)[0]))
+        if not np.isfinite(scale) or scale == 0.0:
             raise StudyError(
-                f"tuning '{problem.name}': objective '{goal.metric}' is {found:g} before tuning, which cannot be "
+                f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be "
                 "the scale; give one, scale = 'VALUE UNIT'"
             )
-        scales[goal.metric] = found
+        scales[goal.metric] = scale
     return scales
 
 
@@ -252,25 +252,25 @@ def setting_of(
 def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Crossed) -> Ceiling:
     """Return in how many draws the supply cannot hold the reference, and which violated constraints that explains."""
     base = scenario_with(problem, gains)
-    given = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
-    scenario = with_numbers(base, given)
+    columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
+    scenario = with_numbers(base, columns)
     if scenario.controller.kind == OPEN_LOOP or scenario.walks:
         return Ceiling(0.0, ())
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
     spread, explained = problem.spread, []
-    for item in problem.constraints:
-        values, is_most = runs.metrics[item.metric], item.is_most
-        follows = bool(METRICS[item.metric].of_reference)
-        if not follows or item.is_kept(float(bad_ends(values, spread, is_most)[0])):
+    for constraint in problem.constraints:
+        values, is_most = runs.metrics[constraint.metric], constraint.is_most
+        follows = bool(METRICS[constraint.metric].of_reference)
+        if not follows or constraint.is_kept(float(bad_ends(values, spread, is_most)[0])):
             continue
         # An error is never below what the supply lacks: where that alone is too much, no gains can keep the limit.
         is_mean = spread is None or spread.fraction is None
         least = np.mean(lacking, axis=1) if is_mean else bad_ends(lacking, spread, True)
-        is_out_of_reach = item.metric in MINIMUM_ERRORS and is_most and not item.is_kept(float(least[0]))
+        is_out_of_reach = constraint.metric in MINIMUM_ERRORS and is_most and not constraint.is_kept(float(least[0]))
         # Else the draws that lack nothing must keep it alone; a standard deviation needs two of them.
         rest = values[:, lacking[0] == 0.0]
-        if is_out_of_reach or rest.shape[1] < 2 or item.is_kept(float(bad_ends(rest, spread, is_most)[0])):
-            explained.append(item.metric)
+        if is_out_of_reach or rest.shape[1] < 2 or constraint.is_kept(float(bad_ends(rest, spread, is_most)[0])):
+            explained.append(constraint.metric)
     return Ceiling(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 
 
@@ -285,5 +285,7 @@ def scenario_with(problem: Problem, gains: Gains) -> Scenario:
 def _values(runs: Crossed, problem: Problem) -> dict[str, float]:
     """Return every metric of the problem as the first candidate is judged by it; nan where a run has none."""
     less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
-    less |= {item.metric: item.is_most for item in problem.constraints if item.metric not in less}
+    less |= {
+        constraint.metric: constraint.is_most for constraint in problem.constraints if constraint.metric not in less
+    }
     return {name: float(bad_ends(runs.metrics[name], problem.spread, less[name])[0]) for name in problem.metrics}

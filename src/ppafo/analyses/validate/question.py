@@ -85,7 +85,7 @@ def validate(
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:
         raise DataError(f"longest delay of {longest_delay:g} s: must be from 0 to {LARGEST_DELAY:g} s")
-    chosen = next((one for one in MOTIONS if one == motion), None)
+    chosen = next((known for known in MOTIONS if known == motion), None)
     if chosen is None:
         near = nearest_name(motion, MOTIONS)
         raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
@@ -104,7 +104,7 @@ def validate(
     for path in recordings:
         measured = read_measured(path, device, column_map, map_name)
         # Given twice, under two names too, a recording would count twice as evidence.
-        same = next((one.file for one in read if one.sha256 == measured.sha256), None)
+        same = next((recording_read.file for recording_read in read if recording_read.sha256 == measured.sha256), None)
         if same is not None:
             raise DataError(f"{measured.file}: the same recording as {same}; give each once")
         read.append(measured)

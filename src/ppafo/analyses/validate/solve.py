@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ppafo.errors import count_of
 from ppafo.parameters.device import Device
 from ppafo.report.display_units import display_value, gauge_shift, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
@@ -63,8 +64,8 @@ class Validation:
         cause explains is one only where it is more than ``LITTLE``, for no model has all that a device has. Of a
         recorded angle that is followed causes are not searched.
         """
-        causes, channels = self.causes, [channel for item in self.recordings for channel in item.channels]
-        is_little = causes.tried == 0 or all(one.fraction <= LITTLE for one in channels)
+        causes, channels = self.causes, [channel for recording in self.recordings for channel in recording.channels]
+        is_little = causes.tried == 0 or all(channel.fraction <= LITTLE for channel in channels)
         is_usual = causes.is_noise or (is_little if causes.found is None else causes.found.is_usual)
         return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
 
@@ -117,8 +118,8 @@ def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[P
 def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> list[Panel]:
     """Return samples and model over time, and below them their residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
-    given = measured_values(measured, name)
-    assert given is not None, "a channel that is compared was measured"
+    measurement = measured_values(measured, name)
+    assert measurement is not None, "a channel that is compared was measured"
     is_short, is_chamber = measured.duration < _SHORT, name in (PRESSURE_1, PRESSURE_2)
     time, scale = (Kind("Time", "ms"), _MILLISECONDS) if is_short else (TIME, 1.0)
     shown, limit = COMPARED[name], channel.limit * channel.full_range
@@ -128,7 +129,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
         change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
         times=scale * measured.time,
-        samples=given,
+        samples=measurement,
         # The measurement is late by the delay, so the model is read that much earlier.
         model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
         names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
@@ -136,7 +137,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
         above=gauge_shift(atmosphere) if is_chamber else 0.0,
     )
     # Where the residual is far from the limit of its RMS value, that would only press it flat.
-    is_near = float(np.abs(course.model - given).max()) >= _NEAR_LIMIT * limit
+    is_near = float(np.abs(course.model - measurement).max()) >= _NEAR_LIMIT * limit
     return course_panels(course, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
 
 
@@ -161,7 +162,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         )
     if validation.overrides:
         said.append(f"values changed: {', '.join(validation.overrides)}")
-    hashes = [(item.file, f"sha256 {item.sha256}") for item in validation.recordings if item.sha256]
+    hashes = [(recording.file, f"sha256 {recording.sha256}") for recording in validation.recordings if recording.sha256]
     method = (
         f"The model with the valve '{validation.device.valve_name}' was run with the inputs of each recording, from "
         "the state of its first samples. A residual is measured - model. Percentages are of the full range: the "
@@ -171,7 +172,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
     return Finding(
         name="validate",
         kicker="Validation of a parameter set",
-        title=f"{validation.device.name} against {count} recording{'' if count == 1 else 's'}",
+        title=f"{validation.device.name} against {count_of(count, 'recording')}",
         said=said,
         parts=(
             Part(said=[method], is_detail=True),
@@ -200,7 +201,7 @@ def verdict(validation: Validation) -> str:
     """Return in one sentence whether the set agrees and, if not, by what it is off and what would explain it."""
     count, name = len(validation.recordings), validation.device.name
     pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
-    worst = max((channel for channel, _ in pairs), key=lambda one: one.in_noise)
+    worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
     share = f"{100 * worst.fraction:.2g} % of full range"
     size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"
     failed = ", ".join(
@@ -224,9 +225,10 @@ def _why(causes: Causes, without: float) -> str:
     wrong samples, which are seen whatever else is wrong.
     """
     if causes.found is not None:
-        others = f" (or, the same for these recordings: {', '.join(one.name for one in causes.found.same)})"
-        usual = ", as on any bench" if causes.found.is_usual else ""
-        return f"{in_words(causes.found)}{usual}{others if causes.found.same else ''}"
+        verdict = in_words(causes.found)
+        verdict += ", as on any bench" if causes.found.is_usual else ""
+        same = ", ".join(cause.name for cause in causes.found.same)
+        return f"{verdict} (or, the same for these recordings: {same})" if same else verdict
     if not causes.tried:
         return ""
     nearest = causes.nearest
@@ -242,29 +244,29 @@ def _times(size: float) -> str:
     return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
 
 
-def in_words(one: Cause) -> str:
+def in_words(cause: Cause) -> str:
     """Return a cause in words, numbers of the set in the unit in which people see them."""
-    if len(one.numbers) != 1:
-        return one.in_words
-    ((value, unit),) = one.numbers.values()
+    if len(cause.numbers) != 1:
+        return cause.in_words
+    ((value, unit),) = cause.numbers.values()
     # An atmosphere in gauge pressure says nothing.
     absolute = unit == "Pa_a"
     quantity = "pressure change" if absolute else quantity_of_unit(unit)
     shown = Kind("", "" if unit == "-" else unit, quantity).text(value)
-    return f"{one.in_words} ({shown})"
+    return f"{cause.in_words} ({shown})"
 
 
-def _cause_data(one: Cause | None) -> dict[str, Any] | None:
-    if one is None:
+def _cause_data(cause: Cause | None) -> dict[str, Any] | None:
+    if cause is None:
         return None
     return {
-        "name": one.name,
-        "words": in_words(one),
-        "same": [other.name for other in one.same],
-        "gain": one.gain,
-        "left": one.left,
-        "numbers": {path: value for path, (value, _) in one.numbers.items()},
-        "is_usual": one.is_usual,
+        "name": cause.name,
+        "words": in_words(cause),
+        "same": [other.name for other in cause.same],
+        "gain": cause.gain,
+        "left": cause.left,
+        "numbers": {path: value for path, (value, _) in cause.numbers.items()},
+        "is_usual": cause.is_usual,
     }
 
 

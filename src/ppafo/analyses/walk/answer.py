@@ -146,8 +146,8 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
 
 def wearers_csv(population: Population) -> bytes:
     """Return one line for each wearer, in SI units."""
-    columns = {f"{name} [{item.unit}]": population.traits[name] for name, item in TRAITS.items()}
-    columns |= {f"{name} [{item.unit}]": population.outcomes[name] for name, item in OUTCOMES.items()}
+    columns = {f"{name} [{trait.unit}]": population.traits[name] for name, trait in TRAITS.items()}
+    columns |= {f"{name} [{outcome.unit}]": population.outcomes[name] for name, outcome in OUTCOMES.items()}
     return csv_of(columns)
 
 
@@ -155,14 +155,14 @@ def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dic
     """Return the quantiles of every number in SI units, with unit and meaning."""
     return {
         name: {
-            "unit": item.unit,
-            "summary": item.summary,
+            "unit": number.unit,
+            "summary": number.summary,
             "mean": float(table[name].mean()) if table[name].size else None,
             "quantiles": dict(zip(map(str, QUANTILES), np.quantile(table[name], QUANTILES).tolist(), strict=True))
             if table[name].size
             else {},
         }
-        for name, item in numbers.items()
+        for name, number in numbers.items()
     }
 
 
@@ -250,11 +250,13 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
         bottle = f"how long a bottle lasts: {on_it}; here its supply pressure stays as it is set"
     remarks = [*person_remarks(configuration), bottle, *safety_remarks(worn), trust_remark(configuration)]
-    remarks += [f"{item.scenario.name}: {item.status.message}" for item in (worn, bare) if not item.status.is_completed]
-    assumed = [(item.path, item.note) for item in configuration.assumptions]
+    remarks += [
+        f"{result.scenario.name}: {result.status.message}" for result in (worn, bare) if not result.status.is_completed
+    ]
+    assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
     set_up = (
         configuration.description,
-        f"device '{configuration.device.name}', gait '{gait.name}'{f' ({gait.title})' if gait.title else ''}",
+        f"device '{configuration.device.name}', gait '{gait.name}'" + (f" ({gait.title})" if gait.title else ""),
         law_of(configuration).summary,
         f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
         if configuration.origin.overrides
@@ -318,7 +320,9 @@ def comparison_table(comparison: Comparison) -> list[Column]:
     for head, metrics in (*walked, ("healthy", comparison.healthy)):
         values: dict[str, float | str | None] = {"body_mass": walk_of(worn.scenario).wearer.body_mass}
         values |= per_stride_values(metrics)
-        values |= {name: toes(one.value) if name == "lowest_toes" else one.value for name, one in metrics.items()}
+        values |= {
+            name: toes(metric.value) if name == "lowest_toes" else metric.value for name, metric in metrics.items()
+        }
         columns.append((head, values))
     columns[0][1][LARGEST_TORQUE] = worn.scenario.controller.settings.get(LARGEST_TORQUE)
     # The positive work of a healthy ankle is what the device's is a share of.
@@ -338,7 +342,7 @@ def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
 def first_lines(worn: WalkResult) -> list[str]:
     """Return that the torque loop oscillates, where it does, and the gains in force with where they come from."""
     in_force = gains_of(worn.scenario, law_of(worn.scenario))
-    return [item.sentence for item in (worn.oscillation, in_force) if item is not None]
+    return [side.sentence for side in (worn.oscillation, in_force) if side is not None]
 
 
 def strides_csv(result: WalkResult) -> bytes:
@@ -346,7 +350,7 @@ def strides_csv(result: WalkResult) -> bytes:
     # The last strike begins a stride that the end of the walk cuts off: it has no numbers.
     count = result.strides["gas"].size
     columns = {"stride [-]": np.arange(1.0, count + 1.0), "start [s]": result.recording.time[result.starts[:count]]}
-    columns |= {f"{name} [{item.unit}]": result.strides[name] for name, item in PER_STRIDE.items()}
+    columns |= {f"{name} [{quantity.unit}]": result.strides[name] for name, quantity in PER_STRIDE.items()}
     columns["helped [-]"] = result.helped.astype(np.float64)
     return csv_of(columns)
 
@@ -383,7 +387,8 @@ def default_folder(values: Mapping[str, Any]) -> Path:
     configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
     walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
     along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
-    return Path("out") / f"{'walk' if values['wearers'] is None else 'wearers'}-{configuration.name}{along}"
+    kind = "walk" if values["wearers"] is None else "wearers"
+    return Path("out") / f"{kind}-{configuration.name}{along}"
 
 
 def reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:

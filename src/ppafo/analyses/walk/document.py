@@ -63,7 +63,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
         "supply_line": plain(scenario.supply_line),
         "gas_model": plain(scenario.gas_model),
         "bottle": None if motion.bottle is None else motion.bottle.to_dict(),
-        "assumed": {item.path: item.note for item in scenario.assumptions},
+        "assumed": {assumption.path: assumption.note for assumption in scenario.assumptions},
         "file": origin.file,
         "overrides": list(origin.overrides),
         "content": origin.content,
@@ -80,11 +80,11 @@ def number_texts(row: Row, values: Iterable[float | str | None]) -> tuple[str | 
     """Return the title with its unit, and values [SI] as text; a text and None stay what they are."""
     _, title, quantity, digits = row
     texts: list[str | None] = []
-    for one in values:
-        if one is None or isinstance(one, str):
-            texts.append(one)
+    for number in values:
+        if number is None or isinstance(number, str):
+            texts.append(number)
             continue
-        text = f"{display_value(one, quantity):.{digits}f}"
+        text = f"{display_value(number, quantity):.{digits}f}"
         # Without the sign of what is rounded to zero.
         texts.append(text.removeprefix("-") if float(text) == 0.0 else text)
     unit = display_unit(quantity)

@@ -64,5 +64,5 @@ def walk_with_and_without(
         advance = reporter(report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
     comparison = compare_walks(chosen, minutes=minutes, progress=reporter(report, "min", LONG))
-    found = finding_of(comparison)
-    return replace(found, passed=found.passed and comparison.with_device.oscillation is None) if check else found
+    finding = finding_of(comparison)
+    return replace(finding, passed=finding.passed and comparison.with_device.oscillation is None) if check else finding

@@ -59,7 +59,8 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     helped, strides = int(worn.helped.sum()), worn.helped.size
     remarks += event_lines(worn.events)
     if strides:
-        remarks.append(f"help in {helped} of {strides} strides{'' if worn.is_helped else ': fewer than half'}")
+        enough = "" if worn.is_helped else ": fewer than half"
+        remarks.append(f"help in {helped} of {strides} strides{enough}")
     return remarks
 
 

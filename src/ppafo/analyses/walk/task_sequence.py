@@ -144,7 +144,7 @@ def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
         return ()
     without = {segment.start: segment.lowest_toes for segment in bare.segments}
     rows = [asdict(segment) | {"without": without.get(segment.start)} for segment in worn.segments]
-    numbers: dict[str, float] = {name: item.value for name, item in worn.metrics.items()}
+    numbers: dict[str, float] = {name: metric.value for name, metric in worn.metrics.items()}
     bare_toes = bare.metrics.get("task_sequence_lowest_toes")
     is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
     rows.append(
@@ -197,14 +197,14 @@ def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
 
 def task_sequence_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
     """Return the files of a task sequence, its segments with and without the device, and of a bottle over the walk."""
-    found: dict[str, Callable[[], bytes]] = {}
+    files: dict[str, Callable[[], bytes]] = {}
     if walk_of(comparison.with_device.scenario).task_sequence is not None:
-        found["segments.csv"] = lambda: segments_csv(comparison.with_device.segments)
-        found["segments-off.csv"] = lambda: segments_csv(comparison.without_device.segments)
+        files["segments.csv"] = lambda: segments_csv(comparison.with_device.segments)
+        files["segments-off.csv"] = lambda: segments_csv(comparison.without_device.segments)
     supply = comparison.with_device.supply
     if supply is not None:
-        found["bottle.csv"] = lambda: marked_csv_bytes(supply.recording)
-    return found
+        files["bottle.csv"] = lambda: marked_csv_bytes(supply.recording)
+    return files
 
 
 def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
@@ -212,7 +212,9 @@ def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     units = {name: QUANTITIES[quantity][0] if quantity else "-" for name, _, quantity, _ in _NUMBERS}
     names = [field.name for field in fields(SegmentResult) if field.name != "title"]
     heads = [f"{name} [{units[name]}]" if name in units else name for name in names]
-    return csv_of({head: [getattr(one, name) for one in segments] for head, name in zip(heads, names, strict=True)})
+    return csv_of(
+        {head: [getattr(segment, name) for segment in segments] for head, name in zip(heads, names, strict=True)}
+    )
 
 
 def task_sequence_data(comparison: Comparison) -> dict[str, Any]:
@@ -237,10 +239,14 @@ def trust_remark(configuration: Scenario) -> str:
         low, high = speed_range(gait)
     except DataError:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
-    given = [item.values["speed"] for item in sequence.segments if "speed" in item.values]
+    given = [segment.values["speed"] for segment in sequence.segments if "speed" in segment.values]
     recorded = gait.walking_speed or 0.0
     # A cadence counts steps of both feet; the speed goes with its square, as the walk ratio is constant.
-    ratios = [0.5 * item.values["cadence"] * gait.stride_time for item in sequence.segments if "cadence" in item.values]
+    ratios = [
+        0.5 * segment.values["cadence"] * gait.stride_time
+        for segment in sequence.segments
+        if "cadence" in segment.values
+    ]
     speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
     # A speed at the edge, written in another unit, is not beyond it.
     far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})

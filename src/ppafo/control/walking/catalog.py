@@ -101,7 +101,7 @@ def row_with(name: str, row: Any, **classes: type) -> Any:
 
 def shared_settings(law: ControllerKind) -> set[str]:
     """Return the settings of a torque law whose names every controller of walking has, too."""
-    return {item.name for item in law.quantities} & {item.name for item in ASSISTING_QUANTITIES}
+    return {quantity.name for quantity in law.quantities} & {quantity.name for quantity in ASSISTING_QUANTITIES}
 
 
 @functools.cache

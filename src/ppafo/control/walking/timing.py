@@ -45,8 +45,8 @@ class TimingKind:
     quantities: tuple[Quantity, ...]
     parameters: type
     initial: Any
-    follow: Callable[..., Any]
-    gait_time: Callable[..., GaitTime]
+    follow: Callable[[Any, PhaseRules, Any, PhaseState, PhaseState, GaitMeasurement, float], Any]
+    gait_time: Callable[[Any, Any, PhaseState], GaitTime]
 
 
 class ThresholdRules(NamedTuple):

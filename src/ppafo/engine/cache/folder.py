@@ -46,32 +46,32 @@ def refusal(folder: Path | None) -> str:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with contextlib.suppress(FileExistsError):
             folder.mkdir(mode=0o700)
-        found = folder.lstat()
+        status = folder.lstat()
         # Whoever can write in any folder above can rename this one and put his own in its place.
-        above = [place.stat() for place in Path(os.path.realpath(folder)).parents]
+        above = [parent.stat() for parent in Path(os.path.realpath(folder)).parents]
     except (OSError, ValueError) as error:
         return f"{folder} cannot be made: {reason(error)}"
     has_users = hasattr(os, "geteuid")
-    if not stat.S_ISDIR(found.st_mode):
-        why_not = f"{folder} is {'a link' if stat.S_ISLNK(found.st_mode) else 'not a folder'}"
-    elif has_users and found.st_uid != os.geteuid():
+    if not stat.S_ISDIR(status.st_mode):
+        why_not = f"{folder} is {'a link' if stat.S_ISLNK(status.st_mode) else 'not a folder'}"
+    elif has_users and status.st_uid != os.geteuid():
         why_not = f"{folder} belongs to another user"
-    elif has_users and found.st_mode & _WRITTEN_BY_OTHERS:
+    elif has_users and status.st_mode & _WRITTEN_BY_OTHERS:
         why_not = f"others can write into {folder}; 'ppafo doctor --clear' and 'chmod 700' make it safe"
-    elif has_users and any(_can_be_exchanged(place) for place in above):
+    elif has_users and any(_can_be_exchanged(status_above) for status_above in above):
         why_not = f"others can put another folder in the place of {folder}"
     else:
         why_not = "" if os.access(folder, os.W_OK | os.X_OK) else f"{folder} cannot be written"
     return why_not
 
 
-def _can_be_exchanged(place: os.stat_result) -> bool:
+def _can_be_exchanged(folder_status: os.stat_result) -> bool:
     """Return whether another user can rename what lies in a folder."""
-    if place.st_uid not in (0, os.geteuid()):
+    if folder_status.st_uid not in (0, os.geteuid()):
         return True
     # A sticky folder such as /tmp lets each user rename only what is his own.
-    writers = stat.S_IWOTH if _is_own_group(place.st_gid) else _WRITTEN_BY_OTHERS
-    return bool(place.st_mode & writers and not place.st_mode & stat.S_ISVTX)
+    writers = stat.S_IWOTH if _is_own_group(folder_status.st_gid) else _WRITTEN_BY_OTHERS
+    return bool(folder_status.st_mode & writers and not folder_status.st_mode & stat.S_ISVTX)
 
 
 @cache
@@ -87,14 +87,14 @@ def _is_own_group(number: int) -> bool:
     return user.pw_gid == number and group.gr_name == user.pw_name and set(group.gr_mem) <= {user.pw_name}
 
 
-def is_own_file(found: os.stat_result, above: os.stat_result) -> bool:
+def is_own_file(status: os.stat_result, above: os.stat_result) -> bool:
     """Return whether a file and its folder are this user's, or root's, and nobody else can write into either."""
-    if not (stat.S_ISREG(found.st_mode) and stat.S_ISDIR(above.st_mode)):
+    if not (stat.S_ISREG(status.st_mode) and stat.S_ISDIR(above.st_mode)):
         return False
     if not hasattr(os, "geteuid"):
         return True
-    is_written = (found.st_mode | above.st_mode) & _WRITTEN_BY_OTHERS
-    return not is_written and {found.st_uid, above.st_uid} <= {0, os.geteuid()}
+    is_written = (status.st_mode | above.st_mode) & _WRITTEN_BY_OTHERS
+    return not is_written and {status.st_uid, above.st_uid} <= {0, os.geteuid()}
 
 
 def is_own(kept: Path, files: Collection[str]) -> bool:
@@ -102,15 +102,15 @@ def is_own(kept: Path, files: Collection[str]) -> bool:
 
     What came while others could write stays theirs. Nobody else can then change a file between this look and its use.
     """
-    found = [kept.lstat()]
-    for place in kept.rglob("*"):
+    statuses = [kept.lstat()]
+    for entry in kept.rglob("*"):
         with contextlib.suppress(FileNotFoundError):
-            found.append(place.lstat())
+            statuses.append(entry.lstat())
     if not hasattr(os, "geteuid"):
-        return stat.S_ISDIR(found[0].st_mode)
+        return stat.S_ISDIR(statuses[0].st_mode)
     # Root may own a file: what root can do, no check prevents.
-    is_whose = all(item.st_uid in (0, os.geteuid()) for item in found)
-    used = [item for item in found if stat.S_ISDIR(item.st_mode)]
-    is_folder = found[0] in used
+    is_whose = all(status.st_uid in (0, os.geteuid()) for status in statuses)
+    used = [status for status in statuses if stat.S_ISDIR(status.st_mode)]
+    is_folder = statuses[0] in used
     used += [(kept / name).lstat() for name in files]
-    return is_whose and is_folder and bool(files) and not any(item.st_mode & _WRITTEN_BY_OTHERS for item in used)
+    return is_whose and is_folder and bool(files) and not any(status.st_mode & _WRITTEN_BY_OTHERS for status in used)

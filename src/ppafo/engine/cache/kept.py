@@ -90,24 +90,24 @@ def is_whole(kept: Path) -> bool:
         return (
             bool(names)
             and is_own(kept, [CHECKSUMS, *names])
-            and all(hashlib.sha256(read_regular_file(kept / name)).hexdigest() == given for name, given in files)
+            and all(hashlib.sha256(read_regular_file(kept / name)).hexdigest() == digest for name, digest in files)
         )
     except (OSError, ValueError, RecursionError):
         return False
 
 
-def remove(place: Path) -> None:
+def remove(folder: Path) -> None:
     """Remove a program, a file or a link; what cannot be removed stays.
 
     A folder is moved aside first: to another process a program is there and whole, or not there.
     """
     with contextlib.suppress(OSError):
-        if place.is_dir() and not place.is_symlink():
-            aside = place.with_name(f".writing-{secrets.token_hex(8)}")
-            place.rename(aside)
+        if folder.is_dir() and not folder.is_symlink():
+            aside = folder.with_name(f".writing-{secrets.token_hex(8)}")
+            folder.rename(aside)
             shutil.rmtree(aside)
         else:
-            place.unlink()
+            folder.unlink()
 
 
 def is_kept(source: str, compiler: Compiler) -> bool:

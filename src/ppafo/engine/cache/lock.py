@@ -22,14 +22,14 @@ _PAUSE = 0.05
 @contextlib.contextmanager
 def one_process(kept: Path) -> Iterator[None]:
     """Hold the lock of a program while it is compiled; where none can be had, go on without."""
-    place = kept.with_name(LOCK + kept.name)
-    held = _lock(place)
+    file = kept.with_name(LOCK + kept.name)
+    held = _lock(file)
     try:
         yield
     finally:
         if held is not None:
             with contextlib.suppress(OSError):
-                place.unlink()
+                file.unlink()
             os.close(held)
 
 

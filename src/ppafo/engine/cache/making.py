@@ -79,7 +79,7 @@ def _compile_and_keep(kept: Path, wanted: Wanted) -> ModuleType:
 def _estimate(wanted: Wanted, kept: Iterable[Path]) -> float:
     """About how long a program takes to compile [s]."""
     kind = wanted.name.rpartition("_")[0]
-    alike = [place for place in kept if place.name.startswith(f"{kind}_")]
+    alike = [entry for entry in kept if entry.name.startswith(f"{kind}_")]
     return estimate_seconds(wanted.source, alike, wanted.compiler.seconds_per_byte)
 
 

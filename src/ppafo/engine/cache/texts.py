@@ -23,25 +23,25 @@ def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
         return make()
     # The name is the hash of all that the content depends on, so that nothing kept is ever out of date.
     key = hashlib.sha256(made_from.encode("utf-8", "surrogatepass")).hexdigest()[:32]
-    place = folder / TEXTS / f"{kind}-{key}"
-    content = _read(place)
+    file = folder / TEXTS / f"{kind}-{key}"
+    content = _read(file)
     if content is None:
         content = make()
         with contextlib.suppress(OSError):
-            _write(place, content)
+            _write(file, content)
             from ppafo.engine.cache.tidying import evict_beyond, measured, texts  # most texts are there
 
             evict_beyond(measured(texts(folder)), MAXIMUM_BYTES)
     return content
 
 
-def _read(place: Path) -> bytes | None:
+def _read(file: Path) -> bytes | None:
     try:
         # It may be run: file and folder must be this user's, and nobody else may write there.
-        if not is_own_file(place.lstat(), place.parent.lstat()):
+        if not is_own_file(file.lstat(), file.parent.lstat()):
             return None
-        content = read_regular_file(place)
-        os.utime(place)
+        content = read_regular_file(file)
+        os.utime(file)
     except OSError:
         return None
     # A file that was cut by a full disk, or changed, counts as not there.
@@ -49,15 +49,15 @@ def _read(place: Path) -> bytes | None:
     return rest if hashlib.sha256(rest).digest() == stated else None
 
 
-def _write(place: Path, content: bytes) -> None:
+def _write(file: Path, content: bytes) -> None:
     # Through a link the file would land in a folder that nobody has checked.
-    if place.parent.is_symlink():
+    if file.parent.is_symlink():
         return
-    place.parent.mkdir(mode=0o700, exist_ok=True)
-    aside = place.with_name(f".writing-{secrets.token_hex(8)}")
+    file.parent.mkdir(mode=0o700, exist_ok=True)
+    aside = file.with_name(f".writing-{secrets.token_hex(8)}")
     try:
         aside.write_bytes(hashlib.sha256(content).digest() + content)
         aside.chmod(0o600)
-        aside.replace(place)
+        aside.replace(file)
     finally:
         aside.unlink(missing_ok=True)

@@ -37,14 +37,14 @@ class CachedProgram:
 
 def list_left_out(folder: Path) -> dict[str, str]:
     """Return why compilers were left out lately, by their names."""
-    found = {}
-    for place in entries_named(folder, _ASIDE):
-        if place.name.startswith(NOTE):
+    left_out = {}
+    for entry in entries_named(folder, _ASIDE):
+        if entry.name.startswith(NOTE):
             with contextlib.suppress(OSError):
-                text = read_regular_file(place).decode("utf-8", "replace")
-                if time.time() - place.lstat().st_mtime < LEFT_OUT_FOR:
-                    found[place.name.removeprefix(NOTE).partition("-")[0]] = one_line(text)
-    return found
+                text = read_regular_file(entry).decode("utf-8", "replace")
+                if time.time() - entry.lstat().st_mtime < LEFT_OUT_FOR:
+                    left_out[entry.name.removeprefix(NOTE).partition("-")[0]] = one_line(text)
+    return left_out
 
 
 def list_programs(folder: Path) -> list[CachedProgram]:
@@ -87,22 +87,22 @@ def evict_beyond(programs: Iterable[CachedProgram], most: int) -> None:
 def entries_named(folder: Path, pattern: re.Pattern[str]) -> list[Path]:
     """Return the entries of a folder with such a name; what others put beside them is left alone."""
     try:
-        return [place for place in folder.iterdir() if pattern.fullmatch(place.name)]
+        return [entry for entry in folder.iterdir() if pattern.fullmatch(entry.name)]
     except OSError:
         return []
 
 
 def measured(places: Iterable[Path]) -> list[CachedProgram]:
     """Return programs and files with their sizes, the one that was used last first."""
-    found = []
-    for place in places:
+    entries = []
+    for path in places:
         try:
-            files = [place] if place.is_symlink() or not place.is_dir() else [place, *place.rglob("*")]
-            size, used = sum(path.lstat().st_size for path in files), place.lstat().st_mtime
+            files = [path] if path.is_symlink() or not path.is_dir() else [path, *path.rglob("*")]
+            size, used = sum(path.lstat().st_size for path in files), path.lstat().st_mtime
         except OSError:  # another process has removed it in this instant
             size, used = 0, time.time()
-        found.append(CachedProgram(place, size, used))
-    return sorted(found, key=lambda item: -item.used)
+        entries.append(CachedProgram(path, size, used))
+    return sorted(entries, key=lambda entry: -entry.used)
 
 
 def texts(folder: Path) -> list[Path]:

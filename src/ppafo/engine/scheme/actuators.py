@@ -4,7 +4,6 @@ A program is linked: where its text calls the vane's ``chambers``, ``chamber_pre
 made of them, it calls its actuator's.
 """
 
-from collections.abc import Callable
 from typing import Any, TypeVar
 
 from ppafo.engine.rows import leaves, rebuilt
@@ -24,6 +23,7 @@ from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.actuators.vane import chambers
 from ppafo.model.columns import over_runs
+from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -114,7 +114,7 @@ def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
     }
 
 
-def _of_plant(actuator: ActuatorModel, function: Callable[..., Any], plant: Any, *given: Any) -> Any:
+def _of_plant(actuator: ActuatorModel, function: PlainFunction, plant: Any, *given: Any) -> Any:
     """Result of a function of a model for numbers any of which may be arrays of one length."""
     if actuator is VANE:
         return function(plant, *given)

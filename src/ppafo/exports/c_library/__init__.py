@@ -35,14 +35,14 @@ _FLAWS_OF_WALK = (
 )
 
 
-def c_library(item: Scenario) -> dict[str, bytes]:
+def c_library(scenario: Scenario) -> dict[str, bytes]:
     """Files of a library in C by name. ProgramError for what cannot be translated, with file and line."""
-    return library_files(library_of(item))
+    return library_files(library_of(scenario))
 
 
-def library_of(item: Scenario) -> Library:
+def library_of(scenario: Scenario) -> Library:
     """The library of a scenario or a walk."""
-    return scenario_library(item) if not item.walks else walk_library(item)
+    return scenario_library(scenario) if not scenario.walks else walk_library(scenario)
 
 
 def scenario_library(scenario: Scenario) -> Library:
@@ -98,7 +98,7 @@ def walk_library(configuration: Scenario) -> Library:
     check_can_leave(configuration)
     program = exported(batch_of(plan_walk(configuration)).program)
     settings, links = settings_of_walk(configuration), links_of_walk(configuration)
-    failing = {sensor: item for sensor, item in walk_of(configuration).faults.items() if item.kind}
+    failing = {sensor: fault for sensor, fault in walk_of(configuration).faults.items() if fault.kind}
     # A sensor that fails is never ideal, whatever the settings are.
     of_readings = [] if failing else [((*_FLAWS, *_FLAWS_OF_WALK), not program.program.ideal_sensors)]
     was_late = "true" if program.program.late_readings else "false"
@@ -120,8 +120,8 @@ def walk_library(configuration: Scenario) -> Library:
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:
     """Settings that choose the program by being 0 or not: of the valve, and others."""
-    given = device.valve.settings
-    of_valve = [((f"valve_{name}",), given[name] > 0.0) for name in choosing(device)]
+    settings = device.valve.settings
+    of_valve = [((f"valve_{name}",), settings[name] > 0.0) for name in choosing(device)]
     of_effects = [
         ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], True)
         for effect in effects_of(device)

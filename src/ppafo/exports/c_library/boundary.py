@@ -22,16 +22,16 @@ class Arrays:
 
     def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
         """Lines that give the numbers their names, then ``body``."""
-        return [*(f"{name} = {array}[{place}]" for place, name in enumerate(names)), *body]
+        return [*(f"{name} = {array}[{index}]" for index, name in enumerate(names)), *body]
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
         """Expression for the row of one of several groups, from the numbers of all."""
-        cells = {path: f"{array}[{place}]" for place, path in enumerate(_paths(groups))}
+        cells = {path: f"{array}[{index}]" for index, path in enumerate(_paths(groups))}
         return row_expression(groups[group], group, cells, name_of)
 
     def given(self, array: str, groups: Mapping[str, type]) -> list[str]:
         """Lines that hand back the numbers of groups, which have their names, one by one."""
-        return [f"{array}[{place}] = {path}" for place, path in enumerate(_paths(groups))]
+        return [f"{array}[{index}] = {path}" for index, path in enumerate(_paths(groups))]
 
     def head(self, name: str, parameters: Mapping[str, str]) -> str:
         """The first lines of a function; ``parameters`` by name, with their types."""
@@ -81,7 +81,7 @@ def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> Shared:
 
 def struct_of_numbers(name: str, names: Iterable[str]) -> Shared:
     """A struct of numbers."""
-    return Shared(Row(name, tuple((item, FLOAT) for item in names)))
+    return Shared(Row(name, tuple((field, FLOAT) for field in names)))
 
 
 def type_of(row: object, name_of: NameOf) -> Type:

@@ -172,8 +172,8 @@ class Library:
 def c_identifier(name: str) -> str:
     """A name as C can have it."""
     # A name in C begins with a letter here: those that begin with an underscore belong to compilers.
-    found = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
-    return found if found[:1].isalpha() else f"run_{found}"
+    identifier = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
+    return identifier if identifier[:1].isalpha() else f"run_{identifier}"
 
 
 def library_files(library: Library) -> dict[str, bytes]:
@@ -189,7 +189,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
     title = f"{library.title}: the functions of ppafo {__version__} that a run is made of. Not to be edited."
     further = [add for add in (library.further, library.following) if add is not None]
-    settings = [item.name for item in library.settings]
+    settings = [setting.name for setting in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
     interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
     functions = c_text_of_run(program, title, name, settings, further, interface)
@@ -218,11 +218,11 @@ def _words(library: Library, name: str) -> dict[str, str]:
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
     relations = _relations(library)
     table = []
-    for item in library.settings:
-        low, high = _limits(item.quantity)
-        marks = item.quantity.minimum_allowed, item.name in library.defaults
+    for setting in library.settings:
+        low, high = _limits(setting.quantity)
+        marks = setting.quantity.minimum_allowed, setting.name in library.defaults
         flags = ", ".join("true" if mark else "false" for mark in marks)
-        table.append(f'    {{"{item.name}", {item.value!r}, {low!r}, {high!r}, {flags}}},')
+        table.append(f'    {{"{setting.name}", {setting.value!r}, {low!r}, {high!r}, {flags}}},')
     return {
         **run_words(library),
         "name": name,
@@ -234,10 +234,12 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "in_parts": in_parts,
         "run": filled(template(_FOLDER, "run.h"), {"name": name}),
         "steps": filled(template(_FOLDER, "steps.c"), steps),
-        "first": "".join(f"    before.{item} = before.{library.surface.step};\n" for item in library.surface.as_step),
+        "first": "".join(f"    before.{name} = before.{library.surface.step};\n" for name in library.surface.as_step),
         "follow": "" if library.following is None else "    follow(&before, &all);",
-        "settings": _members((item.name, item.quantity.unit, _said(item.quantity)) for item in library.settings),
-        "outputs": _members((("time", "s", "since the start"), *((item, *OUTPUTS[item]) for item in program.outputs))),
+        "settings": _members(
+            (setting.name, setting.quantity.unit, _said(setting.quantity)) for setting in library.settings
+        ),
+        "outputs": _members((("time", "s", "since the start"), *((name, *OUTPUTS[name]) for name in program.outputs))),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
         "table": "\n".join(table),
         "relations": "\n".join(
@@ -250,14 +252,14 @@ def _words(library: Library, name: str) -> dict[str, str]:
         ),
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
-        "csv_values": ",\n".join(f"            outputs.{item}" for item in outputs),
+        "csv_values": ",\n".join(f"            outputs.{name}" for name in outputs),
         "print_metrics": "\n".join(
             f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
             for kind in program.metrics
         ),
         # Every scenario has a supply pressure, which is what a user would try first.
         "example": next(
-            f"{item.name} = {item.value!r};" for item in library.settings if item.name == "supply_pressure"
+            f"{setting.name} = {setting.value!r};" for setting in library.settings if setting.name == "supply_pressure"
         ),
         **library.words,
         **library.surface.words,
@@ -276,33 +278,34 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
 def _said(quantity: Quantity) -> str:
     """What a setting is, and its range."""
     low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
-    above = "" if low is None else f"{'from' if quantity.minimum_allowed else 'above'} {low:g}"
+    beyond = "from" if quantity.minimum_allowed else "above"
+    above = "" if low is None else f"{beyond} {low:g}"
     below = "" if high is None else f"up to {high:g}"
     limits = " ".join(filter(None, (above, below)))
-    return f"{quantity.summary or quantity.name}{'; ' if limits else ''}{limits}"
+    return "; ".join(filter(None, (quantity.summary or quantity.name, limits)))
 
 
 def conditions_of_program(library: Library) -> list[tuple[str, str]]:
     """Conditions in C under which the settings ask for another program, with the setting that is named."""
-    values = {item.name: item.value for item in library.settings}
-    found = []
-    for item in library.switches:
-        if item.is_above:
+    values = {setting.name: setting.value for setting in library.settings}
+    conditions = []
+    for switch in library.switches:
+        if switch.is_above:
             # The setting that switches the program on is the one to name where all of them are 0.
-            was_above = next(name for name in item.names if values[name] > 0.0)
-            found.append((f"!({' || '.join(f'settings->{name} > 0.0' for name in item.names)})", was_above))
+            was_above = next(name for name in switch.names if values[name] > 0.0)
+            conditions.append((f"!({' || '.join(f'settings->{name} > 0.0' for name in switch.names)})", was_above))
         else:
-            found += [(f"settings->{name} > 0.0", name) for name in item.names]
-    return [*found, *library.other_program]
+            conditions += [(f"settings->{name} > 0.0", name) for name in switch.names]
+    return [*conditions, *library.other_program]
 
 
 def conditions_of(library: Library) -> list[tuple[str, str]]:
     """Conditions on settings as text in C, each with the setting that is named where it fails, also for NaN."""
     ranges = []
-    for item in library.settings:
-        value, sign = f"settings->{item.name}", ">=" if item.quantity.minimum_allowed else ">"
-        low, high = _limits(item.quantity)
-        ranges.append((f"{value} {sign} {low!r} && {value} <= {high!r}", item.name))
+    for setting in library.settings:
+        value, sign = f"settings->{setting.name}", ">=" if setting.quantity.minimum_allowed else ">"
+        low, high = _limits(setting.quantity)
+        ranges.append((f"{value} {sign} {low!r} && {value} <= {high!r}", setting.name))
     return [*ranges, *_relations(library)]
 
 
@@ -326,17 +329,20 @@ static bool is_whole(double count)
 
 def _relations(library: Library) -> list[tuple[str, str]]:
     """Conditions between settings as text in C, each with the setting that is named."""
-    found = []
-    for item in library.relations:
-        other, sign = f"settings->{item.other}", "-" if item.relation == "at least" else "+"
-        if item.tolerance:
+    relations = []
+    for relation in library.relations:
+        other, sign = f"settings->{relation.other}", "-" if relation.relation == "at least" else "+"
+        if relation.tolerance:
             # With the tolerance of files, or a setting that a file accepts would be refused in C.
-            slack = repr(item.tolerance)
-            other = f"{other} * (1.0 {sign} {slack})" if item.is_share else f"{other} {sign} {slack}"
-        found.append((f"settings->{item.name} {_SIGNS[item.relation]} {other}", item.name))
+            slack = repr(relation.tolerance)
+            other = f"{other} * (1.0 {sign} {slack})" if relation.is_share else f"{other} {sign} {slack}"
+        relations.append((f"settings->{relation.name} {_SIGNS[relation.relation]} {other}", relation.name))
     # A plant alone has no times of a file, and a walk checks its own.
     rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
-    return [*found, *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules)]
+    return [
+        *relations,
+        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules),
+    ]
 
 
 def _limits(quantity: Quantity) -> tuple[float, float]:
@@ -386,7 +392,9 @@ def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
 
 def _followers(links: Graph) -> str:
     """The line on what follows what."""
-    pairs = {path: dict.fromkeys(source for link in found for source in link.sources) for path, found in links.items()}
+    pairs = {
+        path: dict.fromkeys(source for link in follows for source in link.sources) for path, follows in links.items()
+    }
     said = (
         f"`{c_identifier(path)}` ({', '.join(f'`{c_identifier(source)}`' for source in sources)})"
         for path, sources in pairs.items()
@@ -409,7 +417,7 @@ def _fixed_of_walk(gait: "Gait", sequence: "TaskSequence | None") -> tuple[tuple
 
 def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
     """What the page of the library says of this walk: settings follow others by ``links``, some sensors ``failing``."""
-    faults = [f"{sensor} `{item.kind}`" for sensor, item in failing.items()]
+    faults = [f"{sensor} `{fault.kind}`" for sensor, fault in failing.items()]
     from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import has_ideal_sensors
 
@@ -437,6 +445,8 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
     forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
+    gas = "thermal" if is_thermal else "isothermal"
+    let = "let" if device.supply.relieving else "do not let"
     return [
         *(
             f"the form of the {name}, `sonic_conductance, critical_ratio`"
@@ -444,8 +454,7 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
             else f"the form of the {name}, `area, discharge_coefficient`"
             for name, orifice in forms.items()
         ),
-        f"the gas, `{'thermal' if is_thermal else 'isothermal'}`; {lines}, which "
-        f"{'let' if device.supply.relieving else 'do not let'} gas back in from a chamber above them",
+        f"the gas, `{gas}`; {lines}, which {let} gas back in from a chamber above them",
         *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
     ]
 
@@ -459,13 +468,13 @@ def _at_zero(device: Device, flaws: Sequence[float]) -> str:
 
 
 def _listed(items: Sequence[str]) -> str:
-    return "\n".join(f"- {item}{'.' if item is items[-1] else ';'}" for item in items)
+    return "\n".join(f"- {line}{'.' if line is items[-1] else ';'}" for line in items)
 
 
 def choosing(device: Device) -> list[str]:
     """Settings of the valve that choose its functions by being 0 or not."""
     kind = VALVES[device.valve.kind]
-    names = [item.name for item in kind.quantities]
+    names = [quantity.name for quantity in kind.quantities]
     chosen = {}
     # A valve may look only at which settings are 0, so both cases of each tell what chooses.
     for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
@@ -475,6 +484,6 @@ def choosing(device: Device) -> list[str]:
         chosen[pattern] = model, model.command_delay(settings) > 0.0
     return [
         name
-        for place, name in enumerate(names)
-        if any(chosen[pattern] != chosen[*pattern[:place], 0.0, *pattern[place + 1 :]] for pattern in chosen)
+        for index, name in enumerate(names)
+        if any(chosen[pattern] != chosen[*pattern[:index], 0.0, *pattern[index + 1 :]] for pattern in chosen)
     ]

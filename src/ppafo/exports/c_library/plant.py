@@ -88,12 +88,12 @@ _LEAD_ANGLE = (
 )
 
 
-def plant_of(item: Scenario) -> PlantAlone:
+def plant_of(scenario: Scenario) -> PlantAlone:
     """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
-    chosen = _prescribed_vane(item) if not item.walks else _commanded_walk(item)
+    chosen = _prescribed_vane(scenario) if not scenario.walks else _commanded_walk(scenario)
     library, motion = library_of(chosen), chosen.motion
     command, unseen, highest = COMMAND, {"command", *(kind.reference for kind in CONTROLLED.values())}, 1.0
     further: tuple[Input, ...] = ()
@@ -103,7 +103,7 @@ def plant_of(item: Scenario) -> PlantAlone:
         # An angle and its rate at each step make a ramp, which the profile of the library already is.
         said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
         angle = motion.profile.start_level
-        settings = {one.path: one for one in library.settings}
+        settings = {setting.path: setting for setting in library.settings}
         stops = [settings[f"actuator.angle_{end}"].value for end in ("min", "max")]
         # So fast that the short ramp of the first angle still ends within what a level may be.
         fastest = (settings["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT
@@ -125,7 +125,7 @@ def plant_of(item: Scenario) -> PlantAlone:
         joint = "T_ex on the joint" if is_alone else "on the ankle of the leg, -T_2"
         words = f"torque {joint}, above 0 works against plantarflexion"
         path = "motion.external_torque" if is_alone else "motion.ankle_torque"
-        range_of = next(one.quantity for one in library.settings if one.path == path)
+        range_of = next(setting.quantity for setting in library.settings if setting.path == path)
         limits = range_of.minimum, range_of.maximum
         further = (Input("external_torque", "N m", words, motion.outside_torque, *limits),)
     else:
@@ -143,14 +143,14 @@ def plant_of(item: Scenario) -> PlantAlone:
         first=(("controller_period", "@.run_step"), ("run_output_interval", "@.run_step"), *first),
         lead=lead,
         highest=highest,
-        hidden=frozenset(hidden | {item.path for item in library.settings if item.path.startswith(unused)}),
+        hidden=frozenset(hidden | {setting.path for setting in library.settings if setting.path.startswith(unused)}),
         step=chosen.run.step,
     )
 
 
-def plant_library(item: Scenario) -> dict[str, bytes]:
+def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step under its inputs."""
-    return library_files(surfaced(plant_of(item)).library)
+    return library_files(surfaced(plant_of(scenario)).library)
 
 
 def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
@@ -169,18 +169,22 @@ def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
 
 def surfaced(alone: PlantAlone) -> PlantAlone:
     """A plant whose library is called with its inputs."""
-    names = [item.name for item in alone.inputs]
-    says = [f"{item.name}, {item.summary} [{item.unit}]" for item in alone.inputs]
+    names = [variable.name for variable in alone.inputs]
+    says = [f"{variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
     words = {
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
-        "first_inputs": ", ".join(repr(0.5 if item.name == "command" else item.start) for item in alone.inputs),
+        "first_inputs": ", ".join(
+            repr(0.5 if variable.name == "command" else variable.start) for variable in alone.inputs
+        ),
         "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone, names)]),
         "said_inputs": ";\n".join(f" * {line}" for line in says) + ".",
-        "listed_inputs": "\n".join(f"- `{item.name}` [{item.unit}]: {item.summary}." for item in alone.inputs),
+        "listed_inputs": "\n".join(
+            f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs
+        ),
         "motion": alone.motion,
         "highest": repr(alone.highest),
-        "lead": "\n".join(f"    parameters->{place} = {value};" for place, value in alone.lead),
+        "lead": "\n".join(f"    parameters->{field} = {value};" for field, value in alone.lead),
         "follow_inputs": follow_lines(alone, "first", {name: name for name in names}),
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
@@ -200,16 +204,16 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
 def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
     """Lines of C that give settings what inputs decide, of which each is called something."""
     words = re.compile(rf"\b({'|'.join(inputs)})\b")
-    lines = [(place, words.sub(lambda found: inputs[found[1]], value)) for place, value in alone.first]
-    return "\n".join(f"    {settings}->{place} = {value.replace('@.', f'{settings}->')};" for place, value in lines)
+    lines = [(field, words.sub(lambda match: inputs[match[1]], value)) for field, value in alone.first]
+    return "\n".join(f"    {settings}->{field} = {value.replace('@.', f'{settings}->')};" for field, value in lines)
 
 
 def _prescribed_vane(scenario: Scenario) -> Scenario:
     """The scenario under a command at every step of its engine; an ankle is prescribed from outside as well."""
     motion = scenario.motion
     if isinstance(motion, PrescribedMotion):
-        found: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-        settings = {"start_level": found[0], "level": found[0], "ramp_start": 0.0, "ramp_time": 2.0}
+        start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+        settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
         # It begins where the scenario has it.
         motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
     # The engine's own step: commands come once in each, and nothing lies between.

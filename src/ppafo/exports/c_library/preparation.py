@@ -61,19 +61,19 @@ FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resoluti
 
 def following_text(settings: Sequence[Setting], links: Graph, collector: SourceCollector, boundary: Boundary) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
-    places = {item.path: place for place, item in enumerate(settings)}
+    places = {setting.path: place for place, setting in enumerate(settings)}
 
     def cell(array: str, path: str) -> str:
         return boundary.cell(array, places[path], c_identifier(path))
 
-    used = {source for found in links.values() for link in found for source in link.sources}
+    used = {source for follows in links.values() for link in follows for source in link.sources}
     rows: list[str] = []
     lines = [f"{c_identifier(path)} = {cell('settings', path)}" for path in places if path in used - set(links)]
-    for path, found in links.items():
+    for path, follows in links.items():
         name, own = c_identifier(path), cell("settings", path)
         text = own
         # The first link that holds wins, so it is the outermost choice.
-        for link in reversed(found):
+        for link in reversed(follows):
             number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
             source = link.sources[0]
             # Compared with the default to the bit: a value that was written again counts as not set.
@@ -90,11 +90,11 @@ def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
 
     def filled(row: type, numbers: Sequence[str]) -> str:
         name = f"Followed{len(rows)}"
-        rows.append(f"{name} = namedtuple({name!r}, {[item.name for item in quantities_of(row)]!r})")
+        rows.append(f"{name} = namedtuple({name!r}, {[quantity.name for quantity in quantities_of(row)]!r})")
         return f"{name}({', '.join(numbers)})"
 
-    given = term.arguments([c_identifier(source) for source in term.sources], filled)
-    return f"{collector.add(term.function)}({', '.join(given)})"
+    arguments = term.arguments([c_identifier(source) for source in term.sources], filled)
+    return f"{collector.add(term.function)}({', '.join(arguments)})"
 
 
 def _written(sign: str, is_reflected: bool = False) -> "Callable[[Written, Written | float], Written]":
@@ -137,7 +137,7 @@ class Writing:
         self.device = device
         self.lines = lines
         self.program = program
-        self.add: Callable[[Callable[..., Any] | type], str] = collector.add
+        self.add = collector.add
         self.needs = collector.needs
         self.rows: dict[str, list[str]] = {}
 
@@ -146,7 +146,7 @@ class Writing:
 
         The lines must name every group of rows of the program, ``counts_of_steps``, delays and ``needs_parts``.
         """
-        body = [*boundary.named("settings", [item.name for item in settings], list(lines))]
+        body = [*boundary.named("settings", [setting.name for setting in settings], list(lines))]
         body += boundary.given("parameters", self.program.parameter_rows())
         # Task sequence and meters begin with the first sample.
         later = {"course", *self.program.meter_groups}
@@ -160,7 +160,7 @@ class Writing:
             "command_delay": "command_steps",
             "needs_parts": "1.0 if needs_parts else 0.0",
         }
-        body += [f"{boundary.cell('counts', place, name)} = {counted[name]}" for place, name in enumerate(COUNTS)]
+        body += [f"{boundary.cell('counts', index, name)} = {counted[name]}" for index, name in enumerate(COUNTS)]
         own = [f"{name} = namedtuple({name!r}, {fields!r})" for name, fields in self.rows.items()]
         head = boundary.head("prepare", dict.fromkeys(("settings", "parameters", "states", "counts"), "float64[::1]"))
         return "\n".join([*own, head, *indent(composed_lines(body, self.needs))])
@@ -179,9 +179,9 @@ class Writing:
         cells = dict(zip(leaf_paths(type(row), path), map(_text, leaves(row)), strict=True))
         return row_expression(type(row), path, cells, self.add)
 
-    def kind(self, section: str, kind: Any, given: Mapping[str, str] | None = None) -> str:
+    def kind(self, section: str, kind: Any, known: Mapping[str, str] | None = None) -> str:
         """Parameters of a controller or profile: the settings of a section, some of them ``given`` in other words."""
-        numbers = self.section(section, [item.name for item in kind.quantities]) | dict(given or {})
+        numbers = self.section(section, [quantity.name for quantity in kind.quantities]) | dict(known or {})
         cells = dict(zip(leaf_paths(kind.parameters, section), numbers.values(), strict=True))
         return row_expression(kind.parameters, section, cells, self.add)
 
@@ -190,7 +190,7 @@ class Writing:
         add = self.add
         kind = self.device.actuator.kind
         fields = {
-            section: self.section(section, [item.name for item in members(section, kind)])
+            section: self.section(section, [quantity.name for quantity in members(section, kind)])
             for section in SEEN_BY_EFFECTS
         }
         if self.program.has_shape:
@@ -207,7 +207,7 @@ class Writing:
         yield f"valve_restriction = {self._restriction('valve', self.device.valve.orifice)}"
         yield f"leak_restriction = {self._restriction('actuator.leak', self.device.actuator.leak)}"
         for effect in self.program.effects:
-            own = self.section(effect.section, [item.name for item in effect.quantities])
+            own = self.section(effect.section, [quantity.name for quantity in effect.quantities])
             if effect.prepare is None:
                 yield f"{effect.name} = {add(effect.parameters)}({', '.join(own.values())})"
                 continue
@@ -246,7 +246,7 @@ class Writing:
     def timing(self, signal_delay: str, tolerance: str = "1.0") -> Iterator[str]:
         """Lines that make the valve, delays in steps, and the timing, once there are ``counts_of_steps``."""
         add, model = self.add, self.program.valve
-        names = [item.name for item in VALVES[self.device.valve.kind].quantities]
+        names = [quantity.name for quantity in VALVES[self.device.valve.kind].quantities]
         yield f"valve_settings = {self.row('ValveSettings', self.section('valve', names))}"
         yield f"valve = {add(model.prepare)}(valve_settings)"
         # The step that the counts found, not the one that was asked for.
@@ -263,7 +263,7 @@ class Writing:
         flaws = self.section("sensors", FLAWS)
         yield f"sensors = {add(SensorParameters)}({', '.join(flaws.values())}, sensors_seed)"
         if self.program.is_thermal:
-            walls = self.section("gas_model", [item.name for item in gas_settings(THERMAL)])
+            walls = self.section("gas_model", [quantity.name for quantity in gas_settings(THERMAL)])
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:
             # Droop, largest flow and volume, line by line, as the struct of the lines has them.
@@ -327,10 +327,10 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
         Setting(
             c_identifier(path),
             path,
-            replace(item, summary=SAID.get(path, item.summary)),
+            replace(quantity, summary=SAID.get(path, quantity.summary)),
             times[path] if path in TIMES else number_at(scenario, path),
         )
-        for path, item in declared_settings(scenario).items()
+        for path, quantity in declared_settings(scenario).items()
     )
 
 
@@ -366,12 +366,12 @@ def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
     unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
     is_on = effects_of(device)
     unused |= {
-        f"{effect.section}.{item.name}"
+        f"{effect.section}.{quantity.name}"
         for effect in device_effects()
         if effect not in is_on
-        for item in effect.quantities
+        for quantity in effect.quantities
     }
-    return {path: item for path, item in declared_numbers(scenario).items() if path not in unused}
+    return {path: quantity for path, quantity in declared_numbers(scenario).items() if path not in unused}
 
 
 def preparation_of(scenario: Scenario, program: Program, collector: SourceCollector, boundary: Boundary) -> str:
@@ -390,8 +390,8 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
         yield from _leg(leg, writing)
 
     # Steps, delays in them, and whether the error decides about their parts.
-    given = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {add(step_counts)}({given})"
+    times = "run_duration, run_step, run_output_interval, controller_period"
+    yield f"counts_of_steps = {add(step_counts)}({times})"
     yield f"tolerance = {add(relative_tolerance)}(run_tolerance)"
     yield from writing.timing("sensors_delay", "tolerance")
     level = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
@@ -407,7 +407,11 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
         yield f"controller = {writing.kind('controller', CONTROLLERS[scenario.controller.kind])}"
     profile, settings = PROFILES[scenario.reference.kind], scenario.reference.settings
     # Where no reference is followed, the one that stands in its place is written out.
-    known = {} if program.has_reference else {item.name: repr(settings[item.name]) for item in profile.quantities}
+    known = (
+        {}
+        if program.has_reference
+        else {quantity.name: repr(settings[quantity.name]) for quantity in profile.quantities}
+    )
     yield f"reference = {writing.kind('reference', profile, known)}"
     if program.angle is RECORDED_ANGLE:
         yield f"path = {add(Segment)}(0.0, motion_angle, 0.0)"

@@ -13,8 +13,6 @@ from importlib.resources import files
 from types import FunctionType
 from typing import Any
 
-import numpy as np
-
 from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
@@ -27,6 +25,8 @@ from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, 
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.metrics.readable import ThermalTotals, Totals, real_totals, thermal_totals, totals
 from ppafo.model.columns import over_runs
+from ppafo.model.one_run import FOR_ONE_RUN
+from ppafo.model.plain_function import PlainFunction
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
 
@@ -56,21 +56,6 @@ class _ForOneRun(ast.NodeTransformer):
             return node
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
 
-    def visit_If(self, node: ast.If | ast.IfExp) -> ast.AST | list[ast.stmt]:
-        """What is done for a column is left away."""
-        self.generic_visit(node)
-        return node.orelse if self.asks_for_column(node.test) else node
-
-    visit_IfExp = visit_If  # noqa: N815 - named by the library
-
-    def asks_for_column(self, node: ast.expr) -> bool:
-        """True for a test of whether numbers are columns."""
-        if isinstance(node, ast.BoolOp):
-            return isinstance(node.op, ast.Or) and all(map(self.asks_for_column, node.values))
-        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name) or node.func.id != "isinstance":
-            return False
-        return self.value_of(node.args[1]) is np.ndarray
-
     def value_of(self, node: ast.expr) -> Any:
         """What a name, an attribute of one or a text stands for; None for anything else."""
         if isinstance(node, ast.Constant):
@@ -78,6 +63,11 @@ class _ForOneRun(ast.NodeTransformer):
         if isinstance(node, ast.Name):
             return self.scope.get(node.id)
         return getattr(self.value_of(node.value), node.attr, None) if isinstance(node, ast.Attribute) else None
+
+
+def _collector() -> SourceCollector:
+    """A collector that also takes functions which Python applies to columns: they are called for one run."""
+    return SourceCollector(INLINE, for_one_run, links=dict(FOR_ONE_RUN))
 
 
 LOOP_TYPES: tuple[Type, ...] = (
@@ -90,7 +80,7 @@ _ENDINGS = {WHOLE: "", IN_PARTS: "_in_parts"}
 
 
 def c_text_of_run(
-    item: ExportedProgram,
+    exported: ExportedProgram,
     title: str,
     name: str,
     settings: Sequence[str],
@@ -105,29 +95,29 @@ def c_text_of_run(
     from ppafo.translation.c99 import Reading, c_source, documents_of, is_free
     from ppafo.translation.walk import walk_module
 
-    collector = SourceCollector(INLINE, for_one_run)
-    program, structs = item.program, Structs()
+    collector = _collector()
+    program, structs = exported.program, Structs()
     link_program(program, collector)
-    entries = [metrics_entry(item, collector, structs)] if item.metrics else []
+    entries = [metrics_entry(exported, collector, structs)] if exported.metrics else []
     entries += [add(collector, structs) for add in further]
-    steps = _steps_of(item, collector)
+    steps = _steps_of(exported, collector)
     loop = run_loop(steps[WHOLE], f"{name}_outputs", steps.get(IN_PARTS))
     composed = "\n\n".join([HEADER, collector.text(), loop, *entries, ""])
     states = struct_of("run_states", program.state_rows(), collector.add)
     parameters = struct_of("run_parameters", program.parameter_rows(), collector.add)
-    given = struct_of_numbers(f"{name}_settings", settings)
-    outputs = struct_of_numbers(f"{name}_outputs", ["time", *item.outputs])
+    settings_row = struct_of_numbers(f"{name}_settings", settings)
+    outputs = struct_of_numbers(f"{name}_outputs", ["time", *exported.outputs])
     samples = Shared(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
-    found = struct_of_numbers(f"{name}_metrics", [kind.name for kind in item.metrics])
+    metrics_row = struct_of_numbers(f"{name}_metrics", [kind.name for kind in exported.metrics])
     types: dict[str, tuple[Type, ...]] = {
-        WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if item.chooses_parts else [])),
-        "metrics": (states, states, parameters, INT, found),
-        "prepare": (given, parameters, states, struct_of_numbers("run_counts", COUNTS)),
-        "follow": (given, given),
+        WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if exported.chooses_parts else [])),
+        "metrics": (states, states, parameters, INT, metrics_row),
+        "prepare": (settings_row, parameters, states, struct_of_numbers("run_counts", COUNTS)),
+        "follow": (settings_row, settings_row),
     }
     documents = documents_of(collector) | _DOCUMENTS
     # A short name is taken only where it is unambiguous and C leaves it free; all others keep their module's path.
-    own = {name: re.sub(r"\W", "_", item.__qualname__).strip("_") for name, item in collector.owners.items()}
+    own = {name: re.sub(r"\W", "_", owner.__qualname__).strip("_") for name, owner in collector.owners.items()}
     # Functions of the step that divide it have their ending beside those that do not.
     ending = _ENDINGS[IN_PARTS]
     own |= {name: f"{word.removesuffix(ending)}{ending}" for name, word in own.items() if name.endswith(ending)}
@@ -138,7 +128,7 @@ def c_text_of_run(
         walk_module(composed, types),
         documents,
         title,
-        reading=Reading(short, {kind.row.name: kind.row.name for kind in (given, outputs, found)}, around),
+        reading=Reading(short, {kind.row.name: kind.row.name for kind in (settings_row, outputs, metrics_row)}, around),
     )
 
 
@@ -160,7 +150,7 @@ def _names_around() -> frozenset[str]:
     """Names of functions in the files around a library, of which some take its source in, and of its own entries."""
     folders = [folder.joinpath("templates") for folder in files("ppafo.exports").iterdir()]
     texts = [
-        [item.read_text(encoding="utf-8") for item in folder.iterdir() if item.name.endswith(".c")]
+        [file.read_text(encoding="utf-8") for file in folder.iterdir() if file.name.endswith(".c")]
         for folder in folders
         if folder.is_dir()
     ]
@@ -177,7 +167,9 @@ def _names_around() -> frozenset[str]:
 _FUNCTION = re.compile(r"^(?:static )?[\w ]+\b\*?(\w+)\(", re.MULTILINE)
 
 
-def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int) -> str:
+def c_text(
+    exported: ExportedProgram, title: str, settings: Sequence[str], further: Further | None, together: int
+) -> str:
     """All functions of an exported program in C; ``further`` may add one that takes ``settings``, which are named.
 
     Each lane loop stands there for one run and, with ``TOGETHER`` after its name, for so many runs at once.
@@ -185,13 +177,12 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
     from ppafo.translation.c99 import c_source, documents_of
     from ppafo.translation.walk import walk_module
 
-    # A collector that also takes functions that Python applies to columns.
-    collector = SourceCollector(INLINE, for_one_run)
-    composed = _composed_text(item, collector, further, together)
-    state = list(places_of(item.program.state_rows()).values())
-    parameter = list(places_of(item.program.parameter_rows()).values())
+    collector = _collector()
+    composed = _composed_text(exported, collector, further, together)
+    state = list(places_of(exported.program.state_rows()).values())
+    parameter = list(places_of(exported.program.parameter_rows()).values())
     alone = [name.replace("AT_", "PARAMETER_", 1) for name in parameter]
-    steps = {name: _stepping(program, _STEPS[name]) for name, program in item.loops.items()}
+    steps = {name: _stepping(program, _STEPS[name]) for name, program in exported.loops.items()}
     places = {
         **{
             f"{name}{ending}.x": [*state, *parameter, *stepping]
@@ -204,7 +195,7 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
         "counts": [f"COUNT_{name.upper()}" for name in COUNTS],
         "settings": [f"SETTING_{name.upper()}" for name in settings],
         "followed": [f"SETTING_{name.upper()}" for name in settings],
-        "found": [f"METRIC_{kind.name.upper()}" for kind in item.metrics],
+        "found": [f"METRIC_{kind.name.upper()}" for kind in exported.metrics],
     }
     counted = [
         _enumeration("Places of all numbers of a run: states, then parameters.", [*state, *parameter]),
@@ -221,19 +212,21 @@ def c_text(item: ExportedProgram, title: str, settings: Sequence[str], further: 
     return "\n".join([*counted, c_source(walk_module(composed), documents, title, places)])
 
 
-def outline_of(item: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
+def outline_of(exported: ExportedProgram, settings: Sequence[str], further: Further | None, together: int) -> str:
     """All that ``c_text`` makes the same functions from but its title: the same outline, the same code."""
-    composed = _composed_text(item, SourceCollector(INLINE, for_one_run), further, together)
-    places = [places_of(item.program.state_rows()), places_of(item.program.parameter_rows())]
-    names = [*places, [kind.name for kind in item.metrics], list(settings)]
+    composed = _composed_text(exported, _collector(), further, together)
+    places = [places_of(exported.program.state_rows()), places_of(exported.program.parameter_rows())]
+    names = [*places, [kind.name for kind in exported.metrics], list(settings)]
     return f"{names!r}\n{composed}"
 
 
-def _composed_text(item: ExportedProgram, collector: SourceCollector, further: Further | None, together: int) -> str:
-    link_program(item.program, collector)
+def _composed_text(
+    exported: ExportedProgram, collector: SourceCollector, further: Further | None, together: int
+) -> str:
+    link_program(exported.program, collector)
     arrays = Arrays()
-    entries = [metrics_entry(item, collector, arrays), *([] if further is None else [further(collector, arrays)])]
-    steps = _steps_of(item, collector)
+    entries = [metrics_entry(exported, collector, arrays), *([] if further is None else [further(collector, arrays)])]
+    steps = _steps_of(exported, collector)
     loops = [lane_loop(step, COMPILED, name, ARGUMENTS, lanes=1) for name, step in steps.items()]
     loops += [lane_loop(step, COMPILED, name + TOGETHER, ARGUMENTS, together) for name, step in steps.items()]
     return "\n\n".join([HEADER, collector.text(), *loops, *entries, ""])
@@ -250,9 +243,9 @@ def _stepping(program: Program, prefix: str) -> list[str]:
     return [f"{prefix}_{name}" for name in (*handed, *aside)]
 
 
-def _steps_of(item: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
+def _steps_of(exported: ExportedProgram, collector: SourceCollector) -> dict[str, StepText]:
     """The steps of its lane loops, by their names in C; functions that both have alike are there once."""
-    return {name: StepText(program, collector, _ENDINGS[name]) for name, program in item.loops.items()}
+    return {name: StepText(program, collector, _ENDINGS[name]) for name, program in exported.loops.items()}
 
 
 def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
@@ -268,19 +261,19 @@ def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str])
     return numbers if read.function is None else f"{add(read.function)}({numbers})"
 
 
-def metrics_entry(item: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
+def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
     """The metrics of a run, from its first and its last states."""
-    program, groups = item.program, item.program.state_rows()
+    program, groups = exported.program, exported.program.state_rows()
     names = [kind.name for kind in program.meters]
     kind: Any = ThermalTotals if program.is_thermal else Totals
-    make: Callable[..., Any] = thermal_totals if program.is_thermal else totals
+    make: PlainFunction = thermal_totals if program.is_thermal else totals
     if program.has_true_masses and not program.is_thermal:
         # Totals of a gas that is not ideal count true masses.
         make = real_totals
     further = ", plant, thermal" if program.is_thermal else ""
     parameters = program.parameter_rows()
-    given = ("plant", *program.gas.PARAMETERS, *(effect.name for effect in program.effects))
-    lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in given]
+    groups_taken = ("plant", *program.gas.PARAMETERS, *(effect.name for effect in program.effects))
+    lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in groups_taken]
     lines += [f"{name} = {boundary.taken('states', name, groups, collector.add)}" for name in program.effect_states]
     add = collector.add
     for array in ("first", "states"):
@@ -298,8 +291,8 @@ def metrics_entry(item: ExportedProgram, collector: SourceCollector, boundary: B
     lines += [
         f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains={add(kind)}({gains}))",
         *(
-            f"{boundary.cell('found', place, metric.name)} = {_read_expression(metric.read, add)}"
-            for place, metric in enumerate(item.metrics)
+            f"{boundary.cell('found', index, metric.name)} = {_read_expression(metric.read, add)}"
+            for index, metric in enumerate(exported.metrics)
         ),
     ]
     numbers = "float64[::1]"

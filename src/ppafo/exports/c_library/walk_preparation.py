@@ -87,11 +87,13 @@ def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
     run, control = configuration.run, _control(configuration)
     of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": record_interval(run.duration)}
     times = of_run | {"controller.period": configuration.controller.period}
-    declared = declared_settings(configuration) | control | {f"run.{item.name}": item for item in (*RUN, STEP)}
+    declared = (
+        declared_settings(configuration) | control | {f"run.{quantity.name}": quantity for quantity in (*RUN, STEP)}
+    )
     # What fails of the plant, with its shut-off valve, is written out in the source; persons are drawn in Python.
     fixed = ("shut_off.", *(f"faults.{part}." for part in walk_of(configuration).broken), f"wearer.{PERSON.name}")
     # The structures of libraries have the times behind the device.
-    wearer = (f"wearer.{item.name}" for item in (*WEARER, PERSON))
+    wearer = (f"wearer.{quantity.name}" for quantity in (*WEARER, PERSON))
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return tuple(
         Setting(
@@ -109,13 +111,16 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
     """Settings of controller and timing by path, in the order of the controller's parameters."""
     control = law_of(configuration)
     law = walking_controllers().get(configuration.controller.kind, control)
-    own = {item.name for item in law.quantities}
-    return {f"{'controller' if item.name in own else 'timing'}.{item.name}": item for item in control.quantities}
+    own = {quantity.name for quantity in law.quantities}
+    return {
+        f"{'controller' if quantity.name in own else 'timing'}.{quantity.name}": quantity
+        for quantity in control.quantities
+    }
 
 
 def links_of_walk(configuration: Scenario) -> Graph:
     """Settings of a walk that follow others as long as nobody changes them."""
-    known = {item.path: item.value for item in settings_of_walk(configuration)}
+    known = {setting.path: setting.value for setting in settings_of_walk(configuration)}
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
@@ -128,7 +133,7 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     if configuration.supply_lines is not None:
         rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure"))
     rules += _RELATIONS
-    known = {item.path for item in settings_of_walk(configuration)}
+    known = {setting.path for setting in settings_of_walk(configuration)}
     return tuple(
         Relation(c_identifier(path), relation, c_identifier(other))
         for path, relation, other in rules
@@ -153,7 +158,7 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
     # Sensors with their faults, and the longest time by which one is late.
     faults = walk_of(configuration).faults
     for sensor, fault in faults.items():
-        names = writing.section(f"faults.{sensor}", [item.name for item in fault_numbers(sensor, fault.kind)])
+        names = writing.section(f"faults.{sensor}", [quantity.name for quantity in fault_numbers(sensor, fault.kind)])
         yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
     row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
     failing_sensors = ", ".join(f"{sensor}_fault" for sensor in faults)
@@ -176,13 +181,13 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
     stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
-    given = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {add(walk_step_counts)}({given}, plant, volume, {stiffness})"
+    times = "run_duration, run_step, run_output_interval, controller_period"
+    yield f"counts_of_steps = {add(walk_step_counts)}({times}, plant, volume, {stiffness})"
     yield "needs_parts = False"
     yield from writing.timing("signal_delay")
 
     # Controller, gas and task sequence.
-    settings = {item.name: c_identifier(path) for path, item in _control(configuration).items()}
+    settings = {quantity.name: c_identifier(path) for path, quantity in _control(configuration).items()}
     yield f"controller = {writing.kind('controller', law_of(configuration), settings)}"
     yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
     yield from writing.gas()
@@ -198,7 +203,7 @@ def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
     """Lines that make the leg, the gait on it, and the plant with both."""
     # The rocker is fitted to the gait here: a fit has no place in a library.
     add, fit = writing.add, fit_rocker(walk_of(configuration).gait)
-    yield f"wearer = {writing.row('Wearer', writing.section('wearer', [item.name for item in WEARER]))}"
+    yield f"wearer = {writing.row('Wearer', writing.section('wearer', [quantity.name for quantity in WEARER]))}"
     fitted = ", ".join(map(repr, fit))
     yield f"rocker = {add(rocker_on_heel)}({fitted}, wearer_heel_lever)"
     yield f"leg = {add(leg_parameters)}(wearer, rocker)"
@@ -218,8 +223,8 @@ def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
         holds = 1.0 if kind == FROZEN else 0.0
         reading = names.get("reading", "0.0")
         return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
-    given = ", ".join(names.get(name, "0.0") for name in DISTORTING)
-    return f"{writing.add(distorting_fault)}({given}, controller_period)"
+    numbers = ", ".join(names.get(name, "0.0") for name in DISTORTING)
+    return f"{writing.add(distorting_fault)}({numbers}, controller_period)"
 
 
 def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
@@ -230,8 +235,8 @@ def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
     else:
         first = planned.timed.parts[0]
         sine, cosine = map(float, flat_foot(gait_timing(walk_of(configuration).gait)))
-        given = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
-        yield f"walk = {add(walk_from_standing)}({add(standing_on)}({given}))"
+        numbers = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
+        yield f"walk = {add(walk_from_standing)}({add(standing_on)}({numbers}))"
     yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
     filled = f"{add(writing.program.actuator.chambers)}(plant, walk.now.ankle, room, room)"
     yield f"state = {add(vented_state)}(plant, {filled}, walk.now.ankle, walk.now.ankle_rate)"

@@ -104,10 +104,10 @@ def compiler_for(name: str) -> Sequence[str]:
             # zig turns undefined behaviour into traps in what it calls a debug build.
             "-fno-sanitize=undefined",
         ]
-    found = next(filter(None, map(shutil.which, ("gcc", "clang"))), None)
+    compiler = next(filter(None, map(shutil.which, ("gcc", "clang"))), None)
     # A library of this system's gcc runs on systems that are at least as new; zig links against an old one.
-    if name == host_platform() == "linux64" and found is not None:
-        return [found, "-s"]
+    if name == host_platform() == "linux64" and compiler is not None:
+        return [compiler, "-s"]
     needed = "gcc, clang or the package ziglang" if name == "linux64" else "the package ziglang"
     raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")
 
@@ -137,20 +137,20 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     # Before anything is built: a misspelt platform should not cost a compilation.
     chosen = {}
     for name in platforms:
-        found = PLATFORMS.get(name)
-        if found is None:
+        platform = PLATFORMS.get(name)
+        if platform is None:
             hint = nearest_name(name, PLATFORMS)
             raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
-        if fmi == 2 and found.folder_2 is None:
+        if fmi == 2 and platform.folder_2 is None:
             raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
-        chosen[name] = found
+        chosen[name] = platform
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
     # The token is the hash of the sources before it stands in them.
     sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
     main = f"fmi{fmi}.c"
-    tried = "".join(f"<tr><td>{name}</td><td>{item.tried}</td></tr>" for name, item in chosen.items())
+    tried = "".join(f"<tr><td>{name}</td><td>{library.tried}</td></tr>" for name, library in chosen.items())
     words = {
         "title": html.escape(interface.name),
         "description": html.escape(interface.library.description),
@@ -169,18 +169,18 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     }
     if fmi == 3:
         contents["sources/buildDescription.xml"] = build_description_of_fmi3(identifier, " ".join(FLAGS[1:]))
-    for name, item in chosen.items():
-        folder = item.folder_2 if fmi == 2 else item.folder_3
-        contents[f"binaries/{folder}/{identifier}{item.suffix}"] = build(name, sources, main)
+    for name, library in chosen.items():
+        folder = library.folder_2 if fmi == 2 else library.folder_3
+        contents[f"binaries/{folder}/{identifier}{library.suffix}"] = build(name, sources, main)
     return {f"{identifier}.fmu": _archive(contents)}
 
 
-def closed_loop(item: Scenario) -> Interface:
+def closed_loop(scenario: Scenario) -> Interface:
     """The whole scenario or walk, its controller within: no inputs."""
-    library = library_of(item)
+    library = library_of(scenario)
     times = {setting.path: setting.value for setting in library.settings}
     return Interface(
-        name=item.name,
+        name=scenario.name,
         library=library,
         templates=("stepped.c", "closed_loop.c"),
         time=_LOOP_TIME,
@@ -202,7 +202,7 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
     library = interface.library
     name = library.name
     written = library_files(library)
-    paths = "\n".join(f'    "{item.path}",' for item in library.settings)
+    paths = "\n".join(f'    "{setting.path}",' for setting in library.settings)
     words = {
         "name": name,
         "NAME": name.upper(),
@@ -210,8 +210,8 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         "version": __version__,
         "input_count": str(len(interface.inputs)),
         "paths": paths,
-        "changes": "".join(change_of(interface, item) for item in library.settings),
-        "first_inputs": ", ".join([*(repr(item.start) for item in interface.inputs), "0.0"]),
+        "changes": "".join(change_of(interface, setting) for setting in library.settings),
+        "first_inputs": ", ".join([*(repr(variable.start) for variable in interface.inputs), "0.0"]),
         "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),
         "token": "@token@",
         "has_clock": "true" if interface.clock else "false",
@@ -235,11 +235,11 @@ def _archive(contents: Mapping[str, bytes]) -> bytes:
     target = io.BytesIO()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in contents.items():
-            item = zipfile.ZipInfo(name, _FIRST_DAY)
-            item.compress_type = zipfile.ZIP_DEFLATED
+            entry = zipfile.ZipInfo(name, _FIRST_DAY)
+            entry.compress_type = zipfile.ZIP_DEFLATED
             # Permissions of Unix in the upper half; a library must be executable for some tools.
-            item.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            archive.writestr(item, content)
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(entry, content)
     return target.getvalue()
 
 
@@ -250,15 +250,15 @@ PLANT_TIME = (
 PLANT_TUNING = "They are taken at the next communication step."
 
 
-def plant_alone(item: Scenario) -> Interface:
+def plant_alone(scenario: Scenario) -> Interface:
     """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
     """
-    alone = surfaced(plant_of(item))
+    alone = surfaced(plant_of(scenario))
     library = alone.library
-    given = ", ".join(f"inputs[{place}]" for place in range(len(alone.inputs)))
-    numbers = {name.name: f"inputs[{place}]" for place, name in enumerate(alone.inputs)}
+    inputs = ", ".join(f"inputs[{index}]" for index in range(len(alone.inputs)))
+    numbers = {name.name: f"inputs[{index}]" for index, name in enumerate(alone.inputs)}
     return Interface(
         name=library.title,
         library=library,
@@ -266,7 +266,7 @@ def plant_alone(item: Scenario) -> Interface:
         time=PLANT_TIME.format(motion=alone.motion),
         tuning=PLANT_TUNING,
         step=alone.step,
-        duration=item.run.duration,
+        duration=scenario.run.duration,
         outputs=library.program.outputs,
         shows_metrics=False,
         is_step_fixed=True,
@@ -274,7 +274,7 @@ def plant_alone(item: Scenario) -> Interface:
         hidden=alone.hidden,
         inputs=alone.inputs,
         words={
-            "inputs": given,
+            "inputs": inputs,
             "follow": follow_lines(alone, "settings", numbers),
             "checked": "the limits of the inputs, inertia, volumes and areas",
         },

@@ -80,18 +80,20 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
     library = interface.library
     first_metric = len(library.settings) + len(library.program.outputs)
     first_input = first_metric + len(library.program.metrics)
-    found = []
-    for number, item in enumerate(interface.library.settings):
-        change, quantity = change_of(interface, item), item.quantity
+    variables = []
+    for number, setting in enumerate(interface.library.settings):
+        change, quantity = change_of(interface, setting), setting.quantity
         if change == "h":
             continue
         # The largest floats stand for no limit; XML would show them as one.
         low, high = (limit if abs(limit) < 1e308 else None for limit in (quantity.minimum, quantity.maximum))
         said = quantity.summary or quantity.name
         kind = "tunable" if change == "t" else "fixed"
-        found.append(Variable(item.path, number, quantity.unit, said, "parameter", kind, item.value, low, high))
+        variables.append(
+            Variable(setting.path, number, quantity.unit, said, "parameter", kind, setting.value, low, high)
+        )
     return (
-        *found,
+        *variables,
         *(
             Variable(name, len(library.settings) + place, *OUTPUTS[name], "output", variability_of(name))
             for place, name in enumerate(library.program.outputs)
@@ -103,17 +105,17 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
         ),
         *(
             Variable(
-                item.name,
+                variable.name,
                 first_input + place,
-                item.unit,
-                item.summary,
+                variable.unit,
+                variable.summary,
                 "input",
                 "continuous",
-                item.start,
-                item.minimum,
-                item.maximum,
+                variable.start,
+                variable.minimum,
+                variable.maximum,
             )
-            for place, item in enumerate(interface.inputs)
+            for place, variable in enumerate(interface.inputs)
         ),
     )
 
@@ -163,11 +165,11 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
     _add_units_and_experiment(root, interface, variables)
     table = Xml.SubElement(root, "ModelVariables")
     # FMI 2 counts variables by their place in the list, from 1.
-    places = {item.number: place for place, item in enumerate(variables, start=1)}
-    for item in variables:
-        of_variable, of_number = _attributes(item)
+    places = {variable.number: place for place, variable in enumerate(variables, start=1)}
+    for variable in variables:
+        of_variable, of_number = _attributes(variable)
         Xml.SubElement(Xml.SubElement(table, "ScalarVariable", of_variable), "Real", of_number)
-    outputs = [places[item.number] for item in variables if item.causality == "output"]
+    outputs = [places[variable.number] for variable in variables if variable.causality == "output"]
     structure = Xml.SubElement(root, "ModelStructure")
     # Outputs of a step depend on no input of that instant.
     for name, known in (("Outputs", {"dependencies": ""}), ("InitialUnknowns", {})):
@@ -197,17 +199,17 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
     _add_units_and_experiment(root, interface, variables)
     table = Xml.SubElement(root, "ModelVariables")
     # Clock and time get numbers behind all variables of the C.
-    first = 1 + max(item.number for item in variables)
+    first = 1 + max(variable.number for variable in variables)
     if interface.clock is not None:
         clock = {"valueReference": str(first), "description": interface.clock, "causality": "output"}
         Xml.SubElement(table, "Clock", {"name": "controller.clock", **clock, "intervalVariability": "triggered"})
     time = {"name": "time", "valueReference": str(first + 1), "description": "time", "causality": "independent"}
     Xml.SubElement(table, "Float64", {**time, "variability": "continuous", "unit": "s"})
-    for item in variables:
-        of_variable, of_number = _attributes(item)
+    for variable in variables:
+        of_variable, of_number = _attributes(variable)
         Xml.SubElement(table, "Float64", of_variable | of_number)
     structure = Xml.SubElement(root, "ModelStructure")
-    outputs = [item.number for item in variables if item.causality == "output"]
+    outputs = [variable.number for variable in variables if variable.causality == "output"]
     outputs += [] if interface.clock is None else [first]
     for name, known in {"Output": {"dependencies": ""}, "InitialUnknown": {}}.items():
         for number in outputs:
@@ -237,19 +239,19 @@ def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
     }
 
 
-def _attributes(item: Variable) -> tuple[dict[str, str], dict[str, str]]:
+def _attributes(variable: Variable) -> tuple[dict[str, str], dict[str, str]]:
     """Attributes of a variable, and of the number that it is."""
-    initial = {"parameter": {"initial": "exact"}, "input": {}}.get(item.causality, {"initial": "calculated"})
+    initial = {"parameter": {"initial": "exact"}, "input": {}}.get(variable.causality, {"initial": "calculated"})
     of_variable = {
-        "name": item.name,
-        "valueReference": str(item.number),
-        "description": item.summary,
-        "causality": item.causality,
-        "variability": item.variability,
+        "name": variable.name,
+        "valueReference": str(variable.number),
+        "description": variable.summary,
+        "causality": variable.causality,
+        "variability": variable.variability,
         **initial,
     }
-    limits = {"min": item.minimum, "max": item.maximum, "start": item.start}
-    unit = _shown(item.unit)
+    limits = {"min": variable.minimum, "max": variable.maximum, "start": variable.start}
+    unit = _shown(variable.unit)
     of_number = {"unit": unit} if unit else {}
     if unit in DISPLAY_UNITS:
         of_number["displayUnit"] = DISPLAY_UNITS[unit]
@@ -266,7 +268,7 @@ def _shown(unit: str) -> str:
 def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables: Iterable[Variable]) -> None:
     """Add what stands between the kind of a unit and its variables, in FMI 2 and 3 alike."""
     table = Xml.SubElement(root, "UnitDefinitions")
-    for name in sorted({_shown(item.unit) for item in variables} - {""}):
+    for name in sorted({_shown(variable.unit) for variable in variables} - {""}):
         exponents = {BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}
         unit = Xml.SubElement(table, "Unit", name=name)
         Xml.SubElement(unit, "BaseUnit", exponents)
@@ -275,8 +277,8 @@ def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables
             Xml.SubElement(unit, "DisplayUnit", name=DISPLAY_UNITS[name], factor=repr(factor))
     categories = Xml.SubElement(root, "LogCategories")
     Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
-    given = {"startTime": 0.0, "stopTime": interface.duration, "stepSize": interface.step}
-    Xml.SubElement(root, "DefaultExperiment", {name: repr(value) for name, value in given.items()})
+    times = {"startTime": 0.0, "stopTime": interface.duration, "stepSize": interface.step}
+    Xml.SubElement(root, "DefaultExperiment", {name: repr(value) for name, value in times.items()})
 
 
 def _text(root: Xml.Element) -> bytes:

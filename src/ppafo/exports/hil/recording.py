@@ -185,13 +185,13 @@ class Collector:
         self._drop_stray()
         kept: list[int] = []
         times: list[int] = []
-        for place in np.argsort(np.array(self._numbers), kind="stable").tolist():
-            moment = self._stamps[place] if not times else times[-1] + _difference(self._stamps[place], times[-1])
+        for index in np.argsort(np.array(self._numbers), kind="stable").tolist():
+            moment = self._stamps[index] if not times else times[-1] + _difference(self._stamps[index], times[-1])
             if times and moment <= times[-1]:
                 self.ignored["of a clock that went back"] += 1
                 continue
             times.append(moment)
-            kept.append(place)
+            kept.append(index)
         counts = np.array(self._counts).reshape(len(self), -1)[kept]
         channels = {
             name: Channel(column / wire.counts_per_unit(name), KNOWN[name].unit)
@@ -213,15 +213,15 @@ class Collector:
         fresh = sorted(range(self._kept, len(self)), key=self._numbers.__getitem__)
         self._kept = len(self)
         width = len(self._names)
-        for place in fresh:
-            number, stamp = self._numbers[place], self._stamps[place]
+        for index in fresh:
+            number, stamp = self._numbers[index], self._stamps[index]
             before, stamp_before, elapsed = self._last_kept or (number, stamp, 0)
             step = _difference(stamp, stamp_before)
             if self._last_kept is not None and (number <= before or step <= 0):
                 continue
             elapsed += step
             self._last_kept = (number, stamp, elapsed)
-            counts = self._counts[place * width : (place + 1) * width]
+            counts = self._counts[index * width : (index + 1) * width]
             values = map(wire.value_of, self._names, counts)
             lines.append(",".join([repr(elapsed / wire.MICROSECONDS), *map(repr, values)]) + "\n")
         return "".join(lines)

@@ -162,7 +162,7 @@ class Reader:
         """The good packets in what came in, and in what was waiting for it."""
         if not self.is_stream:
             return self._datagram(data)
-        found: list[Packet] = []
+        packets: list[Packet] = []
         waiting = self._waiting + data
         while True:
             at = waiting.find(MARK)
@@ -183,10 +183,10 @@ class Reader:
                 # Only the mark is dropped: a good packet may begin inside what looked like another one.
                 waiting = waiting[len(MARK) :]
             else:
-                found.append(packet)
+                packets.append(packet)
                 waiting = waiting[waiting[4] :]
         self._waiting = waiting[at:]
-        return found
+        return packets
 
     def _datagram(self, data: bytes) -> list[Packet]:
         if not data.startswith(MARK):
@@ -378,22 +378,22 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
 
     ScenarioError, in one line, for a text that is none, and for a port that is not there.
     """
-    kind, _, place = text.partition(":")
+    kind, _, address = text.partition(":")
     if kind == "udp":
-        return _open_udp(text, place, listens)
-    if kind == "serial" and place:
+        return _open_udp(text, address, listens)
+    if kind == "serial" and address:
         try:
             import serial
         except ImportError as error:
             raise ScenarioError(f"--port {text}: a serial port needs pyserial: pip install 'ppafo[hil]'") from error
         try:
-            device = serial.Serial(place, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
+            device = serial.Serial(address, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
             device.reset_input_buffer()
         except _errors_of_ports() as error:
             # pyserial writes the number and the words of the system twice, and names an ioctl that no user knows.
             number = error.errno if isinstance(error, OSError) else None
             why = one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
-            if place and Path(place).exists() and not _is_terminal(place):
+            if address and Path(address).exists() and not _is_terminal(address):
                 why = "it is no serial port"
             raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {why}") from error
         return SerialPort(device)
@@ -409,13 +409,13 @@ def _errors_of_ports() -> tuple[type[Exception], ...]:
     return (OSError, ValueError, OverflowError, termios.error)
 
 
-def _is_terminal(place: str) -> bool:
+def _is_terminal(address: str) -> bool:
     """Tell whether a path is a serial port, or may be one as far as this user can see."""
-    if os.name != "posix" or not os.access(place, os.R_OK | os.W_OK):
+    if os.name != "posix" or not os.access(address, os.R_OK | os.W_OK):
         return True
-    if not Path(place).is_char_device():
+    if not Path(address).is_char_device():
         return False
-    file = os.open(place, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    file = os.open(address, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:
         return os.isatty(file)
     finally:
@@ -428,8 +428,8 @@ def _open_udp(text: str, place: str, listens: bool) -> UdpPort:
         raise ScenarioError(f"--port {one_line(text)}: must be udp:HOST:PORT with a port from 1 to {_HIGHEST_PORT}")
     own = None
     try:
-        found = socket.getaddrinfo(host.strip("[]"), int(number), type=socket.SOCK_DGRAM)
-        family, kind, protocol, _, address = found[0]
+        addresses = socket.getaddrinfo(host.strip("[]"), int(number), type=socket.SOCK_DGRAM)
+        family, kind, protocol, _, address = addresses[0]
         own = socket.socket(family, kind, protocol)
         if listens:
             own.bind(address)

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError
+from ppafo.errors import DataError, count_of
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
@@ -155,7 +155,7 @@ def force_of_plates(
     total: Signal | None = None
     chosen = []
     for table in tables:
-        for name in [item for item in names if item in table.columns]:
+        for name in [column for column in names if column in table.columns]:
             values, _ = CurveColumns("vertical_force.unit", table, ((1.0, name),), True).in_unit(None, ("N",))
             plate = with_absence(Signal(table.file, table.time, values / (body_mass * STANDARD_GRAVITY)))
             own = [contact for contact in contacts_of(plate) if _is_own(contact, plate, shank)]
@@ -279,7 +279,9 @@ _COVERED = 0.9
 def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
     """Return the strides that lie within a signal, to half a sample."""
     slack = 0.5 / signal.rate
-    return [item for item in strides if item.start >= signal.time[0] - slack and item.end <= signal.time[-1] + slack]
+    return [
+        stride for stride in strides if stride.start >= signal.time[0] - slack and stride.end <= signal.time[-1] + slack
+    ]
 
 
 LEAST_STRIDES = 2
@@ -308,18 +310,18 @@ def find_footfalls(
 ) -> Footfalls:
     """Return the strides of a walk: from the force where it has enough of them, else from where there are more."""
     least = given_least or LEAST_STRIDES
-    found = _of_walk(walk, tables, side, least)
-    usable = usable_strides(walk, found.strides)
-    if len(usable) >= (1 if found.is_overground else least) or least > LEAST_STRIDES:
-        return found
+    footfalls = _of_walk(walk, tables, side, least)
+    usable = usable_strides(walk, footfalls.strides)
+    if len(usable) >= (1 if footfalls.is_overground else least) or least > LEAST_STRIDES:
+        return footfalls
     cycle = wrap_cycle(walk)
     if cycle is None:
-        return found
+        return footfalls
     # Three cycles in a row have one whole stride in the middle, wherever the record begins.
     again = _of_walk(cycle.walk, (), side, 1)
     whole = usable_strides(cycle.walk, again.strides)
     if not whole:
-        return found
+        return footfalls
     span = walk[SHANK].time[-1] - walk[SHANK].time[0]
     said = (
         f"one cycle that wraps around: {span:.3g} s of data around a stride of {cycle.period:.4g} s, whose start and "
@@ -330,7 +332,7 @@ def find_footfalls(
 
 def usable_strides(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[Stride]:
     """Return the strides over which both angles were recorded."""
-    return [item for item in strides if all(strides_within(walk[name], [item]) for name in REQUIRED)]
+    return [stride for stride in strides if all(strides_within(walk[name], [stride]) for name in REQUIRED)]
 
 
 def _of_walk(walk: Mapping[str, Signal], tables: Sequence[MotionTable], side: Side, least: int) -> Footfalls:
@@ -374,20 +376,20 @@ def _strides_of_file(tables: Sequence[MotionTable], side: Side) -> list[Stride]:
 def _by_contacts(strides: list[Stride], contacts: Sequence[Contact]) -> tuple[list[Stride], str]:
     """Return strides from the shank, whose strikes and toe-offs are moved by what contacts on plates show."""
     early = [
-        (start - item.start, end - item.toe_off)
-        for item in strides
+        (start - stride.start, end - stride.toe_off)
+        for stride in strides
         for start, end in contacts
         if start is not None and end is not None
-        if abs(start - item.start) < _NEAR and abs(end - item.toe_off) < _NEAR
+        if abs(start - stride.start) < _NEAR and abs(end - stride.toe_off) < _NEAR
     ]
     if not early:
         return strides, "strides from the shank, which no plate corrects: heel strikes and toe-offs are less exact"
     # Strikes and toe-offs of the shank are early or late by one time for a person, which the plates show.
     strike, off = (float(np.mean(values)) for values in zip(*early, strict=True))
-    moved = [Stride(item.start + strike, item.toe_off + off, item.end + strike) for item in strides]
+    moved = [Stride(stride.start + strike, stride.toe_off + off, stride.end + strike) for stride in strides]
     return moved, (
         f"few contacts on plates: strides from the shank, its strikes moved by {1000.0 * strike:.0f} ms and its "
-        f"toe-offs by {1000.0 * off:.0f} ms as {len(early)} contact{'' if len(early) == 1 else 's'} on plates show"
+        f"toe-offs by {1000.0 * off:.0f} ms as {count_of(len(early), 'contact')} on plates show"
     )
 
 
@@ -397,14 +399,14 @@ def strides_of_curve(footfalls: Footfalls, name: str, signal: Signal, strides: S
     if name not in LOADS or not (footfalls.is_overground or signal.absent is not None):
         return inside
     covered = []
-    for item in inside:
-        slack = _ABOUT_STANCE * item.time
-        stance = (signal.time >= item.start + slack) & (signal.time <= item.toe_off - slack)
+    for stride in inside:
+        slack = _ABOUT_STANCE * stride.time
+        stance = (signal.time >= stride.start + slack) & (signal.time <= stride.toe_off - slack)
         if not stance.any() or (signal.absent is not None and bool(signal.absent[stance].any())):
             continue
         values = signal.values[stance]
         there = values > UNLOADED if name == FORCE else values != 0.0
         # Overground the foot may have been on the plate for a part of the stance only.
         if not footfalls.is_overground or float(np.mean(there)) >= _COVERED:
-            covered.append(item)
+            covered.append(stride)
     return covered

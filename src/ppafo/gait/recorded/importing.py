@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.errors import DataError, PpafoError, count_of, noted_in, raise_noted
 from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
@@ -90,11 +90,11 @@ def statistics(name: str, signal: Signal, strides: Sequence[Stride]) -> CurveSta
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(signal.time, signal.values)
-    at = [np.clip(item.start + item.time * PHASES, signal.time[0], signal.time[-1]) for item in strides]
+    at = [np.clip(stride.start + stride.time * PHASES, signal.time[0], signal.time[-1]) for stride in strides]
     curves = np.array([spline(times) for times in at]).reshape(-1, SAMPLES)
     if signal.is_position and strides:
         pairs = zip(curves, strides, strict=True)
-        curves = np.array([acceleration_of(way, HARMONICS[name], item.time) for way, item in pairs])
+        curves = np.array([acceleration_of(way, HARMONICS[name], stride.time) for way, stride in pairs])
     return over_strides(name, curves, strides)
 
 
@@ -108,7 +108,7 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
     mean = curves.mean(axis=0)
     deviation = curves.std(axis=0, ddof=1) if len(strides) > 1 else np.zeros(SAMPLES)
     if name == "centre_of_pressure":
-        fraction = float(np.mean([item.stance_share for item in strides]))
+        fraction = float(np.mean([stride.stance_share for stride in strides]))
         # Without its ends: where hardly any force acts its place has no meaning.
         inside = (PHASES > _UNLOADED_FORCE) & (fraction - _UNLOADED_FORCE > PHASES)
         at, first = PHASES[inside], float(mean[inside][0])
@@ -128,9 +128,9 @@ class Strides:
 
     def without(self, odd: Sequence[Stride], why: str, else_refused: str = "") -> "Strides":
         """Return these without some; where too few remain all stay, or DataError with the words for that case."""
-        kept = tuple(item for item in self.taken if item not in odd)
+        kept = tuple(stride for stride in self.taken if stride not in odd)
         if len(kept) >= self.least:
-            return Strides(kept, (*self.left_out, *((item, why) for item in odd)), self.least)
+            return Strides(kept, (*self.left_out, *((stride, why) for stride in odd)), self.least)
         if else_refused:
             raise DataError(else_refused)
         return self
@@ -141,10 +141,12 @@ def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
     if not strides:
         return Strides((), (), least)
     # The median: one stop among ten strides would move a mean.
-    median = float(np.median([item.time for item in strides]))
-    kept = [item for item in strides if abs(item.time - median) <= LARGEST_STRIDE_CHANGE * median]
-    why = "{:.3g} s long, the others are about " + f"{np.mean([item.time for item in kept]):.3g} s"
-    return Strides(tuple(kept), tuple((item, why.format(item.time)) for item in strides if item not in kept), least)
+    median = float(np.median([stride.time for stride in strides]))
+    kept = [stride for stride in strides if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
+    why = "{:.3g} s long, the others are about " + f"{np.mean([stride.time for stride in kept]):.3g} s"
+    return Strides(
+        tuple(kept), tuple((stride, why.format(stride.time)) for stride in strides if stride not in kept), least
+    )
 
 
 LONGEST_HELD = 0.1
@@ -175,10 +177,10 @@ def without_drop_outs(
     for name, signal in walk.items():
         table = by_file[signal.file]
         # Between the times of a span a column of this curve moves all the time.
-        spans = [(item.start, item.end) for item in strides.taken]
+        spans = [(stride.start, stride.end) for stride in strides.taken]
         if name in LOADS:
-            loaded = [(item, _ABOUT_STANCE * item.time) for item in covered[name]]
-            spans = [(item.start + slack, item.toe_off - slack) for item, slack in loaded]
+            loaded = [(stride, _ABOUT_STANCE * stride.time) for stride in covered[name]]
+            spans = [(stride.start + slack, stride.toe_off - slack) for stride, slack in loaded]
         columns = [(column, table.columns[column]) for column in signal.columns]
         if name in LOADS and len(columns) > 1:
             # Plates that are summed rest in turn, so their sum is looked at.
@@ -188,7 +190,7 @@ def without_drop_outs(
                 what = f"column {column!r} of {name} keeps one value from {start:.4g} to {end:.4g} s"
                 with noted_in(wrong):
                     strides = strides.without(
-                        [item for item in strides.taken if item.start < end and start < item.end],
+                        [stride for stride in strides.taken if stride.start < end and start < stride.end],
                         f"{what}: a drop-out was filled with it",
                         f"{table.file}: {what} while the wearer walks: a drop-out was filled with it; cut the file "
                         "there and give the longer part",
@@ -203,13 +205,13 @@ def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float
         return []
     starts, ends = np.concatenate([[0], moves + 1]), np.concatenate([moves, [values.size - 1]])
     long = time[ends] - time[starts] > LONGEST_HELD
-    found = []
+    stretches = []
     for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
         start, end = float(time[first]), float(time[last])
         inside = sum(max(0.0, min(end, high) - max(start, low)) for low, high in spans)
         if inside > LONGEST_HELD and not _by_coarse_steps(values, first, last):
-            found.append((start, end))
-    return found
+            stretches.append((start, end))
+    return stretches
 
 
 ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
@@ -223,19 +225,19 @@ _MOST_ODD = 0.4
 
 def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) -> Strides:
     """Leave out strides whose curve is unlike all others: a stumble, a turn, markers that were exchanged."""
-    for name, item in curves.items():
-        if len(item.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
+    for name, curve in curves.items():
+        if len(curve.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
             continue
-        middle = np.median(item.curves, axis=0)
+        middle = np.median(curve.curves, axis=0)
         # From the median curve, which one odd stride does not move.
-        away = np.abs(item.curves - middle)
-        is_odd = np.zeros(len(item.strides), dtype=bool)
+        away = np.abs(curve.curves - middle)
+        is_odd = np.zeros(len(curve.strides), dtype=bool)
         for share, distances in ((ODD_SHAPE, np.sqrt(np.mean(away**2, axis=1))), (ODD_PHASE, np.max(away, axis=1))):
             # Both a fraction of the range and a multiple of the usual distance: impaired strides differ, but all of
             # them.
             is_odd |= distances > max(share * np.ptp(middle), ODD_AGAINST_OTHERS * np.median(distances))
-        odd = [stride for stride, is_it in zip(item.strides, is_odd.tolist(), strict=True) if is_it]
-        if len(odd) <= _MOST_ODD * len(item.strides):
+        odd = [stride for stride, is_it in zip(curve.strides, is_odd.tolist(), strict=True) if is_it]
+        if len(odd) <= _MOST_ODD * len(curve.strides):
             strides = strides.without(
                 [stride for stride in odd if stride in strides.taken], f"{name} is unlike all others"
             )
@@ -278,27 +280,27 @@ def check_scatter(
     raise_noted(
         [
             DataError(
-                f"{walk[item.name].file}: {_statement(item)}; at most {100.0 * REFUSED_SPREAD:.0f} % and "
+                f"{walk[scatter.name].file}: {_statement(scatter)}; at most {100.0 * REFUSED_SPREAD:.0f} % and "
                 f"{100.0 * REFUSED_MISFIT:.0f} % are accepted; {_REMEDY}"
             )
-            for item in _scatters(curves, errors)
-            if item.spread > REFUSED_SPREAD or item.misfit > REFUSED_MISFIT
+            for scatter in _scatters(curves, errors)
+            if scatter.spread > REFUSED_SPREAD or scatter.misfit > REFUSED_MISFIT
         ]
     )
 
 
-def _statement(item: _Scatter) -> str:
+def _statement(scatter: _Scatter) -> str:
     return (
-        f"{item.name} differs between strides by {100.0 * item.spread:.0f} % of its range and its series misses "
-        f"{100.0 * item.misfit:.1f} % (standard deviation, root mean square)"
+        f"{scatter.name} differs between strides by {100.0 * scatter.spread:.0f} % of its range and its series misses "
+        f"{100.0 * scatter.misfit:.1f} % (standard deviation, root mean square)"
     )
 
 
 def _scatters(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> Iterator[_Scatter]:
-    for name, item in curves.items():
-        moved = float(np.ptp(item.mean))
+    for name, curve in curves.items():
+        moved = float(np.ptp(curve.mean))
         if moved > 0.0:
-            yield _Scatter(name, item.spread / moved, errors[name].root_mean_square / moved)
+            yield _Scatter(name, curve.spread / moved, errors[name].root_mean_square / moved)
 
 
 _SAME = 0.02
@@ -346,7 +348,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
         columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
     mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
-    names = [name.removeprefix("-") for item in mapped if item is not None for name in column_names(item)]
+    names = [name.removeprefix("-") for mapping in mapped if mapping is not None for name in column_names(mapping)]
     # Only the columns in use: a gap elsewhere needs no word.
     tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, person, settings.columns is None, wrong)
@@ -472,11 +474,11 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         footfalls = find_footfalls(walk, source.tables, settings.side, settings.least_strides)
     if footfalls is None:
         raise_noted(wrong)
-    walk, events, found = footfalls.walk, footfalls.events, footfalls.strides
+    walk, events, cut = footfalls.walk, footfalls.events, footfalls.strides
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
-    strides = of_usual_time(usable_strides(walk, found), least)
+    strides = of_usual_time(usable_strides(walk, cut), least)
     with noted_in(wrong):
-        _check_enough(strides, found, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
+        _check_enough(strides, cut, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
     if not strides.taken:
         raise_noted(wrong)
     covered = {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
@@ -489,12 +491,12 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     # Footfalls come from the unfiltered force, whose edges a low pass would move.
     smooth = walk if settings.low_pass is None else {n: low_pass(s, settings.low_pass) for n, s in walk.items()}
     curves = {
-        name: statistics(name, signal, [item for item in covered[name] if item in strides.taken])
+        name: statistics(name, signal, [stride for stride in covered[name] if stride in strides.taken])
         for name, signal in smooth.items()
     }
     strides = without_odd_shapes(curves, strides)
-    for name, item in list(curves.items()):
-        kept = [stride in strides.taken for stride in item.strides]
+    for name, curve in list(curves.items()):
+        kept = [stride in strides.taken for stride in curve.strides]
         if not any(kept):
             signal = walk[name]
             wrong.append(
@@ -507,7 +509,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
             del curves[name]
         elif not all(kept):
             curves[name] = over_strides(
-                name, item.curves[kept], [stride for stride in item.strides if stride in strides.taken]
+                name, curve.curves[kept], [stride for stride in curve.strides if stride in strides.taken]
             )
     missing = [f"{name} is left out: in no whole stride was it measured throughout the stance" for name in unmeasured]
     remarks = [*source.remarks, *footfalls.remarks, *missing]
@@ -527,9 +529,12 @@ def _finish(
 ) -> ImportedGait:
     """Return the gait of mean curves that legs can have; DataError where any cannot, with everything in ``wrong``."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
-    share, time = float(np.mean([item.stance_share for item in taken])), float(np.mean([item.time for item in taken]))
-    means = {name: item.mean for name, item in curves.items()}
-    fitted = {name: fit_curve(item.mean, HARMONICS[name], item.spread) for name, item in curves.items()}
+    share, time = (
+        float(np.mean([stride.stance_share for stride in taken])),
+        float(np.mean([stride.time for stride in taken])),
+    )
+    means = {name: curve.mean for name, curve in curves.items()}
+    fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     files = {name: signal.file for name, signal in walk.items()}
     mean_stride = MeanStride(files, means, share, time, signs_from, _is_one_marker(source.columns.knee))
@@ -557,15 +562,15 @@ def _finish(
     said += zero_remarks(tilt, f"--ankle-neutral '{neutral}', or ankle_angle.neutral in a gait map, corrects it")
     # A line on each curve that scatters more than a steady walk does.
     said += [
-        f"{_statement(item)}: that is noise, or the walk is not steady; {_REMEDY}"
-        for item in _scatters(curves, errors)
-        if item.spread > REMARKED_SPREAD or item.misfit > REMARKED_MISFIT
+        f"{_statement(scatter)}: that is noise, or the walk is not steady; {_REMEDY}"
+        for scatter in _scatters(curves, errors)
+        if scatter.spread > REMARKED_SPREAD or scatter.misfit > REMARKED_MISFIT
     ]
     names = tuple(table.file for table in source.tables)
     return ImportedGait(
         gait,
         taken,
-        tuple(item for item, _ in strides.left_out),
+        tuple(stride for stride, _ in strides.left_out),
         curves,
         errors,
         footfalls.events,
@@ -582,15 +587,15 @@ def _is_one_marker(knee: KneeMap | None) -> bool:
     return forward == up != ""
 
 
-def _check_enough(strides: Strides, found: list[Stride], walk: Mapping[str, Signal]) -> None:
+def _check_enough(strides: Strides, usable: list[Stride], walk: Mapping[str, Signal]) -> None:
     taken, least = len(strides.taken), strides.least
     if taken >= least:
         return
-    spans = ", ".join(f"{name} {item.time[0]:.4g} to {item.time[-1]:.4g} s" for name, item in walk.items())
-    count = f"{taken} whole stride{'' if taken == 1 else 's'}"
+    spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
+    count = count_of(taken, "whole stride")
     where = list(walk)[-1]
     events = (
-        f"{len(found)} in the events" if found else f"no heel strikes were found in {where}: is it the right column?"
+        f"{len(usable)} in the events" if usable else f"no heel strikes were found in {where}: is it the right column?"
     )
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
@@ -619,10 +624,10 @@ def _gait(
         body_mass=settings.body_mass or 0.0,
         stature=settings.stature,
         walking_speed=settings.walking_speed,
-        stride_time=float(np.mean([item.time for item in strides])),
-        stance_share=float(np.mean([item.stance_share for item in strides])),
-        stride_time_deviation=_spread([item.time for item in strides]),
-        stance_share_deviation=_spread([item.stance_share for item in strides]),
+        stride_time=float(np.mean([stride.time for stride in strides])),
+        stance_share=float(np.mean([stride.stance_share for stride in strides])),
+        stride_time_deviation=_spread([stride.time for stride in strides]),
+        stance_share_deviation=_spread([stride.stance_share for stride in strides]),
         strides=len(strides),
         shank_angle=curves["shank_angle"],
         ankle_angle=curves["ankle_angle"],
@@ -656,7 +661,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     force = walk.get("vertical_force")
     if force is None:
         return said
-    spans = [(item.toe_off, item.end, _WITHIN_SWING * (item.end - item.toe_off)) for item in strides]
+    spans = [(stride.toe_off, stride.end, _WITHIN_SWING * (stride.end - stride.toe_off)) for stride in strides]
     # Only the middle of the swing: at its ends the foot may still be on the plate.
     swings = [force.values[(force.time > off + slack) & (force.time < end - slack)] for off, end, slack in spans]
     scatter = max((float(np.std(values)) for values in swings if values.size > 1), default=0.0)
@@ -669,11 +674,13 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
 
 
 def _remarks(curves: Mapping[str, CurveStatistics], strides: Strides, events: str) -> list[str]:
-    remarks = [f"stride from {item.start:.4g} to {item.end:.4g} s left out: {why}" for item, why in strides.left_out]
+    remarks = [
+        f"stride from {stride.start:.4g} to {stride.end:.4g} s left out: {why}" for stride, why in strides.left_out
+    ]
     remarks += [
-        f"{name} covers {len(item.strides)} of {len(strides.taken)} strides"
-        for name, item in curves.items()
-        if len(item.strides) < len(strides.taken)
+        f"{name} covers {len(curve.strides)} of {len(strides.taken)} strides"
+        for name, curve in curves.items()
+        if len(curve.strides) < len(strides.taken)
     ]
     if "vertical_force" in curves:
         return remarks + force_remarks(curves["vertical_force"].mean)

@@ -156,14 +156,14 @@ def _marker_columns(markers: Sequence[str | None], forward: str, vertical: str) 
 
 def unsaid_axes(columns: GaitMap) -> list[str]:
     """Return which way was taken for markers whose map does not say the axis along the walk, or the one upwards."""
-    found = []
+    axes = []
     for name, mapped in (("shank_angle", columns.shank_angle), ("ankle_angle", columns.ankle_angle)):
         unsaid = [key for key in ("forward", "vertical") if key not in mapped.model_fields_set]
         if mapped.terms is None and unsaid:
             said = " and ".join(f'{key} = "{getattr(mapped, key)}"' for key in unsaid)
             verb = "is" if len(unsaid) == 1 else "are"
-            found.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {said} {verb} assumed")
-    return found
+            axes.append(f"the gait map does not say {' and '.join(unsaid)} of {name}: {said} {verb} assumed")
+    return axes
 
 
 Side = Literal["right", "left"]

@@ -40,7 +40,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
     # Any form may know the suffix: forms of other packages are loaded before it is refused.
     FORMS.load_all()
     # Forms of other packages are asked first: a user who installs one wants it for his files.
-    forms = sorted(FORMS.loaded().values(), key=lambda item: FORMS.is_own(item.name))
+    forms = sorted(FORMS.loaded().values(), key=lambda form: FORMS.is_own(form.name))
     suffix = Path(path).suffix.lower()
     for form in forms:
         if suffix in form.suffixes and form.recognises(path):
@@ -71,16 +71,18 @@ def find_convention(tables: Sequence[MotionTable], side: Side, body_mass: float)
         raise DataError(
             f"the files have different formats ({', '.join(names)}); name the columns of all of them in a gait map"
         )
-    found = [FORMS[table.form].convention(table, side, body_mass) for table in tables]
+    conventions = [FORMS[table.form].convention(table, side, body_mass) for table in tables]
     # One convention for all files: each curve is from the first file that has its columns.
     columns = {}
     for name in GaitMap.model_fields:
-        choices = [getattr(item.columns, name) for item in found]
+        choices = [getattr(convention.columns, name) for convention in conventions]
         pairs = zip(choices, tables, strict=True)
-        fitting = [item for item, table in pairs if name != "schema_version" and _is_there(item, table)]
+        fitting = [
+            convention for convention, table in pairs if name != "schema_version" and _is_there(convention, table)
+        ]
         columns[name] = fitting[0] if fitting else choices[0]
-    plates = tuple(dict.fromkeys(plate for item in found for plate in item.plates))
-    remarks = tuple(dict.fromkeys(remark for item in found for remark in item.remarks))
+    plates = tuple(dict.fromkeys(plate for convention in conventions for plate in convention.plates))
+    remarks = tuple(dict.fromkeys(remark for convention in conventions for remark in convention.remarks))
     # A force by the name of this foot is surer than contacts chosen by the lean of the shank.
     has_force = any(_is_there(columns["vertical_force"], table) for table in tables)
     return Convention(GaitMap(**columns), () if has_force else plates, remarks)

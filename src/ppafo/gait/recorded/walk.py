@@ -131,11 +131,11 @@ class CurveColumns:
         return total, chosen
 
     def _column(self, name: str, stated: str | None, si_units: Sequence[str]) -> tuple[Floats, str]:
-        place = f"{self.table.file}: column {name!r}"
+        where = f"{self.table.file}: column {name!r}"
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
         if not unit:
-            raise DataError(f"{place}: the file does not state its unit; give {self.unit_key} in a gait map (--map)")
+            raise DataError(f"{where}: the file does not state its unit; give {self.unit_key} in a gait map (--map)")
         given = "" if unit == "-" else unit
         problem = ""
         for si_unit in si_units:
@@ -146,14 +146,14 @@ class CurveColumns:
                 problem = problem or str(error)
                 continue
             return zero + (one - zero) * values, si_unit
-        raise DataError(f"{place} [{unit}]: {problem}")
+        raise DataError(f"{where} [{unit}]: {problem}")
 
 
-def check_finite(values: Floats, place: str, time: Floats) -> None:
+def check_finite(values: Floats, where: str, time: Floats) -> None:
     """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
     known = np.flatnonzero(np.isfinite(values))
     if known.size == 0:
-        raise DataError(f"{place} contains no numbers; use another file, or map another column")
+        raise DataError(f"{where} contains no numbers; use another file, or map another column")
     first = int(known[0])
     bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
     if bad.size:
@@ -164,7 +164,7 @@ def check_finite(values: Floats, place: str, time: Floats) -> None:
         if longest > LONGEST_FILLED:
             remedy = f"(--start, --end): {longest:.3g} s are too long to be filled here"
         raise DataError(
-            f"{place} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
+            f"{where} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
             f"fill it or cut the file there {remedy}"
         )
 
@@ -219,21 +219,23 @@ _LEAST_FLAT = 0.1
 """Seconds of flat foot that there must be to take the zero of the angle from."""
 
 
-def between_markers(found: CurveColumns, mapped: ShankMap | AngleMap, first: str, second: str) -> tuple[Floats, Floats]:
+def between_markers(
+    columns: CurveColumns, mapped: ShankMap | AngleMap, first: str, second: str
+) -> tuple[Floats, Floats]:
     """Return how far the second marker is ahead of the first and above it, in the unit of the file."""
-    place = {name: found.table.columns[name] for _, name in found.terms}
-    for name, values in place.items():
-        check_finite(values, f"{found.table.file}: column {name!r}", found.table.time)
+    marker = {name: columns.table.columns[name] for _, name in columns.terms}
+    for name, values in marker.items():
+        check_finite(values, f"{columns.table.file}: column {name!r}", columns.table.time)
     axis, vertical = mapped.forward.removeprefix("-"), mapped.vertical
     sign = -1.0 if mapped.forward.startswith("-") else 1.0
-    ahead = sign * (place[f"{second}.{axis}"] - place[f"{first}.{axis}"])
-    return ahead, place[f"{second}.{vertical}"] - place[f"{first}.{vertical}"]
+    ahead = sign * (marker[f"{second}.{axis}"] - marker[f"{first}.{axis}"])
+    return ahead, marker[f"{second}.{vertical}"] - marker[f"{first}.{vertical}"]
 
 
-def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> Signal:
+def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -> Signal:
     """Return the ankle angle [rad] of a line from heel to toes: flat, 90 deg plus the shank, less the neutral one."""
-    ahead, up = between_markers(found, mapped, str(mapped.heel), str(mapped.toe))
-    pitch = Signal(found.table.file, found.table.time, np.arctan2(up, ahead))
+    ahead, up = between_markers(columns, mapped, str(mapped.heel), str(mapped.toe))
+    pitch = Signal(columns.table.file, columns.table.time, np.arctan2(up, ahead))
     seen = without_ends(pitch)
     inside = (seen.time >= shank.time[0]) & (seen.time <= shank.time[-1])
     time, values = seen.time[inside], seen.values[inside]
@@ -245,13 +247,13 @@ def foot_markers_angle(found: CurveColumns, mapped: AngleMap, shank: Signal) -> 
     # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * seen.rate:
         raise DataError(
-            f"{found.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
+            f"{columns.table.file}: the line from {mapped.heel!r} to {mapped.toe!r} never stands still while the "
             "shank leans forward, so the zero of the ankle is unknown; give the angle itself in ankle_angle.terms "
             "of a gait map"
         )
     sign, neutral = mapped.sign_and_neutral()
     angle = 0.5 * np.pi + lean - (values - float(np.median(values[flat]))) - sign * neutral
-    return Signal(found.table.file, time, angle)
+    return Signal(columns.table.file, time, angle)
 
 
 THIGH_FRACTION = 0.245
@@ -367,11 +369,11 @@ def acceleration_of(position: Floats, harmonics: int, stride_time: float) -> Flo
 def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
     if mapped.thigh_length is None:
         return THIGH_FRACTION * (stature or 0.0)
-    place, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
-    with refused_as(DataError, place, UnitError):
+    where, (low, high) = f"knee.thigh_length = {mapped.thigh_length!r}", _LENGTHS
+    with refused_as(DataError, where, UnitError):
         length = parse_quantity(mapped.thigh_length, "m")
     if not low <= length <= high:
-        raise DataError(f"{place} is not plausible; a thigh is {low:g} to {high:g} m long")
+        raise DataError(f"{where} is not plausible; a thigh is {low:g} to {high:g} m long")
     return length
 
 
@@ -433,17 +435,17 @@ _POSITIVE = ("ankle_in_front", "plantarflexion", "up", "forward")
 """Directions that count above 0 in the package."""
 
 
-def _curve_of(name: str, found: CurveColumns, mapped: Any, body_mass: float) -> Signal:
+def _curve_of(name: str, columns: CurveColumns, mapped: Any, body_mass: float) -> Signal:
     """Return the signal of a curve in SI units, with the signs of the package; loads per ``body_mass`` [kg]."""
     if isinstance(mapped, ShankMap) and mapped.terms is None:
-        ahead, up = between_markers(found, mapped, str(mapped.knee), str(mapped.ankle))
+        ahead, up = between_markers(columns, mapped, str(mapped.knee), str(mapped.ankle))
         values, unit = np.asarray(np.arctan2(ahead, -up), dtype=np.float64), "rad"
     else:
-        values, unit = found.in_unit(mapped.unit, _UNITS[name])
+        values, unit = columns.in_unit(mapped.unit, _UNITS[name])
     if isinstance(mapped, AngleMap):
         sign, neutral = mapped.sign_and_neutral()
-        return Signal(found.table.file, found.table.time, _RIGHT_ANGLE + sign * (values - neutral))
+        return Signal(columns.table.file, columns.table.time, _RIGHT_ANGLE + sign * (values - neutral))
     # A moment is per body mass, and a force in body weights.
     over = {"N m": body_mass, "N": body_mass * STANDARD_GRAVITY, "N/kg": STANDARD_GRAVITY}.get(unit, 1.0)
     sign = 1.0 if mapped.positive in _POSITIVE else -1.0
-    return Signal(found.table.file, found.table.time, sign * values / over)
+    return Signal(columns.table.file, columns.table.time, sign * values / over)

@@ -1,21 +1,16 @@
 """The direct methods of the bench: each one law from recordings to estimates, residuals of the one estimator."""
 
-from ppafo.identification.bench.free_decay import FreeDecaySettings, free_decay
-from ppafo.identification.bench.open_valve_flow import OpenValveFlowSettings, open_valve_flow
+from ppafo.identification.bench.free_decay import free_decay
+from ppafo.identification.bench.open_valve_flow import open_valve_flow
 from ppafo.identification.bench.result import BenchResult
-from ppafo.identification.bench.static_torque import StaticTorqueSettings, static_torque
-from ppafo.identification.bench.valve_map import ValveMapSettings, valve_map
-from ppafo.identification.bench.vane_leak import VaneLeakSettings, vane_leak
+from ppafo.identification.bench.static_torque import static_torque
+from ppafo.identification.bench.valve_map import valve_map
+from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.tolerances import Tolerances
 
 __all__ = [
     "BenchResult",
-    "FreeDecaySettings",
-    "OpenValveFlowSettings",
-    "StaticTorqueSettings",
     "Tolerances",
-    "ValveMapSettings",
-    "VaneLeakSettings",
     "free_decay",
     "open_valve_flow",
     "static_torque",

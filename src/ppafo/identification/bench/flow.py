@@ -18,7 +18,8 @@ from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
-from ppafo.identification.fit import Fit, Free
+from ppafo.identification.fit import Fit
+from ppafo.identification.residuals import Free
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass

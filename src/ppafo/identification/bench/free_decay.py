@@ -12,15 +12,15 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, count_of
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
-from ppafo.identification.fit import Free
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.residuals import Free
 from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
@@ -44,51 +44,53 @@ _STRIBECK = 0.1, 1.0e-3, 2.0
 """Velocity at which half of the rise is left [rad/s]: usual, lowest and highest."""
 
 
-@dataclass(frozen=True, slots=True)
-class FreeDecaySettings:
-    """Times between which the vane turns freely [s], inertia [kg m^2] with its deviation, and how much seals may grip.
-
-    ``rise`` is friction at rest over dynamic friction, less 1 [-]. Without a start the decay begins where the speed is
-    largest; without an inertia only ratios over it are known.
-    """
-
-    start: float | None = None
-    end: float | None = None
-    inertia: float | None = None
-    inertia_deviation: float = 0.0
-    rise: float = 1.0
-    confidence: float = 0.95
-    tolerances: Tolerances = DEFAULTS
-
-
-def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None = None) -> BenchResult:
+def free_decay(
+    sources: tuple[Source, ...],
+    start: float | None = None,
+    end: float | None = None,
+    inertia: float | None = None,
+    inertia_deviation: float = 0.0,
+    rise: float = 1.0,
+    confidence: float = 0.95,
+    tolerances: Tolerances = DEFAULTS,
+) -> BenchResult:
     """Return viscous damping [N m s/rad] and dynamic friction [N m], or both over the inertia [1/s, rad/s^2]; (1).
 
     The angular velocity is fitted with the angle where a recording has it. Several recordings are several impulses to
-    the same device: the numbers are common, each has its own start.
+    the same device: the numbers are common, each has its own start. The vane turns freely from ``start`` to ``end``
+    [s]; without a start the decay begins where the speed is largest. Without an inertia [kg m^2], whose standard
+    deviation is ``inertia_deviation``, only ratios over it are known. ``rise`` is friction at rest over dynamic
+    friction, less 1 [-], by which seals may grip near standstill.
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    chosen = settings or FreeDecaySettings()
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
-    decays = tuple(decay_of(source, chosen.start, chosen.end) for source in sources)
-    inertia = chosen.inertia or 1.0
-    if chosen.inertia:
+    decays = tuple(decay_of(source, start, end) for source in sources)
+    mass = inertia or 1.0
+    if inertia:
         damping, friction, units = "friction.viscous_damping", "friction.dynamic_torque", ("N m s/rad", "N m")
         missing = over_inertia = ""
     else:
         damping, friction = "free_decay.damping_over_inertia", "free_decay.friction_over_inertia"
         units, over_inertia = ("1/s", "rad/s^2"), " over the inertia"
         missing = "; the inertia is not known, so only ratios to it follow"
-    numbers = _numbers(decays, chosen, inertia, damping, friction)
+    starts, (rate, deceleration) = _starts(decays, mass)
+    numbers = (
+        sought(damping, rate, 0.0),
+        sought(friction, deceleration, 0.0),
+        *starts,
+        *_near_rest(rise),
+        *tolerance(_INERTIA, inertia_deviation / mass),
+        *within(_GAIN, tolerances.gain_of(ANGLE)),
+    )
 
     def law(at: Values) -> Floats:
-        mass = inertia * (1.0 + at[_INERTIA])
-        rates = max(at[damping], 0.0) / mass, max(at[friction], 0.0) / mass
+        moved = mass * (1.0 + at[_INERTIA])
+        rates = max(at[damping], 0.0) / moved, max(at[friction], 0.0) / moved
         parts = []
         for number, decay in enumerate(decays):
-            start, speed = at[f"start angle {number + 1}"], at[f"start speed {number + 1}"]
+            first, speed = at[f"start angle {number + 1}"], at[f"start speed {number + 1}"]
             swept, left = course(decay.time, speed, *rates, math.expm1(at[_RISE]), at[_RISE_VELOCITY])
-            parts.append(start + (1.0 + at[_GAIN]) * decay.sign * swept)
+            parts.append(first + (1.0 + at[_GAIN]) * decay.sign * swept)
             parts += [] if decay.velocity is None else [decay.sign * left]
         return np.concatenate(parts)
 
@@ -104,13 +106,13 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
                 halves += ["the first half of the way"] * half + ["the second half of the way"] * (seen.size - half)
     counts = [item.time.size * (1 if item.velocity is None else 2) for item in decays]
     readings = Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
-    found, model = solve(law, readings, numbers, chosen.confidence)
+    found, model = solve(law, readings, numbers, confidence)
     reported = (
         Reported(damping, units[0], f"Viscous damping{over_inertia}"),
         Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
     )
     values = found.by_name
-    rates = values[damping] / inertia, values[friction] / inertia
+    rates = values[damping] / mass, values[friction] / mass
     near_rest = math.expm1(values.get(_RISE, 0.0)), values.get(_RISE_VELOCITY, 0.0)
     at_rest = sum(
         float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *near_rest)[0][-1]
@@ -128,11 +130,9 @@ def free_decay(sources: tuple[Source, ...], settings: FreeDecaySettings | None =
     )
 
 
-def _numbers(
-    decays: tuple["Decay", ...], settings: FreeDecaySettings, inertia: float, damping: str, friction: str
-) -> tuple[Free, ...]:
-    """Return what the fit moves: damping and friction, a start for each decay, and the tolerances."""
-    starts, rates = [], []
+def _starts(decays: tuple["Decay", ...], mass: float) -> tuple[list[Free], tuple[float, float]]:
+    """Return the start of each decay, which is sought, and rough damping [N m s/rad] and friction [N m] of all."""
+    starts, rates = list[Free](), []
     for number, decay in enumerate(decays, start=1):
         velocity, _ = smoothed_rates(decay.time, decay.angle)
         speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
@@ -143,18 +143,20 @@ def _numbers(
         # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
         # deceleration: half of each is a start between the two.
         rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
-    rate, deceleration = (inertia * float(item) for item in np.median(rates, axis=0))
-    most, usual = math.log1p(settings.rise), _STRIBECK[0]
+    rate, deceleration = (mass * float(item) for item in np.median(rates, axis=0))
+    return starts, (rate, deceleration)
+
+
+def _near_rest(rise: float) -> tuple[Free, ...]:
+    """Return the tolerances of seals that grip harder near standstill: by how much, and from which velocity on."""
+    most, usual = math.log1p(rise), _STRIBECK[0]
+    if not most > 0.0:
+        return ()
     # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
     # logarithm, its width over the root of 12.
-    rise = Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)) if most > 0.0 else None
     return (
-        sought(damping, rate, 0.0),
-        sought(friction, deceleration, 0.0),
-        *starts,
-        *(() if rise is None else (rise, Free(_RISE_VELOCITY, usual, *_STRIBECK[1:], usual, usual))),
-        *tolerance(_INERTIA, 0.0 if settings.inertia is None else settings.inertia_deviation / settings.inertia),
-        *within(_GAIN, settings.tolerances.gain_of(ANGLE)),
+        Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
+        Free(_RISE_VELOCITY, usual, *_STRIBECK[1:], usual, usual),
     )
 
 

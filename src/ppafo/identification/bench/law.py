@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.identification.fit import SAMPLES_PER_COEFFICIENT, Block, Fit, Free, fit
+from ppafo.identification.fit import Fit, fit
+from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
+from ppafo.identification.residuals import Block, Free
 from ppafo.identification.source import Source
 from ppafo.identification.tolerances import deviation_of_limit
 from ppafo.signals.faults import resolution_of, rounding_of

@@ -7,7 +7,7 @@ constants as in ``flow``. Temperature and law of the gas, gains of the sensors, 
 tolerances. Of ISO 6358, C is the choked flow, and b shows only where there is choked and subsonic flow.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,33 +40,29 @@ _SPAN, _SUBSONIC = 0.15, 0.6
 """Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
 
 
-@dataclass(frozen=True, slots=True)
-class OpenValveFlowSettings:
-    """The gas, the law, the valve's path in a set (``valves.main``) and its area [m^2] where it is known.
-
-    With an area the orifice law gives Cd; without one only the product Cd A is known. With a ``critical_ratio`` [-]
-    the law ``both`` has ISO 6358 beside the laminar gap in place of an orifice.
-    """
-
-    gas: GasAt
-    law: Law = "orifice"
-    area: float | None = None
-    path: str = "valve"
-    critical_ratio: float | None = None
-    confidence: float = 0.95
-    tolerances: Tolerances = DEFAULTS
-
-
-def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings) -> BenchResult:
+def open_valve_flow(
+    sources: tuple[Source, ...],
+    gas: GasAt,
+    law: Law = "orifice",
+    area: float | None = None,
+    path: str = "valve",
+    critical_ratio: float | None = None,
+    confidence: float = 0.95,
+    tolerances: Tolerances = DEFAULTS,
+) -> BenchResult:
     """Return Cd [-] or Cd A [m^2], or C [m^3/(s Pa)] and b [-], or c [kg/(s Pa^2)], of the open valve; (6), (7).
 
-    The law ``both`` gives Cd, Cd A or C, and c of a laminar gap beside it.
-
+    With an ``area`` [m^2] the orifice law gives Cd; without one only the product Cd A is known. The law ``both`` gives
+    Cd, Cd A or, with a ``critical_ratio`` [-], C, and c of a laminar gap beside it. ``path`` is the valve's in a set
+    (``valves.main``).
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    upstream, downstream, flow, labels = open_readings(sources, settings.gas)
-    size, ratio, largest = _size(settings), downstream / upstream, float(flow.max())
-    is_standard = settings.law == "iso6358"
+    upstream, downstream, flow, labels = open_readings(sources, gas)
+    # Beside a laminar gap the ratio tells whether the opening is an orifice.
+    known_ratio = critical_ratio if law == "both" else None
+    opening = Opening(gas, law, area or 1.0, known_ratio)
+    size, ratio, largest = _size(opening, area, path), downstream / upstream, float(flow.max())
+    is_standard = law == "iso6358"
     if is_standard and (np.ptp(ratio) < _SPAN or ratio.max() < _SUBSONIC):
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: C and b need choked and subsonic flow, pressure ratios that span "
@@ -74,16 +70,14 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         )
     reported = [size]
     if is_standard:
-        reported.append(Reported(f"{settings.path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
-    known_ratio = settings.critical_ratio if settings.law == "both" else None
-    opening = Opening(settings.gas, settings.law, settings.area or 1.0, known_ratio)
+        reported.append(Reported(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
     paths = Paths(size.path, critical_ratio=reported[-1].path if is_standard else "")
-    if settings.law == "both":
+    if law == "both":
         paths = Paths(size.path, beside=_BESIDE.path)
         _, alone = opening.rough_sizes(upstream, downstream, flow)
         # Either part may be zero, which is an answer.
         reported = [replace(size, size=alone.size), replace(_BESIDE, size=alone.beside)]
-    choked = critical_pressure_ratio(settings.gas.heat_capacity_ratio)
+    choked = critical_pressure_ratio(gas.heat_capacity_ratio)
     # The noise of the pressures tells the more in the flow the nearer they are to each other.
     levels = [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]
     found, model = solve_flow(
@@ -91,11 +85,11 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         paths,
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
         Readings(flow, levels, labels),
-        settings.tolerances,
-        settings.confidence,
+        tolerances,
+        confidence,
     )
     shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
-    marks = readings_mark("measured", ratio, shown), curve_mark(settings.law, ratio, fitted)
+    marks = readings_mark("measured", ratio, shown), curve_mark(law, ratio, fitted)
     axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
     return result_of(
         PROCEDURE,
@@ -105,22 +99,22 @@ def open_valve_flow(sources: tuple[Source, ...], settings: OpenValveFlowSettings
         f"{flow.size} readings at pressure ratios from {ratio.min():.2f} to {ratio.max():.2f}; "
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
         with_residuals("Open-valve flow", *axes, marks, ratio, shown - fitted),
-        f"{NEXT_LAW[settings.law]}, or leave those readings out",
+        f"{NEXT_LAW[law]}, or leave those readings out",
     )
 
 
 _BESIDE = Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 
 
-def _size(settings: OpenValveFlowSettings) -> Reported:
+def _size(opening: Opening, area: float | None, path: str) -> Reported:
     """Return the number that is sought: where a set has it, its unit, and what it is."""
-    if settings.law == "laminar":
+    if opening.law == "laminar":
         return Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve")
-    if settings.law == "iso6358" or (settings.law == "both" and settings.critical_ratio is not None):
-        return Reported(f"{settings.path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
-    if settings.area:
-        text = f"Discharge coefficient with the set's area of {settings.area * 1e6:.4g} mm^2; only Cd A sets the flow"
-        return Reported(f"{settings.path}.discharge_coefficient", "", text)
+    if opening.law == "iso6358" or opening.critical_ratio is not None:
+        return Reported(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
+    if area:
+        text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A sets the flow"
+        return Reported(f"{path}.discharge_coefficient", "", text)
     return Reported("open_valve_flow.effective_area", "m^2", "Effective area Cd A")
 
 

@@ -41,11 +41,6 @@ class BenchResult:
         raise KeyError(path)
 
 
-def count_of(number: int, noun: str) -> str:
-    """Return a number with its noun, ``1 decay`` or ``3 decays``."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 @dataclass(frozen=True, slots=True)
 class Reported:
     """A number of a fit that is reported: its name there, which is its path, SI unit, and what it is in a sentence.

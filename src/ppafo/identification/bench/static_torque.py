@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, count_of
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.source import (
     Source,
     check_moves,
@@ -54,15 +54,9 @@ _MOST_REPETITIONS = 12
 _SIGMAS = 4.0
 
 
-@dataclass(frozen=True, slots=True)
-class StaticTorqueSettings:
-    """Confidence of the intervals [-], and what the bench does not know exactly."""
-
-    confidence: float = 0.95
-    tolerances: Tolerances = DEFAULTS
-
-
-def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | None = None) -> BenchResult:
+def static_torque(
+    sources: tuple[Source, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
+) -> BenchResult:
     """Return torque constant [m^3], friction without pressure [N m], its growth [m^3], zero of the scale [N m]; (2).
 
     The friction is that at rest, or in motion where the actuator slid; of a force they are in m^2 and N. Readings whose
@@ -70,9 +64,8 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
     only pulls shows nothing until friction is overcome.
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    chosen = settings or StaticTorqueSettings()
     readings = readings_of(sources)
-    names, tolerances = readings.names, chosen.tolerances
+    names = readings.names
     pressure, torque, branch = readings.pressure, readings.torque, readings.branch
     slope, zero, friction, size = _straight_line(readings, ", ".join(source.name for source in sources))
     files = [source.name for source in sources]
@@ -104,7 +97,7 @@ def static_torque(sources: tuple[Source, ...], settings: StaticTorqueSettings | 
         np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
     )
     labelled = Readings(readings.weight * torque, [load] * torque.size, readings.recordings, groups)
-    found, weighted = solve(law, labelled, numbers, chosen.confidence)
+    found, weighted = solve(law, labelled, numbers, confidence)
     left = torque - weighted / readings.weight
     reported = (
         Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),

@@ -9,8 +9,6 @@ pressures of the moment give, so that a supply that sags does not look like a va
 of the gas, gains and zeros of the sensors are tolerances; the zero of the flow meter shows inside the dead band.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ppafo.errors import IdentificationError
@@ -33,29 +31,26 @@ _SMALL_COMMAND = 0.2
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
 
 
-@dataclass(frozen=True, slots=True)
-class ValveMapSettings:
-    """The gas, the valve's path in a set (``valves.main``), confidence [-], and what is not known exactly."""
-
-    gas: GasAt
-    path: str = "valve"
-    confidence: float = 0.95
-    tolerances: Tolerances = DEFAULTS
-
-
-def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchResult:
+def valve_map(
+    sources: tuple[Source, ...],
+    gas: GasAt,
+    path: str = "valve",
+    confidence: float = 0.95,
+    tolerances: Tolerances = DEFAULTS,
+) -> BenchResult:
     """Return dead band [-], gain [m^2], saturation and hysteresis [-] from command and flow; equations (6), (7).
 
+    ``path`` is the valve's in a set (``valves.main``).
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    gas, names = settings.gas, CHANNELS[2:]
+    names = CHANNELS[2:]
     areas = _areas(sources, gas)
     commands = [source.recording["command"] for source in sources]
     command, flow, upstream, downstream = (pool(sources, name) for name in CHANNELS)
     branch = np.concatenate([_branch(source) for source in sources])
     highest, largest = float(np.abs(command).max()), float(np.abs(areas).max())
     is_two_way = bool((branch > 0).any() and (branch < 0).any())
-    band = f"{settings.path}.dead_band"
+    band = f"{path}.dead_band"
     # The valve is neither shut nor fully open where it has half of the largest area.
     half = float(np.abs(command[np.abs(areas) > 0.5 * largest]).min())
     if not half > 0.0:
@@ -71,7 +66,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         # Just inside the highest command, beyond which no reading changes with it.
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
         *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
-        *flow_tolerances(gas, settings.tolerances, names, float(np.abs(flow).max())),
+        *flow_tolerances(gas, tolerances, names, float(np.abs(flow).max())),
     )
 
     def law(at: Values) -> Floats:
@@ -87,7 +82,7 @@ def valve_map(sources: tuple[Source, ...], settings: ValveMapSettings) -> BenchR
         np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands").tolist(),
     )
     readings = Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), groups)
-    found, model = solve(law, readings, numbers, settings.confidence)
+    found, model = solve(law, readings, numbers, confidence)
     values = found.by_name
     reported = [
         Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),

@@ -13,12 +13,12 @@ fast D falls.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, count_of
 from ppafo.identification.bench.flow import (
     GAS_LAW,
     NEXT_LAW,
@@ -32,8 +32,8 @@ from ppafo.identification.bench.flow import (
     solve_flow,
 )
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, count_of, result_of
-from ppafo.identification.fit import Free
+from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.residuals import Free
 from ppafo.identification.source import (
     Source,
     check_no_gap,
@@ -67,63 +67,55 @@ _RELAXED, _MOST_RELAXED = 5.0, 0.02
 _REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its walls"
 
 
-@dataclass(frozen=True, slots=True)
-class VaneLeakSettings:
-    """The gas, chamber volumes [m^3] where known, what the set has of the leak, and the times to use [s].
-
-    Without the volume of the chamber that empties there is no area, only one over the volume. A
-    ``discharge_coefficient`` [-] makes an area of the product, a ``critical_ratio`` [-] asks for a sonic conductance,
-    the ``law`` laminar for a laminar coefficient, both for one beside what the set has. ``volume_deviation`` [-] is the
-    standard deviation of a volume over it.
-    """
-
-    gas: GasAt
-    volume_1: float | None = None
-    volume_2: float | None = None
-    discharge_coefficient: float | None = None
-    start: float | None = None
-    end: float | None = None
-    confidence: float = 0.95
-    critical_ratio: float | None = None
-    law: Literal["orifice", "laminar", "both"] = "orifice"
-    tolerances: Tolerances = DEFAULTS
-    volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"])
-
-    @property
-    def opening(self) -> Opening:
-        """The leak in the form in which it is sought."""
-        law: Law = self.law if self.law != "orifice" or self.critical_ratio is None else "iso6358"
-        return Opening(self.gas, law, self.discharge_coefficient or 1.0, self.critical_ratio)
-
-    @property
-    def size(self) -> Reported:
-        """The number that is sought: where a set has it, its unit, and what it is."""
-        if self.law == "laminar":
-            return Reported("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
-        if self.critical_ratio is not None:
-            text = f"Sonic conductance of the leak with the set's b = {self.critical_ratio:g}"
-            return Reported("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
-        if self.discharge_coefficient:
-            text = f"Area of the leak with Cd = {self.discharge_coefficient:g}, of which only the product counts"
-            return Reported("actuator.leak.area", "m^2", text)
-        return Reported("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
-
-
-def vane_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
+def vane_leak(
+    sources: tuple[Source, ...],
+    gas: GasAt,
+    volume_1: float | None = None,
+    volume_2: float | None = None,
+    discharge_coefficient: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    confidence: float = 0.95,
+    critical_ratio: float | None = None,
+    law: Literal["orifice", "laminar", "both"] = "orifice",
+    tolerances: Tolerances = DEFAULTS,
+    volume_deviation: float = deviation_of_limit(HELD["actuator.dead_volume_1"]),
+) -> BenchResult:
     """Return the leak: A_leak [m^2], C [m^3/(s Pa)] or a laminar coefficient [kg/(s Pa^2)]; equations (6), (7).
 
-    Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures.
+    Recordings with a ``mass_flow`` are steady: the flow that keeps up the pressure, at several pressures. Of closed
+    chambers the samples from ``start`` to ``end`` [s] count. Without the volume [m^3] of the chamber that empties there
+    is no area, only one over the volume; ``volume_deviation`` [-] is the standard deviation of a volume over it. A
+    ``discharge_coefficient`` [-] makes an area of the product, a ``critical_ratio`` [-] asks for a sonic conductance,
+    the ``law`` laminar for a laminar coefficient, both for one beside what the set has.
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
+    form: Law = law if law != "orifice" or critical_ratio is None else "iso6358"
+    opening = Opening(gas, form, discharge_coefficient or 1.0, critical_ratio)
+    size = _size(opening, discharge_coefficient)
     if sources and all("mass_flow" in source.recording for source in sources):
-        return _steady_leak(sources, settings)
+        return _steady_leak(sources, opening, size, tolerances, confidence)
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("pressure_1",), absolute=CHANNELS)
-    closed = tuple(closed_chambers(source, settings) for source in sources)
+    closed = tuple(closed_chambers(source, start, end) for source in sources)
     if len({item.fuller for item in closed}) > 1:
         raise IdentificationError(
             "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
         )
-    return _decaying_leak(sources, closed, settings)
+    volumes = volume_1, volume_2
+    return _decaying_leak(sources, closed, opening, size, volumes, volume_deviation, tolerances, confidence)
+
+
+def _size(opening: Opening, discharge_coefficient: float | None) -> Reported:
+    """Return the number that is sought: where a set has it, its unit, and what it is."""
+    if opening.law == "laminar":
+        return Reported("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
+    if opening.critical_ratio is not None:
+        text = f"Sonic conductance of the leak with the set's b = {opening.critical_ratio:g}"
+        return Reported("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
+    if discharge_coefficient:
+        text = f"Area of the leak with Cd = {discharge_coefficient:g}, of which only the product counts"
+        return Reported("actuator.leak.area", "m^2", text)
+    return Reported("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
 
 
 class ClosedChambers(NamedTuple):
@@ -152,12 +144,12 @@ class ClosedChambers(NamedTuple):
         return (self.first,) if self.is_a_room else (self.first, self.second)
 
 
-def closed_chambers(source: Source, settings: VaneLeakSettings) -> ClosedChambers:
+def closed_chambers(source: Source, start: float | None, end: float | None) -> ClosedChambers:
     """Return the chambers of a recording between its start and equal pressures.
 
     IdentificationError where too few samples are left.
     """
-    part = window(source.recording, settings.start, settings.end)
+    part = window(source.recording, start, end)
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
         check_no_outlier(source, PROCEDURE, name, part)
@@ -213,20 +205,26 @@ def pressures_of_fall(
 
 
 def _decaying_leak(
-    sources: tuple[Source, ...], closed: tuple[ClosedChambers, ...], settings: VaneLeakSettings
+    sources: tuple[Source, ...],
+    closed: tuple[ClosedChambers, ...],
+    opening: Opening,
+    size: Reported,
+    volumes: tuple[float | None, float | None],
+    volume_deviation: float,
+    tolerances: Tolerances,
+    confidence: float,
 ) -> BenchResult:
-    gas, opening, size, tolerances = settings.gas, settings.opening, settings.size, settings.tolerances
-    fuller = closed[0].fuller
-    volumes = (settings.volume_1, settings.volume_2)[:: 1 if fuller == 1 else -1]
+    gas, fuller = opening.gas, closed[0].fuller
+    volumes = volumes if fuller == 1 else volumes[::-1]
     if volumes[0] is None:
         what = size.text.partition(" with")[0]
         text = f"{what} over the volume of chamber {fuller}, which is not known"
         is_area = size.unit == "m^2"
         path = "vane_leak.area_over_volume" if is_area else f"vane_leak.{size.path.split('.')[-1]}_over_volume"
         size = Reported(path, "1/m" if is_area else f"{size.unit[:-1]} m^3)", text)
-        opening = Opening(gas, opening.law, 1.0, settings.critical_ratio)
+        opening = replace(opening, known=1.0)
     emptied, constant = volumes[0] or 1.0, gas.specific_gas_constant
-    paths, reported, start, alone = _sought(settings, size, volumes[0] is not None, closed, opening, emptied)
+    paths, reported, start, alone = _sought(size, volumes[0] is not None, closed, opening, emptied)
     names = [f"pressure_{item}" for item in (fuller, 3 - fuller)]
     longest = max(float(item.time[-1]) for item in closed)
 
@@ -249,7 +247,7 @@ def _decaying_leak(
     if shut and volumes[0] and volumes[1]:
         # Two volumes, each known to the deviation.
         known = volumes[0] / volumes[1]
-        ratio = tolerance(_RATIO, math.sqrt(2.0) * settings.volume_deviation * known, known)
+        ratio = tolerance(_RATIO, math.sqrt(2.0) * volume_deviation * known, known)
     elif shut:
         ratio = (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
     numbers = (
@@ -259,7 +257,7 @@ def _decaying_leak(
         # Of the logarithm of a time, for only its order of magnitude is known.
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(gas, tolerances),
-        *tolerance(_VOLUME, settings.volume_deviation if volumes[0] else 0.0),
+        *tolerance(_VOLUME, volume_deviation if volumes[0] else 0.0),
         *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
     )
     measured = np.concatenate([one for item in closed for one in item.fitted])
@@ -271,7 +269,7 @@ def _decaying_leak(
             sensors += [name] * values.size
             halves += ["the early fall"] * half + ["the late fall"] * (values.size - half)
     labels = recordings_of(sources, [item.time.size * len(item.fitted) for item in closed])
-    found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, settings.confidence)
+    found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, confidence)
     times = [item.time for item in closed for _ in item.fitted]
     time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
     marks = [readings_mark("measured", time, measured)]
@@ -288,7 +286,7 @@ def _decaying_leak(
         reported,
         f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
         with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, measured - model),
-        _REMEDY.format(NEXT_LAW[settings.law]),
+        _REMEDY.format(NEXT_LAW[opening.law]),
         remark,
     )
 
@@ -310,7 +308,6 @@ def _of_decay(names: list[str], number: int, item: ClosedChambers) -> list[Free]
 
 
 def _sought(
-    settings: VaneLeakSettings,
     size: Reported,
     has_volume: bool,
     closed: tuple[ClosedChambers, ...],
@@ -318,10 +315,10 @@ def _sought(
     emptied: float,
 ) -> tuple[Paths, tuple[Reported, ...], Sizes, Sizes]:
     """Return the numbers of a leak from closed chambers: paths, what is reported, the start, and each part alone."""
-    gas = settings.gas
+    gas = opening.gas
     rate = gas.specific_gas_constant * gas.temperature / emptied
     rough = _rough_size(closed, opening, Sizes(1.0), rate)
-    if settings.law != "both":
+    if opening.law != "both":
         return Paths(size.path), (size,), Sizes(rough), Sizes(rough)
     laminar = _rough_size(closed, opening, Sizes(0.0, beside=1.0), rate)
     beside = replace(_beside(has_volume), size=laminar)
@@ -349,7 +346,9 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: Size
     return float(np.mean(found))
 
 
-def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> BenchResult:
+def _steady_leak(
+    sources: tuple[Source, ...], opening: Opening, size: Reported, tolerances: Tolerances, confidence: float
+) -> BenchResult:
     """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
     check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
     for source in sources:
@@ -361,12 +360,11 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
         )
-    opening, size = settings.opening, settings.size
     # A leak of another law parts low from high pressures.
     is_high = difference > np.median(difference)
     halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
     paths, reported = Paths(size.path), [size]
-    if settings.law == "both":
+    if opening.law == "both":
         _, alone = opening.rough_sizes(first, second, flow)
         reported = [replace(size, size=alone.size), replace(_beside(has_volume=True), size=alone.beside)]
         paths = Paths(size.path, beside=reported[1].path)
@@ -375,8 +373,8 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         paths,
         {"pressure_1": first, "pressure_2": second},
         Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (halves,)),
-        settings.tolerances,
-        settings.confidence,
+        tolerances,
+        confidence,
     )
     scatter = np.std(flow - model) / float(np.abs(flow).max())
     marks = readings_mark("measured", difference, flow), curve_mark(opening.law, difference, model)
@@ -388,5 +386,5 @@ def _steady_leak(sources: tuple[Source, ...], settings: VaneLeakSettings) -> Ben
         reported,
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
         with_residuals("Steady leak", *axes, marks, difference, flow - model),
-        _REMEDY.format(NEXT_LAW[settings.law]),
+        _REMEDY.format(NEXT_LAW[opening.law]),
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.fit import Noise, whiten
+from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, reach_of
 from ppafo.identification.trajectory.runs import Measured, columns_in, numbers_in, prepare_samples, signals_at

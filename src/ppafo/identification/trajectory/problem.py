@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.errors import IdentificationError, first_twice, nearest_name
-from ppafo.identification.fit import Free
+from ppafo.identification.residuals import Free
 from ppafo.identification.source import Use, double_use
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity

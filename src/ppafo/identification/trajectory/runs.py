@@ -22,7 +22,7 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
-from ppafo.identification.fit import Block
+from ppafo.identification.residuals import Block
 from ppafo.identification.trajectory.problem import (
     GAIN_OF,
     TIME_OFFSET,

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from ppafo.errors import ProgramError
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.gas import SPECIES
+from ppafo.model.plain_function import PlainFunction
 
 SECTION = "effects"
 """Section of a parameter set, and begin of the paths, that hold the settings of effects."""
@@ -48,11 +49,11 @@ class State:
     """
 
     row: type
-    start: Callable[..., Any] | None
-    advance: Callable[..., Any]
-    slopes: Callable[..., Any]
+    start: Callable[[Any, Moment], Any] | None
+    advance: Callable[[Any, Any, Moment, Moment, float], Any]
+    slopes: Callable[[Any, Any, Moment], Any]
     tolerances: tuple[float, ...] = ()
-    settle: Callable[..., Any] | None = None
+    settle: Callable[[Any, Any, float], Any] | None = None
 
     @property
     def fields(self) -> tuple[str, ...]:
@@ -92,9 +93,9 @@ class Effect:
     summary: str
     settings: type
     parameters: type
-    prepare: Callable[..., Any] | None
+    prepare: Callable[[Any, Any], Any] | None
     switch: tuple[str, ...]
-    laws: Mapping[Callable[..., Any], Callable[..., Any]]
+    laws: Mapping[PlainFunction, PlainFunction]
     source: str = ""
     equation: str = ""
     symbols: tuple[tuple[str, str, str, str], ...] = ()
@@ -209,5 +210,5 @@ def laws_in_order(effects: Sequence[Effect]) -> dict[Any, Any]:
     return found
 
 
-def _parameters(function: Callable[..., Any]) -> list[str]:
+def _parameters(function: PlainFunction) -> list[str]:
     return list(inspect.signature(function).parameters)

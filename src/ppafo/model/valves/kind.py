@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.model.declaration import Quantity, quantities_of
+from ppafo.model.orifice import FlowCurve
+from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortFlowSlopes
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +22,7 @@ class Joint:
     """
 
     opening: Callable[[Any], float]
-    instant: Callable[..., float]
+    instant: Callable[[Any, Any, float], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +50,17 @@ class ValveModel:
     state: type
     prepare: Callable[[Any], Any]
     initial: Callable[[], Any]
-    advance: Callable[..., Any]
-    connect: Callable[..., Any]
-    port_flow: Callable[..., Any]
-    port_flow_slopes: Callable[..., Any]
+    advance: Callable[[Any, Any, float, float, float], tuple[Any, Any]]
+    connect: Callable[[PlantParameters, Any], tuple[Any, Any]]
+    port_flow: Callable[[float, Any, FlowCurve], PortFlow]
+    port_flow_slopes: Callable[[float, Any, FlowCurve], PortFlowSlopes]
     jumps: bool
-    shift: Callable[..., float] | None
+    shift: Callable[[Any, Any], float] | None
     command_delay: Callable[[Any], float]
-    instant: Callable[..., Any]
-    rates: Callable[..., Any]
-    next_event: Callable[..., float]
-    settle: Callable[..., Any]
+    instant: Callable[[Any, Any, float], Openings]
+    rates: Callable[[Any, Any, float], Any]
+    next_event: Callable[[Any, Any, float, float], float]
+    settle: Callable[[Any, Any, float, float], Any]
     joint: Joint | None = None
 
 

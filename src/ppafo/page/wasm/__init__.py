@@ -114,12 +114,12 @@ _CHANGED = {**_TASK, "origin": "changed"}
 _DEFAULT = {**_TASK, "origin": "default"}
 
 
-def description_of(item: Scenario, library: Library) -> dict[str, Any]:
+def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
     """The description of the module of a scenario or a walk, as the beginning of this file has it."""
     keys = {setting.name: setting.path for setting in library.settings}
-    origins, kept = _origins(item, library), _kept(library)
+    origins, kept = _origins(scenario, library), _kept(library)
     # Settings that have the number of another until they are changed by themselves.
-    follows = {path: found[0].sources[0] for path, found in library.links.items() if found[0].is_same}
+    follows = {path: links[0].sources[0] for path, links in library.links.items() if links[0].is_same}
     # Settings that rules make of others until they are changed by themselves; a rule has the name of its function.
     made = {
         path: {
@@ -128,22 +128,22 @@ def description_of(item: Scenario, library: Library) -> dict[str, Any]:
                     "rule": f"{term.function.__module__.rpartition('.')[2]}.{term.function.__name__}",
                     "sources": list(term.sources),
                 }
-                for term in found[0].terms
+                for term in links[0].terms
             ],
-            "gap": found[0].gap,
+            "gap": links[0].gap,
         }
-        for path, found in library.links.items()
-        if any(term.function is not itself for term in found[0].terms)
+        for path, links in library.links.items()
+        if any(term.function is not itself for term in links[0].terms)
     }
-    program, atmosphere = library.program, item.device.supply.atmospheric_pressure
+    program, atmosphere = library.program, scenario.device.supply.atmospheric_pressure
     channels = {"time": ("s", "since the start"), **{name: OUTPUTS[name] for name in program.outputs}}
     return {
         "name": library.title,
         "title": library.description,
         "version": __version__,
-        "kind": "scenario" if not item.walks else "walk",
-        "document": dict(item.origin.content),
-        "overrides": list(item.origin.overrides),
+        "kind": "scenario" if not scenario.walks else "walk",
+        "document": dict(scenario.origin.content),
+        "overrides": list(scenario.origin.overrides),
         "settings": [
             {
                 **_setting(setting, atmosphere),
@@ -171,31 +171,31 @@ def description_of(item: Scenario, library: Library) -> dict[str, Any]:
 
 def _kept(library: Library) -> dict[str, str]:
     """How settings must stay, by name in C; of some of which any must be above 0 that one which alone is."""
-    values = {item.name: item.value for item in library.settings}
-    found: dict[str, str] = {}
+    values = {setting.name: setting.value for setting in library.settings}
+    kept: dict[str, str] = {}
     for switch in library.switches:
         above = [name for name in switch.names if values[name] > 0.0]
         if not switch.is_above:
-            found |= dict.fromkeys(switch.names, "zero")
+            kept |= dict.fromkeys(switch.names, "zero")
         elif len(above) == 1:
-            found[above[0]] = "above zero"
-    return found
+            kept[above[0]] = "above zero"
+    return kept
 
 
-def _setting(item: Setting, atmosphere: float) -> dict[str, Any]:
-    quantity = item.quantity
-    group, _, name = item.path.rpartition(".")
+def _setting(setting: Setting, atmosphere: float) -> dict[str, Any]:
+    quantity = setting.quantity
+    group, _, name = setting.path.rpartition(".")
     return {
-        "key": item.path,
+        "key": setting.path,
         "group": group,
         "name": name,
         "unit": quantity.unit,
-        "value": item.value,
+        "value": setting.value,
         "minimum": quantity.minimum if math.isfinite(quantity.minimum) else None,
         "is_minimum_allowed": quantity.minimum_allowed,
         "maximum": quantity.maximum if math.isfinite(quantity.maximum) else None,
         "is_whole": name == SEED.name,
-        "display": display_of(quantity.unit, atmosphere, is_absolute=item.path == ATMOSPHERE_PATH),
+        "display": display_of(quantity.unit, atmosphere, is_absolute=setting.path == ATMOSPHERE_PATH),
         "description": quantity.summary or quantity.name,
     }
 
@@ -230,38 +230,38 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
 def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     """Where the value of each setting comes from, by path."""
     origin, device, parameter_set = scenario.origin, scenario.device, _parameter_set(scenario)
-    assumed = {item.path: item.note for item in scenario.assumptions}
+    assumed = {assumption.path: assumption.note for assumption in scenario.assumptions}
     changed = {c_identifier(one_path(split_override(text).typed, device.valve_name)) for text in origin.overrides}
-    found: dict[str, dict[str, Any]] = {}
-    for item in library.settings:
-        if item.name in changed:
-            found[item.path] = dict(_CHANGED)
-        elif is_of_device(item.path):
-            found[item.path] = dict(_of_set(parameter_set, device, item, follows=item.path in library.links))
+    origins: dict[str, dict[str, Any]] = {}
+    for setting in library.settings:
+        if setting.name in changed:
+            origins[setting.path] = dict(_CHANGED)
+        elif is_of_device(setting.path):
+            origins[setting.path] = dict(_of_set(parameter_set, device, setting, follows=setting.path in library.links))
         else:
             # Times and the angle of a locked vane have no key of their own in every file, and are the task's anyway.
-            is_given = value_at(origin.content, item.path) is not None or item.path in (*TIMES, LOCKED_ANGLE)
-            found[item.path] = dict(_TASK if is_given else _DEFAULT)
-        if item.path in assumed and item.name not in changed:
-            found[item.path] |= {"origin": "assumed", "note": assumed[item.path]}
-    return found
+            is_given = value_at(origin.content, setting.path) is not None or setting.path in (*TIMES, LOCKED_ANGLE)
+            origins[setting.path] = dict(_TASK if is_given else _DEFAULT)
+        if setting.path in assumed and setting.name not in changed:
+            origins[setting.path] |= {"origin": "assumed", "note": assumed[setting.path]}
+    return origins
 
 
-def _of_set(parameter_set: ParameterSet | None, device: Device, item: Setting, *, follows: bool) -> dict[str, Any]:
+def _of_set(parameter_set: ParameterSet | None, device: Device, setting: Setting, *, follows: bool) -> dict[str, Any]:
     """Origin of a number of the device: the set's where it has this very value, the default's where it ``follows``."""
     if parameter_set is None:
         return _CHANGED
-    path = item.path
+    path = setting.path
     if path.startswith("valve."):
         path = f"valves.{device.valve_name}.{path.removeprefix('valve.')}"
     entry, declared = parameter_set.numbers.get(path), parameter_set.declarations().get(path)
     if entry is None or declared is None:
-        return _DEFAULT if follows or item.value == item.quantity.default else _CHANGED
-    if entry_in_si(entry, declared, atmospheric_pressure(parameter_set)) != item.value:
+        return _DEFAULT if follows or setting.value == setting.quantity.default else _CHANGED
+    if entry_in_si(entry, declared, atmospheric_pressure(parameter_set)) != setting.value:
         return _CHANGED
     if entry.source == SOURCE:
         return _TASK
-    unit, si, half = entry.unit, item.quantity.unit, None
+    unit, si, half = entry.unit, setting.quantity.unit, None
     if si == "Pa_a":
         # Half of an interval is a difference, also of a level.
         unit, si = f"{unit[:-2]}_d", "Pa_d"
@@ -277,8 +277,8 @@ def _parameter_set(scenario: Scenario) -> ParameterSet | None:
     folder = Path() if origin.file is None else Path(origin.file).parent
     own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
     try:
-        found = load_parameter_set(set_name(section.get("set", device.name), folder))
-        of_file = apply_overrides(found, section.get("overrides", ()), valve=device.valve_name)
+        loaded = load_parameter_set(set_name(section.get("set", device.name), folder))
+        of_file = apply_overrides(loaded, section.get("overrides", ()), valve=device.valve_name)
         return apply_overrides(of_file, own, valve=device.valve_name)
     except PpafoError:
         return None
@@ -308,12 +308,12 @@ _WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation"
 """Folders of the package that have a part in the text of a module, beside those of a program."""
 
 
-def program_of(library: Library, item: Scenario) -> bytes:
+def program_of(library: Library, scenario: Scenario) -> bytes:
     """The module of a scenario's library: the one that comes with the package where it is the same, else a new one.
 
     Neither the text nor a module is made twice on a computer.
     """
-    key = package_key(item, (*COMPOSED, *_WRITERS))
+    key = package_key(scenario, (*COMPOSED, *_WRITERS))
     if key is None:
         digest = _known_digest(library)
     else:
@@ -331,7 +331,7 @@ def _known_digest(library: Library) -> str:
     from ppafo.exports.c_library.program import outline_of  # most digests are kept
 
     # What decides the translation unit: what its functions are made from, and what translates them.
-    names = [item.name for item in library.settings]
+    names = [setting.name for setting in library.settings]
     outline = _unit(library, outline_of(library.program, names, library.further, LANES))
     translators = [*(files("ppafo.translation").iterdir()), *(files("ppafo.exports.c_library").iterdir()), __file__]
     contents = {Path(str(file)).name: Path(str(file)).read_bytes() for file in translators if Path(str(file)).is_file()}
@@ -347,16 +347,16 @@ def source_of(library: Library) -> str:
     """The translation unit of a library. Values of settings are not in it: other numbers, same program."""
     from ppafo.exports.c_library.program import c_text
 
-    names = [item.name for item in library.settings]
+    names = [setting.name for setting in library.settings]
     return _unit(library, c_text(library.program, _TITLE, names, library.further, LANES))
 
 
 def _unit(library: Library, functions: str) -> str:
     """The translation unit around functions."""
-    program, names = library.program, [item.name for item in library.settings]
-    given = [f"given[SETTING_{name.upper()}] = settings->{name};" for name in names]
+    program, names = library.program, [setting.name for setting in library.settings]
+    assignments = [f"given[SETTING_{name.upper()}] = settings->{name};" for name in names]
     arrays = ", ".join(f"array_of({name}, {count}, 0, 0)" for name, count in _ARRAYS.items())
-    prepare = ("double given[SETTINGS];", *given, f"prepare({arrays});")
+    prepare = ("double given[SETTINGS];", *assignments, f"prepare({arrays});")
     refused = [_REFUSED.format(condition, name.upper()) for condition, name in conditions_of_program(library)]
     words = {
         **run_words(library),
@@ -365,7 +365,7 @@ def _unit(library: Library, functions: str) -> str:
         "parameter_count": str(len(places_of(program.program.parameter_rows()))),
         "count_count": str(len(COUNTS)),
         "prepare": "\n".join(f"    {line}" for line in prepare),
-        "needs_other": _COUNT.sub(lambda found: f"counts[COUNT_{found[1].upper()}]", "\n".join(refused)),
+        "needs_other": _COUNT.sub(lambda match: f"counts[COUNT_{match[1].upper()}]", "\n".join(refused)),
     }
     words |= {
         "prepared_run": filled(template(__name__, "prepared_run.c"), words),
@@ -404,8 +404,8 @@ def digest_of(text: str) -> str:
     in their names, and a program of the package stays good where that is moved.
     """
     code = _COMMENT.sub("", "\n".join([*FLAGS, template(__name__, "math.h"), text]))
-    places = {name: f"n{place}" for place, name in enumerate(dict.fromkeys(_INSIDE.findall(code)))}
-    renamed = re.sub(r"\w+", lambda found: places.get(found[0], found[0]), code)
+    places = {name: f"n{number}" for number, name in enumerate(dict.fromkeys(_INSIDE.findall(code)))}
+    renamed = re.sub(r"\w+", lambda match: places.get(match[0], match[0]), code)
     return hashlib.sha256(" ".join(renamed.split()).encode()).hexdigest()[:16]
 
 
@@ -446,8 +446,8 @@ _PROGRAMS = files("ppafo.page.wasm").joinpath("programs")
 @cache
 def prebuilt_programs() -> dict[str, str]:
     """Names of the files of prebuilt programs by the digest of their text."""
-    found: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
-    return found
+    programs: dict[str, str] = json.loads(_PROGRAMS.joinpath(INDEX).read_text(encoding="utf-8"))["programs"]
+    return programs
 
 
 @final
@@ -459,12 +459,12 @@ class WasmModule:
     description: dict[str, Any]
 
 
-def module_of(item: Scenario) -> WasmModule:
+def module_of(scenario: Scenario) -> WasmModule:
     """A scenario or a walk as a module.
 
     Its program comes with the package where a shipped scenario or walk has the same one, whatever its numbers are, and
     is built otherwise. ProgramError where that needs the package ``ziglang``, which is not there, or where something in
     it cannot be translated; ScenarioError for a walk that cannot be exported.
     """
-    library = library_of(item)
-    return WasmModule(program_of(library, item), description_of(item, library))
+    library = library_of(scenario)
+    return WasmModule(program_of(library, scenario), description_of(scenario, library))

@@ -71,9 +71,9 @@ def audit(
     audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
     of_parent = set_or_load(audited.parent or None if parent is None else parent)
     evidence = Evidence(with_followers(audited), audited.declarations())
-    found = [finding for check in CHECKS.values() for finding in check(evidence)]
-    changed, ids = overridden_paths(audited), {finding.id for finding in found}
-    judged = [_judge(finding, audited, changed, of_parent) for finding in found]
+    findings = [finding for check in CHECKS.values() for finding in check(evidence)]
+    changed, ids = overridden_paths(audited), {finding.id for finding in findings}
+    judged = [_judge(finding, audited, changed, of_parent) for finding in findings]
     # With overrides a finding may be gone for that reason alone: its acceptance is not idle.
     idle = {} if changed else {name: why for name, why in audited.accepted.items() if name not in ids}
     judged += [

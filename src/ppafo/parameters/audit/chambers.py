@@ -18,12 +18,12 @@ _TOLERANCE = 0.1
 
 def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
     """Yield a warning where the two differ by more than 10 %, a note where a stated efficiency explains it."""
-    found, efficiency = evidence.numbers(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN), evidence.number(_EFFICIENCY)
-    if found is None or min(found) <= 0.0:
+    numbers, efficiency = evidence.numbers(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN), evidence.number(_EFFICIENCY)
+    if numbers is None or min(numbers) <= 0.0:
         return
-    if efficiency is not None and abs(found[1] * efficiency / found[0] - 1.0) <= _TOLERANCE:
+    if efficiency is not None and abs(numbers[1] * efficiency / numbers[0] - 1.0) <= _TOLERANCE:
         # The shaft's work is the gas's less the stated loss.
-        ratio = found[0] / found[1]
+        ratio = numbers[0] / numbers[1]
         yield Finding(
             id=_ID,
             severity="note",
@@ -37,8 +37,8 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
                 "the vane and compresses gas, where a real loss has the other sign."
             ),
         )
-    elif abs(found[1] / found[0] - 1.0) > _TOLERANCE:
-        torque_constant, displacement_per_radian = found
+    elif abs(numbers[1] / numbers[0] - 1.0) > _TOLERANCE:
+        torque_constant, displacement_per_radian = numbers
         gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, displacement_per_radian)
         yield Finding(
             id=_ID,
@@ -100,10 +100,10 @@ _DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
 
 def check_volumes(evidence: Evidence) -> Iterator[Finding]:
     """Yield an error for each chamber that has no volume left at one end of the range."""
-    found, angles = evidence.numbers(_SLOPE, *_STOPS), evidence.angle_range()
-    if found is None or angles is None or found[0] <= 0.0:
+    numbers, angles = evidence.numbers(_SLOPE, *_STOPS), evidence.angle_range()
+    if numbers is None or angles is None or numbers[0] <= 0.0:
         return
-    _, stop_low, stop_high = found
+    _, stop_low, stop_high = numbers
     low_path, low, high_path, high = angles
     yield from _chamber(evidence, 1, low - stop_low, high - low, low_path)
     yield from _chamber(evidence, 2, stop_high - high, high - low, high_path)

@@ -35,7 +35,7 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
     """
     parameter_set, parent = with_followers(parameter_set), with_followers(parent)
     kinds, old_kinds = _chosen(parameter_set), _chosen(parent)
-    found = [
+    changed = [
         Change(path, old_kinds.get(path, ""), kinds.get(path, ""), "")
         for path in dict.fromkeys((*kinds, *old_kinds))
         if kinds.get(path) != old_kinds.get(path)
@@ -48,8 +48,8 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
             continue
         if new is None or old is None or not _is_same(path, parameter_set, parent):
             was = "" if old is None else entry_text(old)
-            found.append(Change(path, was, *(("", "") if new is None else (entry_text(new), new.origin))))
-    return found
+            changed.append(Change(path, was, *(("", "") if new is None else (entry_text(new), new.origin))))
+    return changed
 
 
 def _chosen(parameter_set: ParameterSet) -> Mapping[str, str]:

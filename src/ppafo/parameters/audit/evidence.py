@@ -102,8 +102,8 @@ class Evidence:
 
     def numbers(self, *paths: str) -> tuple[float, ...] | None:
         """Return the values at all paths in SI, None where one is lacking."""
-        found = [self.number(path) for path in paths]
-        present = tuple(value for value in found if value is not None)
+        values = [self.number(path) for path in paths]
+        present = tuple(value for value in values if value is not None)
         return present if len(present) == len(paths) else None
 
     def text(self, path: str) -> str | None:
@@ -144,15 +144,15 @@ class Evidence:
     def values_of(self, *paths: str) -> tuple[NamedValue, ...]:
         """Return the values at those paths that the set has, as they were given."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts
-        found = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
-        return (*found, *(NamedValue(p, texts[p].value, "", texts[p].origin) for p in paths if p in texts))
+        values = [NamedValue(p, numbers[p].value, numbers[p].unit, numbers[p].origin) for p in paths if p in numbers]
+        return (*values, *(NamedValue(p, texts[p].value, "", texts[p].origin) for p in paths if p in texts))
 
     def gas(self) -> Gas | None:
         """Return the gas, None where the set does not say enough or what it says is no gas."""
-        found = self.numbers(*GAS_PATHS)
-        if found is None or not all(is_within(found[i], self.declared[path]) for i, path in enumerate(GAS_PATHS)):
+        values = self.numbers(*GAS_PATHS)
+        if values is None or not all(is_within(values[i], self.declared[path]) for i, path in enumerate(GAS_PATHS)):
             return None
-        return Gas(self.text("gas.species") or "gas", *found)
+        return Gas(self.text("gas.species") or "gas", *values)
 
     def atmosphere(self) -> float:
         """Return the ambient pressure [Pa absolute], the standard one where the set does not say."""
@@ -168,8 +168,8 @@ class Evidence:
                 ("reported.largest_angle", "actuator.angle_max"),
             )
         )
-        found = self.numbers(low_path, high_path)
-        return None if found is None else (low_path, found[0], high_path, found[1])
+        ends = self.numbers(low_path, high_path)
+        return None if ends is None else (low_path, ends[0], high_path, ends[1])
 
     def single_fill_gas(self) -> str | None:
         """Return the path of the first gas use of a single filling that the set reports."""
@@ -178,9 +178,9 @@ class Evidence:
 
     def chamber_1_volume(self, angle: float) -> float | None:
         """Return the volume of chamber 1 [m^3] at an angle [rad], without a dead volume that the set does not have."""
-        found = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
+        values = self.numbers("actuator.displacement_per_radian", "actuator.angle_min")
         dead_volume = self.number("actuator.dead_volume_1") or 0.0
-        return None if found is None else chamber_1_volume(angle, found[1], found[0], dead_volume)
+        return None if values is None else chamber_1_volume(angle, values[1], values[0], dead_volume)
 
 
 def digits(value: float) -> Interval:

@@ -87,8 +87,8 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
     if gas is None or supply is None or supply <= atmosphere or both_forms(evidence.parameter_set, section):
         return
     ratio = atmosphere / supply
-    area = evidence.numbers(*(f"{section}.{item.name}" for item in AREA_FORM))
-    sonic = evidence.numbers(*(f"{section}.{item.name}" for item in SONIC_FORM))
+    area = evidence.numbers(*(f"{section}.{quantity.name}" for quantity in AREA_FORM))
+    sonic = evidence.numbers(*(f"{section}.{quantity.name}" for quantity in SONIC_FORM))
     if area is not None and min(area) > 0.0:
         conductance = orifice_conductance(Orifice(*area), gas)
         flow = conductance * supply * isentropic_flow_function(ratio, gas.heat_capacity_ratio)
@@ -110,7 +110,7 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
         id=f"open-flow-of-{name}",
         severity="note",
         title=f"valve '{name}' passes {_GRAMS * flow:#.3g} g/s of {gas.species}",
-        values=evidence.values_of(*(f"{section}.{item.name}" for item in form), _SUPPLY),
+        values=evidence.values_of(*(f"{section}.{quantity.name}" for quantity in form), _SUPPLY),
         sides=(Side("flow from supply to atmosphere", flow, "kg/s"), Side("conductance", conductance, "kg/(s Pa)")),
         paragraph=(
             f"Fully open from {evidence.in_set_unit(_SUPPLY, supply)} to the atmosphere it passes "
@@ -297,12 +297,12 @@ def _paths(name: str) -> tuple[str, ...]:
 
 
 def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
-    gas, found = evidence.gas(), evidence.numbers(*_paths(name))
+    gas, numbers = evidence.gas(), evidence.numbers(*_paths(name))
     # Reported digits leave ranges open: a contradiction must hold for all numbers in them.
     ranges = [interval for path in _paths(name)[:3] if (interval := evidence.magnitude(path)) is not None]
-    if gas is None or found is None or len(ranges) < 3 or min(found) <= 0.0:
+    if gas is None or numbers is None or len(ranges) < 3 or min(numbers) <= 0.0:
         return None
-    area, coefficient, measured, pressure = found
+    area, coefficient, measured, pressure = numbers
     k = gas.heat_capacity_ratio
     psi = isentropic_flow_function(min(evidence.atmosphere() / pressure, 1.0), k)
     per_area = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature) * pressure * psi
@@ -347,14 +347,21 @@ def check_sonic_flow(evidence: Evidence) -> Iterator[Finding]:
         valve, entry = f"valves.{name}", f"reported.valves.{name}"
         size, flow = f"{valve}.sonic_conductance", f"{entry}.mass_flow"
         paths = (size, f"{valve}.critical_ratio", flow, f"{entry}.flow_pressure")
-        found, reported, given = evidence.numbers(*paths), evidence.magnitude(flow), evidence.magnitude(size)
-        if gas is None or found is None or reported is None or given is None or min(found) <= 0.0 or found[1] >= 1.0:
+        numbers, reported, size_reported = evidence.numbers(*paths), evidence.magnitude(flow), evidence.magnitude(size)
+        if (
+            gas is None
+            or numbers is None
+            or reported is None
+            or size_reported is None
+            or min(numbers) <= 0.0
+            or numbers[1] >= 1.0
+        ):
             continue
-        conductance, critical_ratio, measured, pressure = found
+        conductance, critical_ratio, measured, pressure = numbers
         psi = iso6358_flow_function(min(evidence.atmosphere() / pressure, 1.0), critical_ratio)
         per_size = sonic_conductance_mass(1.0, gas.specific_gas_constant, gas.temperature) * pressure * psi
         room = Interval(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
-        if per_size <= 0.0 or given.times(room).meets(reported):
+        if per_size <= 0.0 or size_reported.times(room).meets(reported):
             continue
         predicted, needed = conductance * per_size, measured / per_size
         yield Finding(

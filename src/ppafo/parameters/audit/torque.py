@@ -183,10 +183,10 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
     """
     for name in ("rated", "walking"):
         paths = f"reported.{name}_torque", f"reported.{name}_torque_pressure"
-        found = evidence.numbers(_TORQUE_CONSTANT, *paths)
-        if found is None or min(found) <= 0.0 or found[2] <= evidence.atmosphere():
+        numbers = evidence.numbers(_TORQUE_CONSTANT, *paths)
+        if numbers is None or min(numbers) <= 0.0 or numbers[2] <= evidence.atmosphere():
             continue
-        constant, torque, pressure = found
+        constant, torque, pressure = numbers
         note = evidence.parameter_set.numbers[paths[0]].note
         held = constant * (pressure - evidence.atmosphere())
         agrees = abs(held / torque - 1.0) <= _ROOM
@@ -199,12 +199,11 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
             paragraph=(
                 f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(held)}, published "
                 f"are {evidence.torque(torque)}. This speaks of the torque constant alone: "
-                "a vane at rest has any volume."
-                f"{f' {note}' if note else ''}"
-            ),
+                f"a vane at rest has any volume. {note}"
+            ).rstrip(),
         )
         if name == "walking":
-            yield from _while_walking(evidence, found[1], found[2])
+            yield from _while_walking(evidence, numbers[1], numbers[2])
 
 
 def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterator[Finding]:
@@ -214,10 +213,10 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
     target = atmosphere + _REACHED * min(torque / constant, pressure - atmosphere)
     for valve in evidence.parameter_set.valve_kinds:
         sizes = f"valves.{valve}.area", f"valves.{valve}.discharge_coefficient"
-        found = evidence.numbers(*sizes)
-        if gas is None or volume is None or volume <= 0.0 or found is None or min(found) <= 0.0:
+        numbers = evidence.numbers(*sizes)
+        if gas is None or volume is None or volume <= 0.0 or numbers is None or min(numbers) <= 0.0:
             continue
-        time = _filling_time(gas, volume, found[0] * found[1], (atmosphere, target, pressure))
+        time = _filling_time(gas, volume, numbers[0] * numbers[1], (atmosphere, target, pressure))
         severity: Severity = "note" if time <= _PUSH_OFF else "warning"
         yield Finding(
             id=f"walking-torque-in-time-{valve}",

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import ParameterError, UnitError
+from ppafo.errors import ParameterError, UnitError, count_of
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side
@@ -28,7 +28,7 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
         number, unit = stated.get(identifier, (math.nan, ""))
         if number == entry.value and unit == entry.unit:
             continue
-        found = f"{number:g} {unit}".rstrip() if identifier in stated else "no number of that name"
+        stated_number = f"{number:g} {unit}".rstrip() if identifier in stated else "no number of that name"
         yield Finding(
             id=f"{path.replace('.', '-').replace('_', '-')}-against-statement",
             severity="error",
@@ -36,7 +36,7 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
             values=evidence.values_of(path),
             sides=(),
             paragraph=(
-                f"{path} is {number_text(entry)} and names '{entry.key}', which has {found}. Give that "
+                f"{path} is {number_text(entry)} and names '{entry.key}', which has {stated_number}. Give that "
                 "number, or the key of the statement that is meant (ppafo reproduce --list)."
             ),
         )
@@ -44,17 +44,17 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
 
 def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
     """Return number and unit of each statement of a publication by its id, and of its arguments by ``ID.ARGUMENT``."""
-    found = {}
+    numbers = {}
     for claim in read_publication(name)[0].claims:
         if claim.published is not None:
-            found[claim.id] = (claim.published, claim.unit)
+            numbers[claim.id] = (claim.published, claim.unit)
         for argument, text in claim.arguments.items():
             number, _, unit = text.partition(" ")
             try:
-                found[f"{claim.id}.{argument}"] = (float(number), unit)
+                numbers[f"{claim.id}.{argument}"] = (float(number), unit)
             except ValueError:
                 continue  # The name of chambers.
-    return found
+    return numbers
 
 
 # Does a device lack a value?
@@ -72,15 +72,16 @@ def check_missing(evidence: Evidence) -> Iterator[Finding]:
             missing += missing_values(parameter_set, valve)
     if missing:
         paths = tuple(dict.fromkeys(missing))
+        are, them = ("is", "it") if len(paths) == 1 else ("are", "them")
         yield Finding(
             id="missing-values",
             severity="warning",
-            title=f"no device yet: {len(paths)} value{' is' if len(paths) == 1 else 's are'} missing",
+            title=f"no device yet: {count_of(len(paths), 'value')} {are} missing",
             values=(),
             sides=(),
             paragraph=(
-                f"A device needs more: {', '.join(paths)}. Add {'it' if len(paths) == 1 else 'them'} to the file or as "
-                "overrides. What rests on missing values is not audited."
+                f"A device needs more: {', '.join(paths)}. Add {them} to the file or as overrides. "
+                "What rests on missing values is not audited."
             ),
         )
 

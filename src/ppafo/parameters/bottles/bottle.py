@@ -56,7 +56,7 @@ class Fluid:
 
 def list_fluids() -> tuple[str, ...]:
     """Return the names of the fluids that have a table."""
-    return tuple(sorted(item.name.removesuffix(_SUFFIX) for item in _FOLDER.iterdir() if item.name.endswith(_SUFFIX)))
+    return tuple(sorted(file.name.removesuffix(_SUFFIX) for file in _FOLDER.iterdir() if file.name.endswith(_SUFFIX)))
 
 
 @functools.cache
@@ -131,7 +131,7 @@ FILL_BY_PRESSURE = (
         "fill_temperature", "K", "temperature at which the bottle has that pressure", minimum=200.0, maximum=400.0
     ),
 )
-FILLS: Forms = {"bottle": tuple(tuple(item.name for item in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
+FILLS: Forms = {"bottle": tuple(tuple(quantity.name for quantity in form) for form in (FILL_BY_MASS, FILL_BY_PRESSURE))}
 """Forms in which the filling of a bottle is given."""
 REGULATOR = (
     Quantity("set_pressure", "Pa_a", "outlet pressure of the regulator without flow", minimum=1e5, maximum=2e7),
@@ -185,15 +185,15 @@ _MAY_LACK = "hose"
 """Section that a file may leave out."""
 
 PATHS: dict[str, Quantity] = {
-    f"{section}.{item.name}": item for section, members in SECTIONS.items() for item in members
+    f"{section}.{quantity.name}": quantity for section, members in SECTIONS.items() for quantity in members
 }
 NEEDED = tuple(
-    f"{section}.{item.name}"
+    f"{section}.{quantity.name}"
     for section, members in (("bottle", BOTTLE), ("regulator", REGULATOR), ("room", ROOM))
-    for item in members
+    for quantity in members
 )
 
-WARMING = (*(f"regulator.{item.name}" for item in BODY), *(f"hose.{item.name}" for item in HOSE))
+WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quantity.name}" for quantity in HOSE))
 """Values that warm the gas on its way; a file without them has the paper's bottle's."""
 
 
@@ -208,7 +208,7 @@ def bottle_file() -> type[BaseModel]:
         "gas": (TextEntry, Field(description="name of the fluid, which needs a property table")),
     }
     for name, members in SECTIONS.items():
-        own = {item.name: optional(Entry, f"{item.summary} [{item.unit or '-'}]") for item in members}
+        own = {quantity.name: optional(Entry, f"{quantity.summary} [{quantity.unit or '-'}]") for quantity in members}
         section, described = table(f"{name.capitalize()}OfABottle", own), f"section {name}"
         fields[name] = optional(section, described) if name == _MAY_LACK else (section, Field(description=described))
     return table("BottleFile", fields)
@@ -294,32 +294,32 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     # A part has no file of its own: the paper's bottle gives what a catalogue does not say.
     parsed, file = read_model(FILE, bottle_file(), name_or_path if part is None else PAPER_BOTTLE)
     # A file without regulator and hose values has the paper's.
-    found = _warming() | _given(parsed)
+    entries = _warming() | _given(parsed)
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
-        found, file = scaled_entries(part, found), part.name
-    for path, given in override_set(overrides, forms=FILLS).items():
+        entries, file = scaled_entries(part, entries), part.name
+    for path, override in override_set(overrides, forms=FILLS).items():
         if path not in PATHS:
-            raise ParameterError(f"override '{given}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
-        with refused_as(ParameterError, f"override '{given}'", UnitError):
-            value, unit = split_quantity(given.text)
+            raise ParameterError(f"override '{override}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
+        with refused_as(ParameterError, f"override '{override}'", UnitError):
+            value, unit = split_quantity(override.text)
         # A new form of the filling replaces the old one, of which two would contradict each other.
-        kept = {name: entry for name, entry in found.items() if name not in other_forms(path, FILLS)}
-        found = kept | {path: Entry(value=value, unit=unit, origin="assumed", source="override")}
-    return _build(parsed, found, file)
+        kept = {name: entry for name, entry in entries.items() if name not in other_forms(path, FILLS)}
+        entries = kept | {path: Entry(value=value, unit=unit, origin="assumed", source="override")}
+    return _build(parsed, entries, file)
 
 
 def _given(parsed: Any) -> dict[str, Entry]:
-    given = {section: getattr(parsed, section) for section in SECTIONS}
-    entries = {path: getattr(given[path.partition(".")[0]], path.partition(".")[2], None) for path in PATHS}
+    sections = {section: getattr(parsed, section) for section in SECTIONS}
+    entries = {path: getattr(sections[path.partition(".")[0]], path.partition(".")[2], None) for path in PATHS}
     return {path: entry for path, entry in entries.items() if entry is not None}
 
 
 @functools.cache
 def _warming() -> dict[str, Entry]:
     """Return the values of regulator and hose of the paper's bottle."""
-    given = _given(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
-    return {path: given[path] for path in WARMING}
+    entries = _given(read_model(FILE, bottle_file(), PAPER_BOTTLE)[0])
+    return {path: entries[path] for path in WARMING}
 
 
 def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
@@ -329,11 +329,11 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
         raise ParameterError(f"{file}: {said_missing(missing)}")
     values = {}
     for path, entry in entries.items():
-        given = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
-        with refused_as(ParameterError, given, UnitError):
+        written = f"{file}: {path} = {format_quantity(entry.value, entry.unit)}"
+        with refused_as(ParameterError, written, UnitError):
             values[path] = to_si(entry.value, entry.unit, PATHS[path].unit)
         if not (math.isfinite(values[path]) and is_within(values[path], PATHS[path])):
-            raise ParameterError(f"{given}: {range_rule(PATHS[path], limits_text(PATHS[path]))}")
+            raise ParameterError(f"{written}: {range_rule(PATHS[path], limits_text(PATHS[path]))}")
     with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
         fluid = load_fluid(parsed.gas.value)
     bottle = Bottle(
@@ -362,26 +362,26 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
 
 def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float:
     """Return the mass of gas [kg] in a full bottle, given as such or by pressure and temperature."""
-    by_pressure = [f"bottle.{item.name}" for item in FILL_BY_PRESSURE]
-    given = [path for path in by_pressure if path in values]
+    by_pressure = [f"bottle.{quantity.name}" for quantity in FILL_BY_PRESSURE]
+    stated = [path for path in by_pressure if path in values]
     # Exactly one form: by mass, or by pressure and temperature.
-    if ("bottle.gas_mass" in values) == bool(given):
+    if ("bottle.gas_mass" in values) == bool(stated):
         raise ParameterError(f"{file}: give either bottle.gas_mass or {' and '.join(by_pressure)}")
-    if not given:
+    if not stated:
         return values["bottle.gas_mass"]
     missing = [path for path in by_pressure if path not in values]
     if missing:
-        raise ParameterError(f"{file}: {said_missing(missing)} beside {given[0]}")
+        raise ParameterError(f"{file}: {said_missing(missing)} beside {stated[0]}")
     pressure, temperature = (values[path] for path in by_pressure)
     _check_temperature("bottle.fill_temperature", temperature, fluid, file)
     # Above the saturated vapour the rest is liquid: pressure and temperature then leave the mass open.
     if fluid_pressure(fluid.table, temperature, math.inf) < pressure:
         most = fluid_pressure(fluid.table, temperature, math.inf)
-        place, end = f"{file}: bottle.fill_pressure", f"{_pressure_text(most)} at {temperature:g} K"
+        where, end = f"{file}: bottle.fill_pressure", f"{_pressure_text(most)} at {temperature:g} K"
         raise ParameterError(
-            f"{place}: {fluid.name} is gas up to {end}; give bottle.gas_mass instead"
+            f"{where}: {fluid.name} is gas up to {end}; give bottle.gas_mass instead"
             if has_liquid(fluid.table)
-            else f"{place}: the table of {fluid.name} ends at {end}"
+            else f"{where}: the table of {fluid.name} ends at {end}"
         )
     return values["bottle.volume"] * gas_density(fluid.table, temperature, pressure)
 
@@ -405,10 +405,10 @@ def _check_content(bottle: Bottle, file: str) -> None:
     if bottle.mass >= most:
         volume = bottle.entries["bottle.volume"]
         fill = "bottle.gas_mass" if "bottle.gas_mass" in bottle.entries else "bottle.fill_pressure"
+        limit = "liquid would fill it at" if wet else "the property table ends at"
         raise ParameterError(
             f"{file}: {GRAMS_PER_KILOGRAM * bottle.mass:.4g} g of {fluid.name} do not fit into "
-            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: "
-            f"{'liquid would fill it at' if wet else 'the property table ends at'} "
+            f"{format_quantity(volume.value, volume.unit)} at {temperature:g} K: {limit} "
             f"{GRAMS_PER_KILOGRAM * most:.4g} g; set {fill} or room.temperature lower, or bottle.volume higher"
         )
     content = bottle_content(fluid.table, bottle.mass, bottle.volume, temperature)

@@ -37,8 +37,8 @@ _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 
 VALVE = (MASS, RATING, NOMINAL_FLOW, NOMINAL_DIAMETER, POWER, IDLE_POWER, *ORIFICE)
 GROUPS: dict[str, tuple[Quantity, ...]] = {
-    "valves": VALVE + tuple(item for kind in VALVES.values() for item in kind.quantities),
-    "actuators": (MASS, RATING, *(item for item in ACTUATOR if item.name in _OF_ACTUATOR)),
+    "valves": VALVE + tuple(quantity for kind in VALVES.values() for quantity in kind.quantities),
+    "actuators": (MASS, RATING, *(quantity for quantity in ACTUATOR if quantity.name in _OF_ACTUATOR)),
     "regulators": (MASS, RATING),
     "bottles": (CONTENT, EMPTY_MASS),
     "processors": (MASS, POWER),
@@ -127,8 +127,10 @@ class Part:
     def model_numbers(self) -> dict[str, float]:
         """Numbers of a valve by path, in SI; what its maker does not state is ideal, by the defaults."""
         # A figure that is not given is left at the model's default, which is the ideal valve.
-        settings = {item.name: item.default for item in VALVES[self.kind].quantities if item.default is not None}
-        orifice = {item.name: self.values[item.name] for item in ORIFICE if item.name in self.values}
+        settings = {
+            quantity.name: quantity.default for quantity in VALVES[self.kind].quantities if quantity.default is not None
+        }
+        orifice = {quantity.name: self.values[quantity.name] for quantity in ORIFICE if quantity.name in self.values}
         own = {name: self.values[name] for name in settings if name in self.values}
         return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
 
@@ -151,9 +153,11 @@ def _part_table(title: str, group: str, quantities: tuple[Quantity, ...], extra:
         "note": (str, Field("", description="remark")),
         "unknown": (_NAMES, Field(default=(), description="figures that are not known")),
     }
-    for item in quantities:
-        text = f"{item.summary} [{item.unit or '-'}]"
-        fields[item.name] = (Figure, Field(description=text)) if item.name in NEEDED[group] else optional(Figure, text)
+    for quantity in quantities:
+        text = f"{quantity.summary} [{quantity.unit or '-'}]"
+        fields[quantity.name] = (
+            (Figure, Field(description=text)) if quantity.name in NEEDED[group] else optional(Figure, text)
+        )
     return table(title, fields | (extra or {}))
 
 
@@ -243,7 +247,7 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
     """
     parsed: Any = validate(CATALOGUE_FILE, _FILE.parse(content, file), file, ParameterError)
     groups = {
-        group: {name: _part(file, group, name, item) for name, item in getattr(parsed, group).items()}
+        group: {name: _part(file, group, name, table) for name, table in getattr(parsed, group).items()}
         for group in GROUPS
     }
     return Catalogue(file, parsed.name, parsed.title, parsed.notes, groups)
@@ -252,28 +256,28 @@ def parse_catalogue(content: bytes, file: str) -> Catalogue:
 def _part(file: str, group: str, name: str, parsed: Any) -> Part:
     # Only valves come in kinds.
     kind = getattr(parsed, "kind", "")
-    declared = {item.name: item for item in figures_of(group, kind)}
+    declared = {quantity.name: quantity for quantity in figures_of(group, kind)}
     figures = {key: figure for key in declared if isinstance(figure := getattr(parsed, key), Figure)}
-    place = f"{file}: {group}.{name}"
+    where = f"{file}: {group}.{name}"
     for key in parsed.unknown:
         if key not in declared:
             hint = nearest_name(key, declared)
-            raise ParameterError(f"{place}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
+            raise ParameterError(f"{where}.unknown: there is no figure '{key}'{hint}; available: {', '.join(declared)}")
         if key in figures:
-            raise ParameterError(f"{place}.unknown: '{key}' is given in the same part")
-    given = [[item.name for item in form if item.name in figures] for form in (AREA_FORM, SONIC_FORM)]
+            raise ParameterError(f"{where}.unknown: '{key}' is given in the same part")
+    forms_given = [[quantity.name for quantity in form if quantity.name in figures] for form in (AREA_FORM, SONIC_FORM)]
     # Half a form of an orifice is as unusable as two forms at once.
-    if group == "valves" and sorted(map(len, given)) != [0, 2]:
+    if group == "valves" and sorted(map(len, forms_given)) != [0, 2]:
         raise ParameterError(
-            f"{place}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "
-            f"it has {', '.join(given[0] + given[1]) or 'none of them'}"
+            f"{where}: needs either area and discharge_coefficient or sonic_conductance and critical_ratio, "
+            f"it has {', '.join(forms_given[0] + forms_given[1]) or 'none of them'}"
         )
     values = {}
     for key, figure in figures.items():
-        shown = f"{place}.{key} = {figure.value:g} {figure.unit}"
+        shown = f"{where}.{key} = {figure.value:g} {figure.unit}"
         # A guess without its reason cannot be checked by the next reader.
         if figure.origin in _NEEDS_A_REASON and not figure.note.strip():
-            raise ParameterError(f"{place}.{key}.note is missing: a figure that is {figure.origin} needs its reason")
+            raise ParameterError(f"{where}.{key}.note is missing: a figure that is {figure.origin} needs its reason")
         with refused_as(ParameterError, shown, UnitError):
             # Data sheets give gauge pressures at sea level.
             values[key] = to_si(figure.value, figure.unit, declared[key].unit, STANDARD_ATMOSPHERE)

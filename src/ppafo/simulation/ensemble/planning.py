@@ -17,9 +17,8 @@ from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
-from ppafo.simulation.clock import Clock
 from ppafo.simulation.declaration import limits, quantity_text
-from ppafo.simulation.motion_kind import MotionKind
+from ppafo.simulation.motion_kind import Clock, MotionKind
 from ppafo.simulation.numbers import TIMES, Columns, clock_of, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
@@ -90,10 +89,10 @@ def screen_columns(columns: Columns) -> Screen:
     for rule in rules_of(columns.base.motion.motion_kind):
         # After each problem that some runs have, the others are checked again: their numbers may have fewer.
         while screen.members.size:
-            found = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
-            if not found:
+            problems_left = [problem for problem in rule(screen.scenario) if np.any(problem[0])]
+            if not problems_left:
                 break
-            screen.refuse(*found[0])
+            screen.refuse(*problems_left[0])
     return screen
 
 
@@ -102,12 +101,12 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
     unit = quantity.unit
 
     def line(run: int) -> str:
-        given = f"{path} = {values[run]:.9g} {unit}".rstrip()
+        said = f"{path} = {values[run]:.9g} {unit}".rstrip()
         if not np.isfinite(values[run]):
-            return f"{given}: is not a finite number"
+            return f"{said}: is not a finite number"
         if path in _WHOLE and values[run] != np.floor(values[run]):
-            return f"{given}: must be a whole number"
-        return f"{given}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
+            return f"{said}: must be a whole number"
+        return f"{said}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
 
     above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
     is_good = np.isfinite(values) & above & (values <= quantity.maximum)
@@ -194,8 +193,8 @@ def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
         return f"actuator: {problem}" if problem else ""
 
     # A kind checks single numbers, so the runs are gone through one by one.
-    found = [words(run) for run in range(varied[0].size)]
-    return ((np.array([bool(line) for line in found]), lambda run: found[run]),)
+    problems = [words(run) for run in range(varied[0].size)]
+    return ((np.array([bool(line) for line in problems]), lambda run: problems[run]),)
 
 
 def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
@@ -225,7 +224,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
     return ((np.atleast_1d(supply.dorsiflexion_pressure > supply.pressure), line),)
 
 
-def rules_of(kind: MotionKind) -> tuple[Rule, ...]:
+def rules_of(kind: MotionKind[Scenario]) -> tuple[Rule, ...]:
     """The rules for the scenarios of a kind of motion."""
     of_device = _inconsistent, _misshapen, _beyond_the_table, _without_growth
     return *of_device, kind.rules, _second_regulator_above_the_first

@@ -63,7 +63,9 @@ class Outcome:
     def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
         """Run batches one after the other, whose runs have these places in the ensemble."""
         first = {batch.program: batch for _, batch in batches}
-        alone = [Batch(item.program, item.clock, item.parameters[:, :1], item.states[:, :1]) for item in first.values()]
+        alone = [
+            Batch(batch.program, batch.clock, batch.parameters[:, :1], batch.states[:, :1]) for batch in first.values()
+        ]
         # Several programs are compiled side by side before the first batch runs; a single one as it is met.
         if len(alone) > 1:
             load_programs([_meter_batch(batch, self.request).batch.program for batch in alone])

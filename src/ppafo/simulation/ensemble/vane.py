@@ -11,8 +11,9 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
 from ppafo.model.columns import Problem, at
 from ppafo.model.controlled import CONTROLLED
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, Clock
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY
 from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
+from ppafo.simulation.motion_kind import Clock
 from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
 from ppafo.simulation.profiles import Limits, limits_of, profile_bounds, profile_problem, stops_of
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
@@ -72,13 +73,13 @@ def _profile_beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, 
     """A profile of a section that leaves its limits."""
     outside = _is_beyond(limits, profile)
     # The bounds hold for all time; a run that may leave them is checked at its own times.
-    found: dict[int, str] = {}
+    problems: dict[int, str] = {}
     for run in np.flatnonzero(outside).tolist():
         own = ProfileChoice(profile.kind, {name: at(value, run) for name, value in profile.settings.items()})
         duration, step = at(scenario.run.duration, run), at(scenario.run.step, run)
-        found[run] = profile_problem(limits.of_run(run), own, duration, step, section)
-        outside[run] = bool(found[run])
-    return outside, lambda run: found[run]
+        problems[run] = profile_problem(limits.of_run(run), own, duration, step, section)
+        outside[run] = bool(problems[run])
+    return outside, lambda run: problems[run]
 
 
 def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
@@ -87,13 +88,13 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Proble
     Times are read as those of a file are, once for each combination of them.
     """
     # Once for each combination: times are read as the texts of a file are, and an ensemble has few of them.
-    given = time_texts(base)
+    texts = time_texts(base)
     rows, places = np.unique(np.stack(list(times.values()), axis=1), axis=0, return_inverse=True)
     places = places.reshape(-1)
     reasons, table = [""] * len(rows), np.full((len(rows), 4), np.nan)
     for number, row in enumerate(rows.tolist()):
         try:
-            read = clock_with(base.name, given, dict(zip(times, row, strict=True)))
+            read = clock_with(base.name, texts, dict(zip(times, row, strict=True)))
         except ScenarioError as error:
             reasons[number] = str(error)
         else:

@@ -260,8 +260,8 @@ def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floa
     if channel not in result.recording or not chosen.any():
         return np.zeros((len(states), PHASES.size))
     time = result.recording.time
-    found = np.searchsorted(time, times_of_phases(time, result.starts)[chosen], side="right") - 1
-    values = result.recording[channel][found]
+    stride = np.searchsorted(time, times_of_phases(time, result.starts)[chosen], side="right") - 1
+    values = result.recording[channel][stride]
     return np.array([np.mean(state.holds(values), axis=0) for state in states])
 
 
@@ -276,8 +276,8 @@ def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]
             left, right = _PERCENT[first], _PERCENT[last - 1]
             if right - left >= _NARROWEST:
                 text, turn = (state.name, 0) if right - left >= _NARROW else (state.short, 90)
-                place = 0.5 * (left + right), float(np.mean(middle[first:last]))
-                axes.text(*place, text, ha="center", va="center", fontsize=9.0 if turn == 0 else 8.0, rotation=turn)
+                label_at = 0.5 * (left + right), float(np.mean(middle[first:last]))
+                axes.text(*label_at, text, ha="center", va="center", fontsize=9.0 if turn == 0 else 8.0, rotation=turn)
         below = below + fraction
     if not below.any():
         axes.text(50.0, 0.5, "no gait phases in this controller", ha="center", va="center", fontsize=9.0, color=GREY)
@@ -391,8 +391,8 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
     figure = Figure(figsize=_ANIMATION_SIZE, dpi=_RESOLUTION)
     pairs = ((comparison.without_device, "without", WITHOUT), (comparison.with_device, "with", WITH))
     scenes = []
-    for place, (result, word, colour) in enumerate(pairs):
-        axes = figure.add_axes((0.01 + 0.5 * place, 0.34, 0.48, 0.6))
+    for index, (result, word, colour) in enumerate(pairs):
+        axes = figure.add_axes((0.01 + 0.5 * index, 0.34, 0.48, 0.6))
         scenes.append(_scene(axes, result, turns, f"{word} the device", colour))
     traces = figure.add_axes((0.09, 0.115, 0.89, 0.18))
     worn, configuration = comparison.with_device, comparison.with_device.scenario

@@ -56,13 +56,13 @@ _THIN = {"linewidth": 0.8}
 def failures(configuration: Scenario) -> dict[str, float]:
     """Return when which sensor or part of the plant fails [s], by its name, in this order; {} where all are sound."""
     sensors = gait_sensors_of(configuration)._asdict()
-    found = {
+    failures_by_part = {
         name.removesuffix(_FAULT_SUFFIX): fault.time
         for name, fault in sensors.items()
         if name.endswith(_FAULT_SUFFIX) and fault.time < NEVER
     }
-    found |= {part: fault.numbers["time"] for part, fault in walk_of(configuration).broken.items()}
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    failures_by_part |= {part: fault.numbers["time"] for part, fault in walk_of(configuration).broken.items()}
+    return dict(sorted(failures_by_part.items(), key=lambda failure: failure[1]))
 
 
 def over_time_figure(result: WalkResult) -> "Figure":
@@ -89,8 +89,9 @@ def over_time_figure(result: WalkResult) -> "Figure":
             else:
                 named.append((begin, [part.replace("_", " ")]))
         for number, (begin, words) in enumerate(named):
+            fail = "fails" if len(words) == 1 else "fail"
             axes.annotate(
-                f"{', '.join(words)} {'fails' if len(words) == 1 else 'fail'}",
+                f"{', '.join(words)} {fail}",
                 (begin / scale, 0.98 - 0.16 * (number % 2)),
                 xycoords=("data", "axes fraction"),
                 ha="left" if begin < 0.6 * end else "right",
@@ -133,11 +134,11 @@ def acting_phase(recording: Recording) -> Floats:
 
 def _levels(recording: Recording, x: Kind) -> Panel:
     """Return the strip of help, pause and stop, with the name of each stretch that is wide enough."""
-    time, found = recording.time, recording["safe_state"]
-    edges = np.flatnonzero(np.diff(found, prepend=-1.0, append=-1.0))
+    time, state = recording.time, recording["safe_state"]
+    edges = np.flatnonzero(np.diff(state, prepend=-1.0, append=-1.0))
     marks, names = [], []
     for first, last in pairwise(edges.tolist()):
-        name, colour = _LEVELS[float(found[first])]
+        name, colour = _LEVELS[float(state[first])]
         begin, end = float(time[first]), float(time[min(last, time.size - 1)])
         marks.append(Mark("span", (begin, end), colour=colour, style={"alpha": 1.0}))
         if end - begin > 0.06 * time[-1]:

@@ -26,14 +26,13 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import WalkResult, load_walk, walk
-from ppafo.walking.bottle import Schedule, SupplyBalance
+from ppafo.walking.bottle import SupplyBalance
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.result import WALK_FORMAT
 
 SMALL = ["bottle.gas_mass=20 g", "bottle.volume=30 cm^3"]
 """A bottle that is walked to its end in a second."""
-FEW = Schedule(60.0, 0.0, 5.0)
 STRIDE = 1.0
 
 
@@ -200,7 +199,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = ["--bottle", PAPER_BOTTLE]
+    words = ["--bottle", PAPER_BOTTLE, "--minutes", "0.2"]
     assert main(["walk", "solenoid-regulators", *words, "--out", "on-bottle"]) == 0
     said = re.search(rf"bottle {PAPER_BOTTLE}: lasts (.*?): (.*)", capsys.readouterr().out)
     assert said is not None

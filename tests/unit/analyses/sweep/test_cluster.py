@@ -37,9 +37,9 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {name: path.read_bytes() for name, path in files.items() if name != LOG}
 
 
-@pytest.fixture
-def two_workers(tmp_path: Path) -> Iterator[Any]:
-    """A scheduler with two worker processes on this machine."""
+@pytest.fixture(scope="module")
+def two_workers(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """A scheduler with two worker processes on this machine, which start anew where one of them is killed."""
     from distributed import LocalCluster
 
     with LocalCluster(
@@ -47,7 +47,7 @@ def two_workers(tmp_path: Path) -> Iterator[Any]:
         threads_per_worker=1,
         processes=True,
         dashboard_address=":0",
-        local_directory=str(tmp_path / "dask"),
+        local_directory=str(tmp_path_factory.mktemp("dask")),
     ) as local:
         yield local
 

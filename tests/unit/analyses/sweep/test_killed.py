@@ -15,7 +15,7 @@ from ppafo.storage.files import LEFT_ASIDE
 STUDY = """
 schema_version = 1
 name = "killed"
-runs_of_chunk = 256
+runs_of_chunk = 128
 
 [[configurations]]
 name = "proportional"
@@ -27,7 +27,7 @@ scenario = "torque-task-solenoid"
 
 [sample]
 method = "latin_hypercube"
-runs = 4096
+runs = 2048
 seed = 5
 
 [[vary]]

@@ -190,9 +190,3 @@ def test_a_map_shows_the_mean_over_the_draws_where_it_belongs() -> None:
             assert own.sum() == 12
             mean = 1e3 * table["gas_supplied"][own].mean()
             assert mesh.get_array()[row, column] == pytest.approx(mean, rel=1e-9)
-
-
-def test_the_same_results_give_the_same_figure() -> None:
-    results = sweep(study(DRAWN, LEAK, names=BOTH))
-    one, other = (render_figure(results.plot(), ["svg", "png"]) for _ in range(2))
-    assert one == other

@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -187,19 +186,6 @@ def test_a_stopped_study_goes_on_to_the_same_bytes(
     assert {path: path.stat().st_mtime_ns for path in before} == before
 
 
-def test_what_a_killed_process_left_half_written_goes_away(
-    small_results: StudyResults, small: Any, tmp_path: Path
-) -> None:
-    out = tmp_path / "out"
-    (out / "runs").mkdir(parents=True)
-    (out / ".study.json.writing-0badcafe").write_bytes(b"{")
-    (out / "runs" / ".chunk-0000001.parquet.writing-0badcafe").write_bytes(b"PAR1")
-    for path in out.rglob("*.writing-*"):
-        os.utime(path, (0.0, 0.0))
-    sweep(small, out=out)
-    assert contents(out) == contents(small_results.place.address)
-
-
 def cut(content: bytes) -> bytes:
     """The first half."""
     return content[: len(content) // 2]
@@ -293,15 +279,6 @@ def test_a_study_whose_draws_were_changed_in_python_is_refused(small_results: St
         sweep(other, out=small_results.place.address)
 
 
-def test_a_folder_of_something_else_is_refused_and_left_alone(small: Any, tmp_path: Path) -> None:
-    (tmp_path / "thesis.txt").write_text("mine", encoding="utf-8")
-    with pytest.raises(StudyError, match="is not empty and contains no study results"):
-        sweep(small, out=tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
-    with pytest.raises(DataError, match="is a file; the results need a folder"):
-        sweep(small, out=tmp_path / "thesis.txt")
-
-
 def test_a_foreign_or_newer_manifest_is_refused(small: Any, tmp_path: Path) -> None:
     for text, expected in (("{}", "is not a manifest of study results"), ("{", "cannot be read")):
         (tmp_path / "study.json").write_text(text, encoding="utf-8")
@@ -393,10 +370,6 @@ def test_results_go_to_any_address_of_fsspec(small_results: StudyResults, small:
         assert results.place.address == address
     finally:
         system.rm("/ppafo-test", recursive=True)
-
-
-def test_a_study_object_can_be_run_as_it_is(small: Any, small_results: StudyResults) -> None:
-    assert sweep(load_study(small)).found.summary == small_results.summary
 
 
 def test_a_seed_takes_the_place_of_that_of_the_file(varying: Callable[..., Any]) -> None:

@@ -135,15 +135,6 @@ def test_interruption_after_the_last_chunk_says_that_the_chunks_are_kept(
     assert list((tmp_path / "out" / "runs").iterdir())
 
 
-def test_studies_of_the_package_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sweep", "--list", "--json"]) == 0
-    listed = json.loads(capsys.readouterr().out)["studies"]
-    names = [item["name"] for item in listed]
-    assert all(item["runs"] > 0 and item["description"] for item in listed)
-    assert names == sorted(names)
-    assert "pressure-and-area" in names
-
-
 def test_the_schema_describes_the_studies_of_the_package(capsys: pytest.CaptureFixture[str]) -> None:
     import jsonschema
 

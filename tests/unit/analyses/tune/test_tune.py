@@ -2,6 +2,7 @@
 
 import copy
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import jsonschema
@@ -80,6 +81,7 @@ def test_a_robust_tuning_judges_every_candidate_over_the_same_draws() -> None:
 CEILING = "the torque ceiling is the cause"
 
 
+@cache
 def held_by(level: str, share: float) -> Tuned:
     """A robust tuning that asks an uncertain device to hold a torque."""
     robust = {"study": "torque-task-uncertainty", "measure": "quantile", "share": share, "draws": 16}

@@ -1,26 +1,23 @@
 """Open valve, valve map and vane leak: planted values come back, tolerances are named, a wrong law is said once."""
 
 import math
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import (
-    OpenValveFlowSettings,
     Tolerances,
-    ValveMapSettings,
-    VaneLeakSettings,
     open_valve_flow,
     valve_map,
     vane_leak,
 )
 from ppafo.identification.bench.flow import GasAt, Opening, Sizes, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
-from ppafo.identification.fit import burg
+from ppafo.identification.noise import burg
 from ppafo.identification.source import Source
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
+from tests.unit.identification import planted
 
 VOLUME = 60e-6
 EXACT = Tolerances(gas_temperature=0.0, gas_law=0.0, zero_of_pressure=0.0, gain=0.0, zero_of_flow=0.0, held=0.0)
@@ -42,12 +39,9 @@ def test_the_shapes_of_flow_are_the_flow_functions_of_the_model_and_antisymmetri
     assert np.array_equal(orifice_shape(second, first, 1.3), -orifice_shape(first, second, 1.3))
 
 
-def test_a_planted_discharge_coefficient_lies_inside_its_interval_which_names_the_temperature(
-    planted: ModuleType,
-) -> None:
+def test_a_planted_discharge_coefficient_lies_inside_its_interval_which_names_the_temperature() -> None:
     gas = GasAt(0.044, 1.3, 298.0, 15.0 / math.sqrt(3.0))
-    settings = OpenValveFlowSettings(gas, area=31.6e-6, path="valves.main")
-    result = open_valve_flow((planted.flow(),), settings)
+    result = open_valve_flow((planted.flow(),), gas, area=31.6e-6, path="valves.main")
     found = result["valves.main.discharge_coefficient"]
     assert found.low <= 3.57 / 31.6 <= found.high
     assert 0.025 < found.half_width / found.value < 0.06
@@ -55,71 +49,67 @@ def test_a_planted_discharge_coefficient_lies_inside_its_interval_which_names_th
     assert (found.verdict, result.conflict) == ("identified", "")
 
 
-def test_a_gas_that_is_colder_than_stated_stays_inside_the_default_tolerance(planted: ModuleType) -> None:
+def test_a_gas_that_is_colder_than_stated_stays_inside_the_default_tolerance() -> None:
     source = planted.flow()
     cold = changed(source, "mass_flow", source.recording["mass_flow"] * np.sqrt(298.0 / 290.0))
-    found = open_valve_flow((cold,), OpenValveFlowSettings(GasAt(0.044, 1.3, 298.0, 15.0 / math.sqrt(3.0))))
+    found = open_valve_flow((cold,), GasAt(0.044, 1.3, 298.0, 15.0 / math.sqrt(3.0)))
     area = found["open_valve_flow.effective_area"]
     assert area.low <= 3.57e-6 <= area.high
-    exact = open_valve_flow((cold,), OpenValveFlowSettings(planted.CO2, tolerances=EXACT))
+    exact = open_valve_flow((cold,), planted.CO2, tolerances=EXACT)
     assert exact["open_valve_flow.effective_area"].low > 3.57e-6
 
 
-def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_holds_for_this_model_only(
-    planted: ModuleType,
-) -> None:
+def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_holds_for_this_model_only() -> None:
     source = planted.flow()
     pressures = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
     flow = 7.0e-9 * planted.CO2.flow_per_sonic_conductance * iso6358_shape(*pressures, 0.2)
     noisy = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
-    settings = OpenValveFlowSettings(planted.CO2, law="iso6358", path="valves.main", tolerances=EXACT)
-    result = open_valve_flow((noisy,), settings)
+    result = open_valve_flow((noisy,), planted.CO2, law="iso6358", path="valves.main", tolerances=EXACT)
     assert result["valves.main.sonic_conductance"].value == pytest.approx(7.0e-9, rel=0.01)
     assert result["valves.main.critical_ratio"].value == pytest.approx(0.2, abs=0.03)
     assert result.conflict == ""
-    wrong = open_valve_flow((noisy,), OpenValveFlowSettings(planted.CO2))
+    wrong = open_valve_flow((noisy,), planted.CO2)
     assert "try law = 'both', or for a valve 'iso6358'" in wrong.conflict
     assert wrong.estimates[0].verdict == "holds for this model only"
 
 
-def test_a_laminar_valve_gives_back_its_coefficient(planted: ModuleType) -> None:
+def test_a_laminar_valve_gives_back_its_coefficient() -> None:
     source = planted.flow()
     pressures = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
     flow = Opening(planted.CO2, "laminar").flow(Sizes(3.0e-14), *pressures)
     laminar = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
-    found = open_valve_flow((laminar,), OpenValveFlowSettings(planted.CO2, law="laminar"))
+    found = open_valve_flow((laminar,), planted.CO2, law="laminar")
     assert found["open_valve_flow.laminar_coefficient"].value == pytest.approx(3.0e-14, rel=0.01)
 
 
-def test_choked_flow_alone_is_refused_for_the_critical_ratio(planted: ModuleType) -> None:
-    settings = OpenValveFlowSettings(planted.CO2, law="iso6358")
+def test_choked_flow_alone_is_refused_for_the_critical_ratio() -> None:
     with pytest.raises(IdentificationError, match="C and b need choked and subsonic flow"):
-        open_valve_flow((planted.flow(ratios=(0.2, 0.3)),), settings)
+        open_valve_flow((planted.flow(ratios=(0.2, 0.3)),), planted.CO2, law="iso6358")
 
 
-def test_gauge_pressures_passed_for_absolute_are_refused(planted: ModuleType) -> None:
+def test_gauge_pressures_passed_for_absolute_are_refused() -> None:
     source = planted.flow()
     gauge = changed(source, "downstream_pressure", np.minimum(source.recording["downstream_pressure"] - 4e5, 0.0))
     with pytest.raises(IdentificationError, match="at sample 1, which is not an absolute pressure"):
-        open_valve_flow((gauge,), OpenValveFlowSettings(planted.CO2))
+        open_valve_flow((gauge,), planted.CO2)
 
 
-def test_exchanged_pressures_are_told(planted: ModuleType) -> None:
+def test_exchanged_pressures_are_told() -> None:
     source = planted.flow()
     first, second = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
     turned = changed(changed(source, "upstream_pressure", second), "downstream_pressure", first)
     with pytest.raises(IdentificationError, match="are the two columns swapped"):
-        open_valve_flow((turned,), OpenValveFlowSettings(planted.CO2))
+        open_valve_flow((turned,), planted.CO2)
 
 
-def test_a_valve_that_was_never_open_is_told(planted: ModuleType) -> None:
+def test_a_valve_that_was_never_open_is_told() -> None:
     half = changed(planted.flow(), "command", np.full(60, 0.5))
     with pytest.raises(IdentificationError, match="fully open"):
-        open_valve_flow((half,), OpenValveFlowSettings(planted.CO2))
+        open_valve_flow((half,), planted.CO2)
 
 
-def test_planted_dead_band_saturation_and_hysteresis_come_back(planted: ModuleType) -> None:
-    result = valve_map((planted.sweep(),), ValveMapSettings(planted.CO2, "valves.main"))
+def test_planted_dead_band_saturation_and_hysteresis_come_back() -> None:
+    result = valve_map((planted.sweep(),), planted.CO2, "valves.main")
     for path, truth, near in (
         ("valves.main.dead_band", 0.12, 0.003),
         ("effects.spool_play.width", 0.04, 0.003),
@@ -131,149 +121,144 @@ def test_planted_dead_band_saturation_and_hysteresis_come_back(planted: ModuleTy
     assert result.conflict == ""
 
 
-def test_the_zero_of_the_flow_meter_does_not_move_the_dead_band(planted: ModuleType) -> None:
+def test_the_zero_of_the_flow_meter_does_not_move_the_dead_band() -> None:
     source = planted.sweep()
     off = changed(source, "mass_flow", source.recording["mass_flow"] + 4e-5)
-    found = valve_map((off,), ValveMapSettings(planted.CO2))["valve.dead_band"]
+    found = valve_map((off,), planted.CO2)["valve.dead_band"]
     assert found.low <= 0.12 <= found.high
 
 
-def test_a_valve_that_opens_more_in_one_direction_holds_for_this_model_only(planted: ModuleType) -> None:
+def test_a_valve_that_opens_more_in_one_direction_holds_for_this_model_only() -> None:
     source = planted.sweep()
     flow = source.recording["mass_flow"]
-    result = valve_map(
-        (changed(source, "mass_flow", np.where(flow > 0.0, 1.2 * flow, flow)),), ValveMapSettings(planted.CO2)
-    )
+    result = valve_map((changed(source, "mass_flow", np.where(flow > 0.0, 1.2 * flow, flow)),), planted.CO2)
     assert "not the same in both directions" in result.conflict
 
 
-def test_a_command_that_only_rises_leaves_hysteresis_out(planted: ModuleType) -> None:
+def test_a_command_that_only_rises_leaves_hysteresis_out() -> None:
     up = Source(planted.sweep().recording.between(0.0, 10.0))
-    result = valve_map((up,), ValveMapSettings(planted.CO2))
+    result = valve_map((up,), planted.CO2)
     assert "effects.spool_play.width" not in [item.path for item in result.estimates]
 
 
-def test_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
+def test_flow_with_the_wrong_sign_is_told() -> None:
     with pytest.raises(IdentificationError, match="reverse the sign of one of them"):
-        valve_map((planted.sweep(sign=-1.0),), ValveMapSettings(planted.CO2))
+        valve_map((planted.sweep(sign=-1.0),), planted.CO2)
 
 
-def test_a_valve_that_is_open_at_command_zero_is_told(planted: ModuleType) -> None:
+def test_a_valve_that_is_open_at_command_zero_is_told() -> None:
     source = planted.sweep()
     command, flow = source.recording["command"].copy(), source.recording["mass_flow"].copy()
     nearest = np.argsort(np.abs(command))[:8]
     command[nearest], flow[nearest] = 0.0, flow.max()
     with pytest.raises(IdentificationError, match="more than half of its largest flow at command 0"):
-        valve_map((changed(changed(source, "command", command), "mass_flow", flow),), ValveMapSettings(planted.CO2))
+        valve_map((changed(changed(source, "command", command), "mass_flow", flow),), planted.CO2)
 
 
-def test_a_command_in_percent_is_told(planted: ModuleType) -> None:
+def test_a_command_in_percent_is_told() -> None:
     source = planted.sweep()
     percent = changed(source, "command", 100.0 * source.recording["command"])
     with pytest.raises(IdentificationError, match="it goes from -1 to 1"):
-        valve_map((percent,), ValveMapSettings(planted.CO2))
+        valve_map((percent,), planted.CO2)
 
 
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_planted_orifice_leak_gives_its_area_whichever_chamber_empties(planted: ModuleType, turned: bool) -> None:
+def test_a_planted_orifice_leak_gives_its_area_whichever_chamber_empties(turned: bool) -> None:
     source, volumes = planted.leak("orifice", EFFECTIVE), (VOLUME, VOLUME / 1.3)
     if turned:
         first, second = (source.recording[name] for name in ("pressure_1", "pressure_2"))
         source, volumes = changed(changed(source, "pressure_1", second), "pressure_2", first), volumes[::-1]
-    area = vane_leak((source,), VaneLeakSettings(planted.CO2, *volumes, 0.113, volume_deviation=0.01))[AREA]
+    area = vane_leak((source,), planted.CO2, *volumes, 0.113, volume_deviation=0.01)[AREA]
     assert area.low <= 0.3e-6 <= area.high
     assert area.half_width < 0.05 * area.value
     assert area.verdict == "identified"
 
 
-def test_a_leak_without_a_volume_is_an_area_over_it(planted: ModuleType) -> None:
-    found = vane_leak((planted.leak("orifice", EFFECTIVE),), VaneLeakSettings(planted.CO2))
+def test_a_leak_without_a_volume_is_an_area_over_it() -> None:
+    found = vane_leak((planted.leak("orifice", EFFECTIVE),), planted.CO2)
     area = found["vane_leak.area_over_volume"]
     assert area.low <= EFFECTIVE / VOLUME <= area.high
     assert "volume of chamber 1, which is not known" in area.explanation
 
 
-def test_gas_that_is_lost_outside_holds_for_this_model_only(planted: ModuleType) -> None:
+def test_gas_that_is_lost_outside_holds_for_this_model_only() -> None:
     source = planted.leak("orifice", EFFECTIVE, lost=5000.0)
-    result = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113))
+    result = vane_leak((source,), planted.CO2, VOLUME, VOLUME / 1.3, 0.113)
     assert "gas may leak elsewhere" in result.conflict
     assert result[AREA].verdict == "holds for this model only"
 
 
 @pytest.mark.parametrize("kind", ["leak", "steady"])
-def test_a_laminar_leak_gives_its_coefficient_and_an_orifice_holds_for_this_model_only(
-    planted: ModuleType, kind: str
-) -> None:
+def test_a_laminar_leak_gives_its_coefficient_and_an_orifice_holds_for_this_model_only(kind: str) -> None:
     source = getattr(planted, kind)("laminar", 2.0e-16)
-    found = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, law="laminar"))
+    found = vane_leak((source,), planted.CO2, VOLUME, VOLUME / 1.3, law="laminar")
     coefficient = found["vane_leak.laminar_coefficient"]
     assert coefficient.low <= 2.0e-16 <= coefficient.high
     assert found.conflict == ""
-    wrong = vane_leak((source,), VaneLeakSettings(planted.CO2, VOLUME, VOLUME / 1.3, 0.113))
+    wrong = vane_leak((source,), planted.CO2, VOLUME, VOLUME / 1.3, 0.113)
     assert "try law = 'both'" in wrong.conflict
 
 
-def test_a_tight_chamber_gives_an_upper_end_and_no_area(planted: ModuleType) -> None:
+def test_a_tight_chamber_gives_an_upper_end_and_no_area() -> None:
     time = np.arange(0.0, 20.0, 0.05)
     first = 4e5 + np.random.default_rng(2).normal(0.0, 300.0, time.size)
     tight = planted.source("tight", time, pressure_1=(first, "Pa"), pressure_2=(np.full(time.size, 1e5), "Pa"))
-    area = vane_leak((tight,), VaneLeakSettings(planted.CO2, VOLUME))["vane_leak.effective_area"]
+    area = vane_leak((tight,), planted.CO2, VOLUME)["vane_leak.effective_area"]
     assert not area.is_usable
     assert area.low == pytest.approx(0.0, abs=1e-12)
     assert 0.0 < area.high < 1e-8
 
 
-def test_gas_that_comes_to_rest_with_its_walls_is_no_leak(planted: ModuleType) -> None:
+def test_gas_that_comes_to_rest_with_its_walls_is_no_leak() -> None:
     time = np.arange(0.0, 60.0, 0.1)
     first = 4e5 * (1.0 + 0.01 * np.exp(-time / 12.0)) + np.random.default_rng(2).normal(0.0, 100.0, time.size)
     rests = planted.source("rests", time, pressure_1=(first, "Pa"), pressure_2=(np.full(time.size, 1e5), "Pa"))
-    assert not vane_leak((rests,), VaneLeakSettings(planted.CO2, VOLUME)).estimates[0].is_identified
+    assert not vane_leak((rests,), planted.CO2, VOLUME).estimates[0].is_identified
 
 
-def test_decays_that_empty_different_chambers_are_refused(planted: ModuleType) -> None:
+def test_decays_that_empty_different_chambers_are_refused() -> None:
     source = planted.leak("orifice", EFFECTIVE)
     first, second = source.recording["pressure_1"], source.recording["pressure_2"]
     turned = changed(changed(source, "pressure_1", second), "pressure_2", first)
     with pytest.raises(IdentificationError, match="chamber 1 empties in some recordings and chamber 2 in others"):
-        vane_leak((source, turned), VaneLeakSettings(planted.CO2, VOLUME, VOLUME))
+        vane_leak((source, turned), planted.CO2, VOLUME, VOLUME)
 
 
-def test_a_steady_orifice_leak_gives_its_area_beside_the_zero_of_the_meter(planted: ModuleType) -> None:
-    settings = VaneLeakSettings(planted.CO2, discharge_coefficient=0.113)
+def test_a_steady_orifice_leak_gives_its_area_beside_the_zero_of_the_meter() -> None:
     for zero in (0.0, 2.0e-6):
-        area = vane_leak((planted.steady("orifice", EFFECTIVE, zero),), settings)[AREA]
+        area = vane_leak((planted.steady("orifice", EFFECTIVE, zero),), planted.CO2, discharge_coefficient=0.113)[AREA]
         assert area.low <= 0.3e-6 <= area.high
         assert area.verdict == "identified"
 
 
-def test_steady_flow_with_the_wrong_sign_is_told(planted: ModuleType) -> None:
+def test_steady_flow_with_the_wrong_sign_is_told() -> None:
     with pytest.raises(IdentificationError, match="reverse its sign"):
-        vane_leak((planted.steady("orifice", -EFFECTIVE),), VaneLeakSettings(planted.CO2))
+        vane_leak((planted.steady("orifice", -EFFECTIVE),), planted.CO2)
 
 
-def test_a_leak_in_the_form_of_the_standard_gives_its_conductance(planted: ModuleType) -> None:
+def test_a_leak_in_the_form_of_the_standard_gives_its_conductance() -> None:
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, planted.ROOM)
     flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(Sizes(7.0e-11), first, second)
     flow *= 1.0 + np.random.default_rng(3).normal(0.0, 0.003, 24)
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     source = planted.source("steady", np.arange(24.0), **channels)
-    found = vane_leak((source,), VaneLeakSettings(planted.CO2, critical_ratio=0.25))["actuator.leak.sonic_conductance"]
+    found = vane_leak((source,), planted.CO2, critical_ratio=0.25)["actuator.leak.sonic_conductance"]
     assert found.value == pytest.approx(7.0e-11, rel=0.02)
     assert found.low <= 7.0e-11 <= found.high
 
 
-def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure(planted: ModuleType) -> None:
+def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure() -> None:
     opening = Opening(planted.CO2, "orifice", 1.0 / planted.CO2.choked_flow_constant)
     time = np.linspace(0.0, 3.0, 50)
     first, _ = pressures_of_fall(opening, Sizes(0.2), 1e6, 1e5, 0.0, 1.0, time)
     assert np.allclose(first, 1e6 * np.exp(-0.2 * time), rtol=1e-4)
 
 
-def test_a_leak_below_zero_absolute_pressure_is_refused(planted: ModuleType) -> None:
+def test_a_leak_below_zero_absolute_pressure_is_refused() -> None:
     source = planted.leak("orifice", EFFECTIVE)
     gauge = changed(source, "pressure_2", source.recording["pressure_2"] - 2.0e5)
     with pytest.raises(IdentificationError, match=r"'pressure_2' is .* at sample 1, which is not an absolute pressure"):
-        vane_leak((gauge,), VaneLeakSettings(planted.CO2))
+        vane_leak((gauge,), planted.CO2)
 
 
 def test_a_hundred_readings_with_white_noise_have_hardly_any_memory() -> None:

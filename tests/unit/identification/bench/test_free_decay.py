@@ -1,21 +1,18 @@
 """Free decay: the course of equation (1), planted damping and friction, and an inertia that may be unknown."""
 
 import math
-from types import ModuleType
 
 import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.bench import FreeDecaySettings, Tolerances, free_decay
+from ppafo.identification.bench import Tolerances, free_decay
 from ppafo.identification.bench.free_decay import course
 from ppafo.identification.source import Source
-
-SMOOTH = FreeDecaySettings(inertia=8.4e-3, rise=0.0, tolerances=Tolerances(gain=0.0))
-RATIOS = FreeDecaySettings(rise=0.0)
+from tests.unit.identification import planted
 
 
-def test_the_course_is_that_of_the_closed_form_and_ends_at_rest(planted: ModuleType) -> None:
+def test_the_course_is_that_of_the_closed_form_and_ends_at_rest() -> None:
     time = np.linspace(0.0, 8.0, 801)
     swept, speed = course(time, 3.0, 0.7, 0.5)
     assert np.allclose(swept, planted.angle_of_decay(time, 0.0, 3.0, 0.7, 0.5), atol=1e-6)
@@ -40,8 +37,8 @@ def test_a_decay_without_damping_or_without_friction_stays_finite() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_planted_damping_and_friction_lie_inside_their_intervals(planted: ModuleType, sign: float) -> None:
-    result = free_decay((planted.decay(sign=sign),), SMOOTH)
+def test_planted_damping_and_friction_lie_inside_their_intervals(sign: float) -> None:
+    result = free_decay((planted.decay(sign=sign),), inertia=8.4e-3, rise=0.0, tolerances=Tolerances(gain=0.0))
     for path, ratio in (
         ("friction.viscous_damping", planted.DAMPING_RATE),
         ("friction.dynamic_torque", planted.DECELERATION),
@@ -51,62 +48,51 @@ def test_planted_damping_and_friction_lie_inside_their_intervals(planted: Module
     assert result.conflict == ""
 
 
-def test_intervals_hold_in_about_the_stated_share_of_recordings(planted: ModuleType) -> None:
-    found = [free_decay((planted.decay(seed=seed),), RATIOS)["free_decay.damping_over_inertia"] for seed in range(20)]
+def test_intervals_hold_in_about_the_stated_share_of_recordings() -> None:
+    found = [free_decay((planted.decay(seed=seed),), rise=0.0)["free_decay.damping_over_inertia"] for seed in range(20)]
     assert sum(item.low <= planted.DAMPING_RATE <= item.high for item in found) >= 17
 
 
-def test_several_impulses_share_one_damping(planted: ModuleType) -> None:
+def test_several_impulses_share_one_damping() -> None:
     path = "free_decay.damping_over_inertia"
-    one = free_decay((planted.decay(seed=1),), RATIOS)[path]
-    three = free_decay(tuple(planted.decay(seed=seed) for seed in (1, 2, 3)), RATIOS)[path]
+    one = free_decay((planted.decay(seed=1),), rise=0.0)[path]
+    three = free_decay(tuple(planted.decay(seed=seed) for seed in (1, 2, 3)), rise=0.0)[path]
     assert three.half_width < 0.8 * one.half_width
     assert len(three.recordings) == 3
 
 
-def test_an_unknown_inertia_leaves_only_ratios_and_says_so(planted: ModuleType) -> None:
-    result = free_decay((planted.decay(),), RATIOS)
+def test_an_unknown_inertia_leaves_only_ratios_and_says_so() -> None:
+    result = free_decay((planted.decay(),), rise=0.0)
     assert [item.path.partition(".")[0] for item in result.estimates] == ["free_decay", "free_decay"]
     assert "inertia is not known" in result.summary
 
 
-def test_an_uncertain_inertia_widens_what_depends_on_it(planted: ModuleType) -> None:
-    settings = FreeDecaySettings(inertia=8.4e-3, inertia_deviation=0.84e-3 / math.sqrt(3.0), rise=0.0)
-    damping = free_decay((planted.decay(),), settings)["friction.viscous_damping"]
+def test_an_uncertain_inertia_widens_what_depends_on_it() -> None:
+    known = 8.4e-3, 0.84e-3 / math.sqrt(3.0)
+    damping = free_decay((planted.decay(),), None, None, *known, rise=0.0)["friction.viscous_damping"]
     assert damping.half_width / damping.value == pytest.approx(0.1 / np.sqrt(3.0) * 1.96, rel=0.05)
     assert "inertia" in damping.explanation
 
 
-def test_a_seal_that_grips_near_standstill_does_not_move_damping_out_of_its_interval(planted: ModuleType) -> None:
+def test_a_seal_that_grips_near_standstill_does_not_move_damping_out_of_its_interval() -> None:
     time = np.arange(0.0, 4.0, 0.005)
     angle = 0.4 + course(time, 6.0, 3.8, 1.3, 35.0, 0.05)[0] + np.random.default_rng(4).normal(0.0, 2e-3, time.size)
     source = planted.source("grips", time, angle=(angle, "rad"))
-    narrow, wide = (free_decay((source,), FreeDecaySettings(start=0.0, rise=rise)) for rise in (0.0, 40.0))
+    narrow, wide = (free_decay((source,), start=0.0, rise=rise) for rise in (0.0, 40.0))
     found = wide["free_decay.friction_over_inertia"]
     assert found.low <= 1.3 <= found.high
     missed = narrow["free_decay.friction_over_inertia"]
     assert narrow.conflict or not missed.low <= 1.3 <= missed.high
 
 
-def test_gravity_holds_for_this_model_only(planted: ModuleType) -> None:
+def test_gravity_holds_for_this_model_only() -> None:
     time = np.arange(0.0, 1.2, 0.005)
     noise = np.random.default_rng(1).normal(0.0, 1e-3, time.size)
     swing = planted.source("swing", time, angle=(0.6 * np.exp(-0.2 * time) * np.sin(1.2 * time) + noise, "rad"))
-    assert "another torque acts" in free_decay((swing,), FreeDecaySettings(start=0.0, rise=0.0)).conflict
+    assert "another torque acts" in free_decay((swing,), start=0.0, rise=0.0).conflict
 
 
-def test_an_angle_that_never_moves_is_refused(planted: ModuleType) -> None:
-    still = planted.source("still", np.arange(100.0), angle=(np.full(100, 0.3), "rad"))
-    with pytest.raises(IdentificationError, match=r"still: free-decay: channel 'angle' is 17\.1887 deg throughout"):
-        free_decay((still,))
-
-
-def test_too_few_samples_are_refused(planted: ModuleType) -> None:
-    with pytest.raises(IdentificationError, match="at least 20 samples between start and end, there are 2"):
-        free_decay((planted.decay(),), FreeDecaySettings(start=7.99))
-
-
-def with_velocity(planted: ModuleType, factor: float = 1.0) -> Source:
+def with_velocity(factor: float = 1.0) -> Source:
     """A decay whose angular velocity was recorded too, times a factor."""
     source = planted.decay()
     time = source.recording.time
@@ -115,14 +101,14 @@ def with_velocity(planted: ModuleType, factor: float = 1.0) -> Source:
     return Source(source.recording.with_channel("angular_velocity", factor * speed, "rad/s"))
 
 
-def test_a_recorded_velocity_makes_the_interval_narrower_and_it_holds(planted: ModuleType) -> None:
+def test_a_recorded_velocity_makes_the_interval_narrower_and_it_holds() -> None:
     path = "free_decay.damping_over_inertia"
-    alone, both = (free_decay((one,), RATIOS)[path] for one in (planted.decay(), with_velocity(planted)))
+    alone, both = (free_decay((one,), rise=0.0)[path] for one in (planted.decay(), with_velocity()))
     assert both.half_width < 0.8 * alone.half_width
     assert both.low <= planted.DAMPING_RATE <= both.high
 
 
 @pytest.mark.parametrize(("factor", "shown"), [(57.29578, "57.3 times"), (-1.0, "-1 times")])
-def test_a_velocity_in_another_unit_or_direction_is_refused(planted: ModuleType, factor: float, shown: str) -> None:
+def test_a_velocity_in_another_unit_or_direction_is_refused(factor: float, shown: str) -> None:
     with pytest.raises(IdentificationError, match=f"'angular_velocity' is {shown} as fast as 'angle' changes"):
-        free_decay((with_velocity(planted, factor),))
+        free_decay((with_velocity(factor),))

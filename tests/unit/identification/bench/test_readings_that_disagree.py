@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -10,10 +9,6 @@ import pytest
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import (
     BenchResult,
-    FreeDecaySettings,
-    OpenValveFlowSettings,
-    ValveMapSettings,
-    VaneLeakSettings,
     free_decay,
     open_valve_flow,
     static_torque,
@@ -22,6 +17,7 @@ from ppafo.identification.bench import (
 )
 from ppafo.identification.source import Source
 from ppafo.signals.recording import Floats
+from tests.unit.identification import planted
 
 Solve = Callable[[tuple[Source, ...]], BenchResult]
 RESPONSES = {
@@ -35,20 +31,20 @@ RESPONSES = {
 
 
 @pytest.fixture
-def solved(planted: ModuleType) -> dict[str, Solve]:
+def solved() -> dict[str, Solve]:
     """The procedure for each kind of recording."""
-    leaking = VaneLeakSettings(planted.CO2, 60e-6, 60e-6 / 1.3, 0.113)
+    leaking = planted.CO2, 60e-6, 60e-6 / 1.3, 0.113
     return {
-        "decay": lambda sources: free_decay(sources, FreeDecaySettings(rise=0.0)),
-        "flow": lambda sources: open_valve_flow(sources, OpenValveFlowSettings(planted.CO2)),
-        "sweep": lambda sources: valve_map(sources, ValveMapSettings(planted.CO2)),
-        "leak": lambda sources: vane_leak(sources, leaking),
-        "steady": lambda sources: vane_leak(sources, leaking),
+        "decay": lambda sources: free_decay(sources, rise=0.0),
+        "flow": lambda sources: open_valve_flow(sources, planted.CO2),
+        "sweep": lambda sources: valve_map(sources, planted.CO2),
+        "leak": lambda sources: vane_leak(sources, *leaking),
+        "steady": lambda sources: vane_leak(sources, *leaking),
         "static": static_torque,
     }
 
 
-def made(planted: ModuleType, kind: str, seed: int) -> Source:
+def made(kind: str, seed: int) -> Source:
     """Return a right recording of a kind."""
     sized = {"leak": ("orifice", 3.39e-8), "steady": ("orifice", 3.39e-8)}
     return getattr(planted, kind)(*sized.get(kind, ()), seed=seed)  # type: ignore[no-any-return]
@@ -62,7 +58,7 @@ def changed(source: Source, name: str, values: Floats, file: str = "") -> Source
 @pytest.mark.parametrize("seed", [11, 12, 13])
 @pytest.mark.parametrize("fault", ["gain", "zero"])
 def test_a_repetition_of_another_gain_or_zero_is_named_and_not_weighed_out(
-    planted: ModuleType, solved: dict[str, Solve], fault: str, seed: int
+    solved: dict[str, Solve], fault: str, seed: int
 ) -> None:
     source = planted.static(seed=seed)
     torque = source.recording["torque"].copy()
@@ -74,11 +70,9 @@ def test_a_repetition_of_another_gain_or_zero_is_named_and_not_weighed_out(
 
 
 @pytest.mark.parametrize("kind", ["decay", "flow", "sweep", "steady"])
-def test_a_recording_of_another_gain_is_named_with_its_file(
-    planted: ModuleType, solved: dict[str, Solve], kind: str
-) -> None:
+def test_a_recording_of_another_gain_is_named_with_its_file(solved: dict[str, Solve], kind: str) -> None:
     name = RESPONSES[kind]
-    right = tuple(made(planted, kind, seed) for seed in (1, 2, 3))
+    right = tuple(made(kind, seed) for seed in (1, 2, 3))
     values = right[2].recording[name]
     wrong = changed(right[2], name, values[0] + 1.1 * (values - values[0]), "third.csv")
     assert solved[kind](right).conflict == ""
@@ -88,10 +82,8 @@ def test_a_recording_of_another_gain_is_named_with_its_file(
 
 
 @pytest.mark.parametrize("kind", RESPONSES)
-def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(
-    planted: ModuleType, solved: dict[str, Solve], kind: str
-) -> None:
-    name, source = RESPONSES[kind], made(planted, kind, 5)
+def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(solved: dict[str, Solve], kind: str) -> None:
+    name, source = RESPONSES[kind], made(kind, 5)
     values = source.recording[name].copy()
     # Neither about zero nor at the ends.
     at = int(np.flatnonzero(np.abs(values) > 0.5 * np.abs(values).max())[9])
@@ -105,9 +97,9 @@ def test_a_reading_of_ten_times_its_value_is_named_before_a_fit(
     [("static", "pressure_difference"), ("flow", "upstream_pressure"), ("sweep", "downstream_pressure")],
 )
 def test_a_pressure_of_ten_times_its_value_is_named_before_a_fit(
-    planted: ModuleType, solved: dict[str, Solve], kind: str, name: str
+    solved: dict[str, Solve], kind: str, name: str
 ) -> None:
-    source = made(planted, kind, 5)
+    source = made(kind, 5)
     values = source.recording[name].copy()
     at = int(np.argsort(values)[values.size // 2])
     values[at] *= 10.0
@@ -115,7 +107,7 @@ def test_a_pressure_of_ten_times_its_value_is_named_before_a_fit(
         solved[kind]((changed(source, name, values),))
 
 
-def test_two_wrong_readings_are_both_named(planted: ModuleType) -> None:
+def test_two_wrong_readings_are_both_named() -> None:
     source = planted.static()
     torque = source.recording["torque"].copy()
     torque[[12, 90]] *= (10.0, 20.0)
@@ -123,7 +115,7 @@ def test_two_wrong_readings_are_both_named(planted: ModuleType) -> None:
         static_torque((changed(source, "torque", torque),))
 
 
-def test_friction_that_grows_with_the_root_of_the_pressure_holds_for_this_model_only(planted: ModuleType) -> None:
+def test_friction_that_grows_with_the_root_of_the_pressure_holds_for_this_model_only() -> None:
     flagged = 0
     for seed in range(10):
         source = planted.static(seed=seed)

@@ -169,7 +169,7 @@ def _view(design: Design, title: str, x: str, y: str, legend: str) -> Panel:
     places = np.array([[getattr(point, name) for name in (x, y)] for point in design.front])
     pairs = [(point.valve, point.actuator) for point in design.front]
     # Looks are given in the order of the problem, so that a valve keeps its colour in all views.
-    groups = [(item.valve, item.actuator) for item in design.problem.combinations]
+    groups = [(combination.valve, combination.actuator) for combination in design.problem.combinations]
     valves, actuators = (
         {group[side].name: group[side].title for group in groups if group[side] in used}
         for side, used in enumerate(zip(*pairs, strict=True))
@@ -225,13 +225,13 @@ _MEANS = (
 @in_units(lambda design: next(iter(design.problem.tasks[0].scenarios.values())).device.shown)
 def finding_of(design: Design) -> Finding[Design]:
     """Return a design study in words, tables and panels."""
-    problem, points = design.problem, [design.front[place] for place in design.shown]
+    problem, points = design.problem, [design.front[number] for number in design.shown]
     carried = ", ".join(part.title for part in problem.carried)
     front = (
         "No other design found beats one below in tracking error, gas per task and mass together: less of one of the "
-        "three costs more of "
-        f"another.{f' Every design carries {carried}; their mass is in the table.' if carried else ''}"
+        "three costs more of another."
     )
+    front += f" Every design carries {carried}; their mass is in the table." if carried else ""
     tasks = [
         (task.name, task.weight, ", ".join(f"{scenario.name} ({kind})" for kind, scenario in task.scenarios.items()))
         for task in problem.tasks
@@ -248,7 +248,7 @@ def finding_of(design: Design) -> Finding[Design]:
             finding.Part(
                 "Designs",
                 _columns(design, points),
-                marked=[row for row, place in enumerate(design.shown) if place == design.knee],
+                marked=[row for row, point in enumerate(design.shown) if point == design.knee],
                 left=2,
             ),
             finding.Part(remarks=_remarks(design)),
@@ -278,10 +278,10 @@ def _table_bytes(design: Design) -> bytes:
 def _suggestion(design: Design) -> Iterator[finding.Part]:
     """Yield the suggestion as it ran once more in each task, with its figure and the command that repeats it."""
     for number, rerun in enumerate(design.suggested, 1):
-        found = rerun.result.metrics
+        metrics = rerun.result.metrics
         error, gas = (
-            OBJECTIVES["error"].text(found[design.problem.error].value),
-            OBJECTIVES["gas"].text(found[GAS].value),
+            OBJECTIVES["error"].text(metrics[design.problem.error].value),
+            OBJECTIVES["gas"].text(metrics[GAS].value),
         )
         yield finding.Part(
             "The suggestion, run once more" if number == 1 else "",
@@ -301,11 +301,11 @@ def front_table(design: Design) -> str:
     """Return the whole front as comma-separated text in SI units, named in the header."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
-    numbers = [f"{item.path} [{item.unit or '-'}]" for item in design.problem.variables]
+    numbers = [f"{variable.path} [{variable.unit or '-'}]" for variable in design.problem.variables]
     spread = ["error from noise [N m]", "gas from noise [kg]"] if design.streams else []
     writer.writerow(["valve", "actuator", "error [N m]", "gas [kg]", "mass [kg]", *spread, *numbers])
     for point in design.front:
-        values = [point.numbers.get(item.path, "") for item in design.problem.variables]
+        values = [point.numbers.get(variable.path, "") for variable in design.problem.variables]
         writer.writerow([point.valve.name, point.actuator.name, *point.objectives, *(point.spread or ()), *values])
     return buffer.getvalue()
 
@@ -318,12 +318,12 @@ def _columns(design: Design, points: list[DesignPoint]) -> list[Column]:
     if design.streams:
         titles.append(("error from noise", replace(OBJECTIVES["error"], form=".2g")))
         rows = [[*row, point.spread[0] if point.spread else None] for row, point in zip(rows, points, strict=True)]
-    for item in design.problem.variables:
+    for variable in design.problem.variables:
         # Its path without the section, with its unit.
-        words, quantity = item.path.partition(".")[2].replace("_", " "), quantity_of_unit(item.unit)
-        own_unit = "" if quantity or item.unit in ("", "1") else f" ({item.unit})"
+        words, quantity = variable.path.partition(".")[2].replace("_", " "), quantity_of_unit(variable.unit)
+        own_unit = "" if quantity or variable.unit in ("", "1") else f" ({variable.unit})"
         titles.append((f"{words}{own_unit}", Kind(quantity=quantity)))
-        rows = [[*row, point.numbers.get(item.path)] for row, point in zip(rows, points, strict=True)]
+        rows = [[*row, point.numbers.get(variable.path)] for row, point in zip(rows, points, strict=True)]
     return columns_of(titles, rows)
 
 

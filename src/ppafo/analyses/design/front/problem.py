@@ -51,8 +51,8 @@ _BY_PARTS = {
     "actuator.dead_volume_1": DEAD_VOLUME,
     "actuator.dead_volume_2": DEAD_VOLUME,
 }
-_AREA = {f"valve.{item.name}" for item in AREA_FORM}
-_SONIC = {f"valve.{item.name}" for item in SONIC_FORM}
+_AREA = {f"valve.{quantity.name}" for quantity in AREA_FORM}
+_SONIC = {f"valve.{quantity.name}" for quantity in SONIC_FORM}
 
 
 class VariableTable(StrictTable):
@@ -80,14 +80,14 @@ class Variable:
     is_logarithmic: bool
     kinds: tuple[str, ...] = ()
 
-    def value(self, place: Floats) -> Floats:
+    def value(self, fraction: Floats) -> Floats:
         """Return the values (candidates,) in SI at places from 0 to 1."""
         if self.values:
             count = len(self.values)
-            return np.array(self.values)[np.minimum((place * count).astype(np.int64), count - 1)]
+            return np.array(self.values)[np.minimum((fraction * count).astype(np.int64), count - 1)]
         if self.is_logarithmic:
-            return np.asarray(np.exp(np.log(self.lowest) + place * np.log(self.highest / self.lowest)))
-        return self.lowest + place * (self.highest - self.lowest)
+            return np.asarray(np.exp(np.log(self.lowest) + fraction * np.log(self.highest / self.lowest)))
+        return self.lowest + fraction * (self.highest - self.lowest)
 
 
 def read_variables(
@@ -106,52 +106,52 @@ def read_variables(
     known = {path: quantity for scenario in everything for path, quantity in declared_numbers(scenario).items()}
     known = {path: quantity for path, quantity in known.items() if path not in _BY_PARTS} | OWN
     atmosphere = everything[0].device.supply.atmospheric_pressure
-    found = []
+    variables = []
     for path, table in tables.items():
-        place = f"{file}: variables.'{path}'"
-        _check_path(path, known, valves, place)
+        where = f"{file}: variables.'{path}'"
+        _check_path(path, known, valves, where)
         # The kinds of valve whose scenarios have a number, none where all of them do.
         having = {
             kind: path in OWN or any(path in declared_numbers(scenario) for scenario in of_kind)
             for kind, of_kind in scenarios.items()
         }
         kinds = () if all(having.values()) else tuple(kind for kind, has in having.items() if has)
-        found.append(replace(_variable(path, table, known[path], atmosphere, place), kinds=kinds))
-    return tuple(found)
+        variables.append(replace(_variable(path, table, known[path], atmosphere, where), kinds=kinds))
+    return tuple(variables)
 
 
-def _check_path(path: str, known: Mapping[str, Quantity], valves: Sequence[Part], place: str) -> None:
+def _check_path(path: str, known: Mapping[str, Quantity], valves: Sequence[Part], where: str) -> None:
     if path in _BY_PARTS:
-        raise StudyError(f"{place}: is fixed by the chosen actuator; vary '{_BY_PARTS[path]}' instead")
+        raise StudyError(f"{where}: is fixed by the chosen actuator; vary '{_BY_PARTS[path]}' instead")
     if path not in known:
         hint = nearest_name(path, known) or f"; for example {', '.join([*OWN, 'supply.pressure', 'controller.rate'])}"
-        raise StudyError(f"{place}: no scenario of the tasks has such a value{hint}")
+        raise StudyError(f"{where}: no scenario of the tasks has such a value{hint}")
     other = _SONIC if path in _AREA else _AREA if path in _SONIC else frozenset[str]()
     for valve in valves:
         if {f"valve.{name}" for name in valve.values} & other:
-            raise StudyError(f"{place}: valve '{valve.name}' gives its orifice in the other form")
+            raise StudyError(f"{where}: valve '{valve.name}' gives its orifice in the other form")
 
 
-def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: float, place: str) -> Variable:
+def _variable(path: str, table: VariableTable, quantity: Quantity, atmosphere: float, where: str) -> Variable:
     between = [text for text in (table.lowest, table.highest) if text is not None]
     if bool(table.values) == bool(between) or len(between) == 1:
-        raise StudyError(f"{place}: give either lowest and highest, or values")
+        raise StudyError(f"{where}: give either lowest and highest, or values")
     if path in TIMES and not table.values:
         raise StudyError(
-            f"{place}: is a time or rate of the run; list the values to choose from, values = ['500 Hz', '1 kHz']"
+            f"{where}: is a time or rate of the run; list the values to choose from, values = ['500 Hz', '1 kHz']"
         )
     numbers, unit = [], "" if quantity.unit == "1" else quantity.unit
     for text in table.values or between:
-        with refused_as(StudyError, f"{place}: '{text}'", UnitError):
+        with refused_as(StudyError, f"{where}: '{text}'", UnitError):
             value = parse_quantity(text, unit, atmosphere)
         if not is_within(value, quantity):
-            raise StudyError(f"{place}: '{text}': must be {limits_text(quantity)}")
+            raise StudyError(f"{where}: '{text}': must be {limits_text(quantity)}")
         numbers.append(value)
     lowest, highest = min(numbers), max(numbers)
     if not table.values and numbers[0] >= numbers[1]:
-        raise StudyError(f"{place}: lowest = '{table.lowest}' must be below highest = '{table.highest}'")
+        raise StudyError(f"{where}: lowest = '{table.lowest}' must be below highest = '{table.highest}'")
     if table.scale == "log" and lowest <= 0.0:
-        raise StudyError(f"{place}: scale = 'log' needs limits above 0")
+        raise StudyError(f"{where}: scale = 'log' needs limits above 0")
     return Variable(
         path,
         quantity.unit,
@@ -298,11 +298,11 @@ def design_problem(document: DesignFile, file: str, folder: Path, seed: int | No
         raise StudyError(f"{file}: variables.'{NOISE}': every design meets the same noise, so it cannot be searched")
     by_kind = {kind: [task.scenarios[kind] for task in tasks] for kind in tasks[0].scenarios}
     bottles = [] if document.parts.bottle is None else [catalogue.part("bottles", document.parts.bottle)]
-    place = f"{file}: parts.other_mass"
-    with refused_as(StudyError, f"{place} = '{document.parts.other_mass}'", UnitError):
+    where = f"{file}: parts.other_mass"
+    with refused_as(StudyError, f"{where} = '{document.parts.other_mass}'", UnitError):
         other_mass = parse_quantity(document.parts.other_mass, "kg")
     if other_mass < 0.0:
-        raise StudyError(f"{place} = '{document.parts.other_mass}': must be at least 0 kg")
+        raise StudyError(f"{where} = '{document.parts.other_mass}': must be at least 0 kg")
     problem = DesignProblem(
         name=document.name,
         description=document.description,
@@ -359,25 +359,25 @@ def _constraints(document: DesignFile, tasks: Sequence[Task], file: str) -> tupl
     # Gauge pressures count from the atmosphere, which may differ from task to task; a searched one is not known: 0.
     searched = [0.0] if ATMOSPHERE_PATH in document.variables else []
     scenarios = [scenario for task in tasks for scenario in task.scenarios.values()]
-    atmospheres = frozenset([*searched, *(item.device.supply.atmospheric_pressure for item in scenarios)])
-    found = []
+    atmospheres = frozenset([*searched, *(scenario.device.supply.atmospheric_pressure for scenario in scenarios)])
+    constraints = []
     for name, table in document.constraints.items():
-        place = f"{file}: constraints.{name}"
+        where = f"{file}: constraints.{name}"
         if name not in units:
             hint = nearest_name(name, units)
-            raise StudyError(f"{place}: there is no such metric{hint}; available: {', '.join(units)}")
+            raise StudyError(f"{where}: there is no such metric{hint}; available: {', '.join(units)}")
         limits: list[float | None] = []
         for key, text in (("least", table.least), ("most", table.most)):
-            what = f"{place}.{key} = '{text}'"
+            what = f"{where}.{key} = '{text}'"
             limits.append(None if text is None else common_level(text, units[name], what, atmospheres))
             if text is not None and limits[-1] is None:
                 raise StudyError(f"{what}: the designs have several atmospheres; give an absolute pressure")
         least, most = limits
         if least is None and most is None:
-            raise StudyError(f"{place}: has no limit; give least, most or both")
+            raise StudyError(f"{where}: has no limit; give least, most or both")
         if least is not None and most is not None and least > most:
             raise StudyError(
-                f"{place}: least = '{table.least}' is above most = '{table.most}'; no design can satisfy both"
+                f"{where}: least = '{table.least}' is above most = '{table.most}'; no design can satisfy both"
             )
-        found.append(Constraint(_OWN_NAMES.get(name, name), units[name], least, most))
-    return tuple(found)
+        constraints.append(Constraint(_OWN_NAMES.get(name, name), units[name], least, most))
+    return tuple(constraints)

@@ -153,16 +153,16 @@ def hypervolume(points: Floats, reference: Floats) -> float:
     ys: list[float] = []
     volume = area = 0.0
     for (x, y, height), above in zip(ordered.tolist(), [*ordered[1:, 2].tolist(), last], strict=True):
-        place = bisect_left(xs, x)
-        level = ys[place - 1] if place else top
-        if level > y and not (place < len(xs) and xs[place] == x and ys[place] <= y):
+        step = bisect_left(xs, x)
+        level = ys[step - 1] if step else top
+        if level > y and not (step < len(xs) and xs[step] == x and ys[step] <= y):
             # What it dominates and no point before it did; the points that it dominates leave the staircase.
-            gained, start, end = 0.0, x, place
+            gained, start, end = 0.0, x, step
             while end < len(xs) and ys[end] >= y:
                 gained += (xs[end] - start) * (level - y)
                 start, level, end = xs[end], ys[end], end + 1
             area += gained + ((xs[end] if end < len(xs) else right) - start) * (level - y)
-            xs[place:end], ys[place:end] = [x], [y]
+            xs[step:end], ys[step:end] = [x], [y]
         volume += area * (above - height)
     return volume
 
@@ -189,7 +189,7 @@ def representatives(objectives: Floats, most: int = MAXIMUM_SHOWN) -> tuple[int,
     """
     scaled = fractions(objectives)
     chosen = list(dict.fromkeys([*np.argmin(objectives, axis=0).tolist(), knee(objectives)]))[:most]
-    distance = np.min([np.linalg.norm(scaled - scaled[place], axis=1) for place in chosen], axis=0)
+    distance = np.min([np.linalg.norm(scaled - scaled[point], axis=1) for point in chosen], axis=0)
     while len(chosen) < min(most, objectives.shape[0]) and distance.max() > 0.0:
         chosen.append(int(np.argmax(distance)))
         distance = np.minimum(distance, np.linalg.norm(scaled - scaled[chosen[-1]], axis=1))
@@ -250,13 +250,13 @@ def search_front(
     """
     begun = time.monotonic()
     random = np.random.default_rng(settings.seed)
-    found = evenly_spread(settings.screening, choices, variables, settings.seed)
-    worth = evaluate(found)
+    evaluated = evenly_spread(settings.screening, choices, variables, settings.seed)
+    worth = evaluate(evaluated)
     best = survivors(worth, settings.population)
-    population, standing = found.at(best), worth.at(best)
+    population, standing = evaluated.at(best), worth.at(best)
     box = _box(worth)
     keep = non_dominated(worth) & worth.is_feasible
-    found, worth = found.at(keep), worth.at(keep)
+    evaluated, worth = evaluated.at(keep), worth.at(keep)
     growth = [(settings.screening, _dominated_fraction(worth, box))]
     while len(growth) <= settings.generations and not _has_settled(growth, settings.tolerance):
         children = vary(population, choices, random)
@@ -265,13 +265,13 @@ def search_front(
         best = survivors(standing, settings.population)
         population, standing = population.at(best), standing.at(best)
         good = value.is_feasible
-        found, worth = found.with_more(children.at(good)), worth.with_more(value.at(good))
+        evaluated, worth = evaluated.with_more(children.at(good)), worth.with_more(value.at(good))
         # Equal points do not dominate each other: without this one design would fill the front with its copies.
         _, once = np.unique(worth.objectives, axis=0, return_index=True)
         once.sort()
-        found, worth = found.at(once), worth.at(once)
+        evaluated, worth = evaluated.at(once), worth.at(once)
         keep = non_dominated(worth)
-        found, worth = found.at(keep), worth.at(keep)
+        evaluated, worth = evaluated.at(keep), worth.at(keep)
         # No design of the first sample kept the constraints: the first that do give the box.
         if box is None:
             box = _box(worth)
@@ -280,7 +280,7 @@ def search_front(
         designs, fraction = growth[-1]
         most = settings.screening + settings.generations * settings.population
         progress(Progress(f"hypervolume {fraction:.2f}", designs, most, elapsed=elapsed, noun="designs"))
-    return Front(found, worth, tuple(growth), _has_settled(growth, settings.tolerance))
+    return Front(evaluated, worth, tuple(growth), _has_settled(growth, settings.tolerance))
 
 
 def vary(population: Candidates, choices: int, random: np.random.Generator) -> Candidates:

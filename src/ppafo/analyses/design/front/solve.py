@@ -80,7 +80,7 @@ class Evaluation:
         self.reasons: dict[str, str] = {}
         self.seeds = noise_streams(problem, 0, STREAMS)
         self._threads = threads
-        own = (item.name for item in problem.constraints if item.name not in OBJECTIVES)
+        own = (constraint.name for constraint in problem.constraints if constraint.name not in OBJECTIVES)
         self._metrics = tuple(dict.fromkeys([problem.error, GAS, *own]))
 
     def __call__(self, candidates: Candidates) -> Worth:
@@ -96,8 +96,8 @@ class Evaluation:
             np.sum([weight * found[name] for weight, found in zip(weights, metrics, strict=True)], axis=0)
             for name in (problem.error, GAS)
         )
-        valves = np.array([item.valve.full_mass for item in problem.combinations])
-        actuators = np.array([item.actuator.full_mass for item in problem.combinations])
+        valves = np.array([combination.valve.full_mass for combination in problem.combinations])
+        actuators = np.array([combination.actuator.full_mass for combination in problem.combinations])
         size = values_of(problem, candidates).get(SIZE, np.ones(len(candidates)))
         fixed = problem.other_mass + sum(part.full_mass for part in problem.carried)
         # All that is carried; an actuator that is scaled has its part's mass times the scale.
@@ -109,8 +109,8 @@ class Evaluation:
     def metrics(self, task: Task, candidates: Candidates, seeds: Floats) -> dict[str, Floats]:
         """Return the metrics (streams, candidates) of a task by name; nan where a run failed."""
         found = {name: np.full((max(1, seeds.size), len(candidates)), np.nan) for name in self._metrics}
-        names = np.array([item.valve.name for item in self.problem.combinations])[candidates.choice]
-        valves = {item.valve.name: item.valve for item in self.problem.combinations}
+        names = np.array([combination.valve.name for combination in self.problem.combinations])[candidates.choice]
+        valves = {combination.valve.name: combination.valve for combination in self.problem.combinations}
         # Valve by valve: all runs of one have one kind of valve and one form of orifice, so one program.
         for name in np.unique(names):
             scenario, members = task.scenarios[valves[str(name)].kind], np.flatnonzero(names == name)
@@ -127,24 +127,27 @@ class Evaluation:
     def _violation(self, candidates: Candidates, objectives: Floats, metrics: Sequence[Mapping[str, Floats]]) -> Floats:
         total = np.zeros(len(candidates))
         own: Mapping[str, Floats] = dict(zip(OBJECTIVES, objectives.T[:, None, :], strict=True))
-        for item in self.problem.constraints:
-            series = [own[item.name]] if item.name in own else [found[item.name] for found in metrics]
+        for constraint in self.problem.constraints:
+            series = [own[constraint.name]] if constraint.name in own else [found[constraint.name] for found in metrics]
             for values in series:
-                beyond = _excess(values, item.most, 1.0) + _excess(values, item.least, -1.0)
+                beyond = _excess(values, constraint.most, 1.0) + _excess(values, constraint.least, -1.0)
                 total += beyond.max(axis=0)
         # By what fraction (candidates,) the highest supply pressure is above what the parts are made for.
         problem = self.problem
         ratings = np.array(
-            [rated_pressure(item.valve, item.actuator, *problem.carried) for item in problem.combinations]
+            [
+                rated_pressure(combination.valve, combination.actuator, *problem.carried)
+                for combination in problem.combinations
+            ]
         )[candidates.choice]
         chosen = values_of(problem, candidates)
         highest = np.zeros(len(candidates))
         for task in problem.tasks:
             for scenario in task.scenarios.values():
-                found = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
+                moved = moving_together(scenario, {path: chosen[path] for path in SUPPLIES if path in chosen})
                 for path in SUPPLIES[:2]:
                     # One pressure may follow the other: all pressures are read, not the variables alone.
-                    highest = np.maximum(highest, found.get(path, number_at(scenario, path)))
+                    highest = np.maximum(highest, moved.get(path, number_at(scenario, path)))
         total += np.asarray(np.maximum(0.0, highest / ratings - 1.0))
         return np.where(np.isfinite(objectives).all(axis=1) & np.isfinite(total), total, np.inf)
 
@@ -159,12 +162,16 @@ def _excess(values: Floats, limit: float | None, sign: float) -> Floats:
 def noise_streams(problem: DesignProblem, first: int, count: int) -> Floats:
     """Return the seeds of streams of noise, from number ``first`` on; none where no controller receives noise."""
     scenarios = [scenario for task in problem.tasks for scenario in task.scenarios.values()]
-    return seeds_of_noise(scenarios, [item.path for item in problem.variables], first, count, problem.search.seed)
+    return seeds_of_noise(
+        scenarios, [variable.path for variable in problem.variables], first, count, problem.search.seed
+    )
 
 
 def values_of(problem: DesignProblem, candidates: Candidates) -> dict[str, Floats]:
     """Return the chosen numbers (candidates,) in SI, by path."""
-    return {item.path: item.value(candidates.places[:, index]) for index, item in enumerate(problem.variables)}
+    return {
+        variable.path: variable.value(candidates.places[:, index]) for index, variable in enumerate(problem.variables)
+    }
 
 
 def design_columns(problem: DesignProblem, scenario: Scenario, candidates: Candidates) -> dict[str, Floats]:
@@ -175,7 +182,9 @@ def design_columns(problem: DesignProblem, scenario: Scenario, candidates: Candi
     columns = {path: np.full(count, number) for path, number in combinations[0].valve.model_numbers.items()}
     size = chosen.get(SIZE, np.ones(count))
     for name in ("torque_constant", "displacement_per_radian"):
-        columns[f"actuator.{name}"] = size * np.array([item.actuator.values[name] for item in combinations])
+        columns[f"actuator.{name}"] = size * np.array(
+            [combination.actuator.values[name] for combination in combinations]
+        )
     if DEAD_VOLUME in chosen:
         columns |= {f"{DEAD_VOLUME}_{chamber}": chosen[DEAD_VOLUME] for chamber in (1, 2)}
     known = declared_numbers(scenario)
@@ -196,7 +205,7 @@ def find_front(problem: DesignProblem, threads: int | None = None, report: Repor
         if evaluation.failed == evaluation.runs:
             reason = next(iter(evaluation.reasons), "no reason was given")
             raise StudyError(f"{problem.file}: all {evaluation.runs} runs failed; the first: {reason}")
-        names = ", ".join(item.name for item in problem.constraints) or "the rated pressure of the parts"
+        names = ", ".join(constraint.name for constraint in problem.constraints) or "the rated pressure of the parts"
         raise StudyError(
             f"{problem.file}: none of {front.growth[-1][0]} designs satisfies the constraints ({names}); relax them, "
             "widen the variables or name other parts, and check that every task has these metrics"
@@ -233,8 +242,8 @@ def _run_again(problem: DesignProblem, task: Task, chosen: Candidates) -> Rerun:
     """Return one design run in a task as its files and the command line have it."""
     scenario = task.scenarios[problem.combinations[int(chosen.choice[0])].valve.kind]
     origin, columns = scenario.origin, design_columns(problem, scenario, chosen)
-    known = {path: item.unit for path, item in declared_numbers(scenario).items()}
-    units = known | {item.path: item.unit for item in problem.variables}
+    known = {path: quantity.unit for path, quantity in declared_numbers(scenario).items()}
+    units = known | {variable.path: variable.unit for variable in problem.variables}
     texts = [
         f"{path}={values[0]:.6g} {'' if units[path] in PLAIN else units[path]}".strip()
         for path, values in columns.items()
@@ -265,13 +274,13 @@ def _points(problem: DesignProblem, candidates: Candidates, assessed: Assessed) 
     """Return designs with what each task reports of each, and the numbers that mean something for its kind of valve."""
     numbers, is_noisy = values_of(problem, candidates), len(assessed.error) > 1
     means = {
-        task.name: (found[problem.error].mean(axis=0), found[GAS].mean(axis=0))
-        for task, found in zip(problem.tasks, assessed.tasks, strict=True)
+        task.name: (metrics[problem.error].mean(axis=0), metrics[GAS].mean(axis=0))
+        for task, metrics in zip(problem.tasks, assessed.tasks, strict=True)
     }
     points = []
     for row, choice in enumerate(candidates.choice.tolist()):
         valve, actuator = problem.combinations[choice].valve, problem.combinations[choice].actuator
-        paths = [item.path for item in problem.variables if not item.kinds or valve.kind in item.kinds]
+        paths = [variable.path for variable in problem.variables if not variable.kinds or valve.kind in variable.kinds]
         error, gas, mass = assessed.worth.objectives[row].tolist()
         spread = [float(series[:, row].std(ddof=1)) for series in (assessed.error, assessed.gas)] if is_noisy else None
         points.append(
@@ -289,9 +298,9 @@ def _points(problem: DesignProblem, candidates: Candidates, assessed: Assessed) 
     return tuple(points)
 
 
-def _reason(points: tuple[DesignPoint, ...], place: int) -> str:
+def _reason(points: tuple[DesignPoint, ...], number: int) -> str:
     """Return why the knee is suggested, with what the nearest better designs of each objective cost."""
-    chosen = points[place].objectives
+    chosen = points[number].objectives
     said = []
     for index, name in enumerate(OBJECTIVES):
         others = [other for other in range(len(chosen)) if other != index]

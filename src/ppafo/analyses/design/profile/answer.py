@@ -129,7 +129,9 @@ class Sizing:
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
         """Figures that are quoted or assumed, of the parts that the result rests on."""
-        parts = [item.valve for item in self.valves] + [item.bottle for item in self.valves if item.bottle is not None]
+        parts = [valve.valve for valve in self.valves] + [
+            valve.bottle for valve in self.valves if valve.bottle is not None
+        ]
         once = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
         return tuple((part, name) for part in once for name in part.doubtful)
 
@@ -160,22 +162,22 @@ class Sizing:
             "summary": suggestion_sentence(self),
             "valves": [
                 {
-                    "valve": item.valve.name,
-                    "works": item.works,
-                    "pressure": item.pressure,
-                    "lowest_pressure": item.lowest_pressure,
-                    "gains": dict(item.gains),
-                    "error": item.error,
-                    "gas_per_repetition": item.gas,
-                    "gas_in_all": item.gas_in_all,
-                    "bottle": None if item.bottle is None else item.bottle.name,
-                    "mass": item.mass,
-                    "margins": None if item.margins is None else asdict(item.margins),
-                    "limited_by": item.limit,
-                    "limit": LIMITS[item.limit],
-                    "remark": item.remark,
+                    "valve": valve.valve.name,
+                    "works": valve.works,
+                    "pressure": valve.pressure,
+                    "lowest_pressure": valve.lowest_pressure,
+                    "gains": dict(valve.gains),
+                    "error": valve.error,
+                    "gas_per_repetition": valve.gas,
+                    "gas_in_all": valve.gas_in_all,
+                    "bottle": None if valve.bottle is None else valve.bottle.name,
+                    "mass": valve.mass,
+                    "margins": None if valve.margins is None else asdict(valve.margins),
+                    "limited_by": valve.limit,
+                    "limit": LIMITS[valve.limit],
+                    "remark": valve.remark,
                 }
-                for item in self.valves
+                for valve in self.valves
             ],
             "noise_streams": self.streams,
             "runs": self.runs,
@@ -211,14 +213,14 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
     limit = sizing.problem.largest_error
     errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
-    for number, item in enumerate(sizing.valves):
-        pressure, error, gas = item.curve
+    for number, valve in enumerate(sizing.valves):
+        pressure, error, gas = valve.curve
         keeps, colour = error <= limit, COLOURS[number % len(COLOURS)]
-        errors.append(Mark("line", pressure, error, (), item.valve.title, colour, _DOTTED))
+        errors.append(Mark("line", pressure, error, (), valve.valve.title, colour, _DOTTED))
         gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=_DOTTED))
-        if item.works:
-            errors.append(Mark("line", [item.pressure], [item.error], colour=colour, style=RING))
-            gases.append(Mark("line", [item.pressure], [item.gas], colour=colour, style=RING))
+        if valve.works:
+            errors.append(Mark("line", [valve.pressure], [valve.error], colour=colour, style=RING))
+            gases.append(Mark("line", [valve.pressure], [valve.gas], colour=colour, style=RING))
 
     torque_kind = replace(_TORQUE, words="RMS error")
     highest = float(torque_kind.values(_MAXIMUM_OF_LIMIT * limit))
@@ -226,7 +228,7 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     def set_gas(axes: "Axes") -> None:
         # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
         axes.margins(y=0.15)
-        if not any(item.works for item in sizing.valves):
+        if not any(valve.works for valve in sizing.valves):
             axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
 
     return [
@@ -309,7 +311,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             finding.Part(
                 remarks=(
                     suggestion_sentence(sizing),
-                    *(f"{item.valve.name}: {item.remark}" for item in sizing.valves if item.remark),
+                    *(f"{valve.valve.name}: {valve.remark}" for valve in sizing.valves if valve.remark),
                     *([noisy] if sizing.streams else []),
                     f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
                 )
@@ -333,7 +335,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             ),
             *parts_to_check(sizing.doubtful),
             finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
-            part_titles([item.valve for item in sizing.valves]),
+            part_titles([valve.valve for valve in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
@@ -352,21 +354,21 @@ def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
     marked = []
     quantities = CONTROLLERS[sizing.problem.scenario.controller.kind].quantities
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
-    for item in sizing.valves:
-        name = item.valve.name
-        if not item.works:
-            rows.append((name, None, None, f"{_TORQUE.number(item.error)} at best", *(None,) * 4, item.limit))
+    for valve in sizing.valves:
+        name = valve.valve.name
+        if not valve.works:
+            rows.append((name, None, None, f"{_TORQUE.number(valve.error)} at best", *(None,) * 4, valve.limit))
             continue
-        bottle, lowest = "none" if item.bottle is None else item.bottle.name, item.lowest_pressure or item.pressure
-        gas = (item.gas, item.gas_in_all)
-        rows.append((name, item.pressure, lowest, item.error, *gas, bottle, item.mass, item.limit))
+        bottle, lowest = "none" if valve.bottle is None else valve.bottle.name, valve.lowest_pressure or valve.pressure
+        gas = (valve.gas, valve.gas_in_all)
+        rows.append((name, valve.pressure, lowest, valve.error, *gas, bottle, valve.mass, valve.limit))
         gains = (
             f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}"
-            for path, value in item.gains.items()
+            for path, value in valve.gains.items()
         )
-        if item is sizing.choice:
+        if valve is sizing.choice:
             marked.append(len(margins))
-        of_each = [None if item.margins is None else getattr(item.margins, margin) for margin in _MARGINS]
+        of_each = [None if valve.margins is None else getattr(valve.margins, margin) for margin in _MARGINS]
         margins.append((name, *of_each, ", ".join(gains) or "none to choose"))
     fraction = Kind(quantity="fraction", form=".0f")
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
@@ -379,16 +381,16 @@ def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
 
 def suggestion_sentence(sizing: Sizing) -> str:
     """Return the suggestion with the reason, or why there is none."""
-    item = sizing.choice
-    if item is None:
+    choice = sizing.choice
+    if choice is None:
         if any(valve.works for valve in sizing.valves):
             return "no suggestion: valves keep the limit, but no bottle is large enough for the use"
         return "no suggestion: no valve keeps the error limit at any of the pressures"
-    bottle = "" if item.bottle is None else f" and {item.bottle.name}"
-    cut = 0.0 if item.margins is None else -item.margins.torque
+    bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"
+    cut = 0.0 if choice.margins is None else -choice.margins.torque
     peak = f", with {100.0 * cut:.0f} % of the peak cut off" if cut > 0.0 else ""
     return (
-        f"suggested: {item.valve.name} at {_PRESSURE.text(item.pressure)}{bottle}, the lightest that lasts "
-        f"and keeps the error limit{peak}, {_MASS.text(item.mass or 0.0, '.0f')}; a lower pressure is "
-        f"prevented by {LIMITS[item.limit]}"
+        f"suggested: {choice.valve.name} at {_PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
+        f"and keeps the error limit{peak}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower pressure is "
+        f"prevented by {LIMITS[choice.limit]}"
     )

@@ -90,24 +90,24 @@ class TorqueProfile:
 
 def read_profile(table: ProfileTable, folder: Path, file: str) -> TorqueProfile:
     """Return the profile of a design file; a recording's path begins in ``folder``."""
-    place = f"{file}: profile"
+    where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
     if is_typed == (table.recording is not None):
-        raise StudyError(f"{place}: give either recording, or time and torque")
+        raise StudyError(f"{where}: give either recording, or time and torque")
     if is_typed:
-        time, torque, kind = *_profile_of_table(table, place), "typed"
+        time, torque, kind = *_profile_of_table(table, where), "typed"
     else:
-        with refused_as(StudyError, f"{place}.recording", DataError):
+        with refused_as(StudyError, f"{where}.recording", DataError):
             recording = read_recording(folder / str(table.recording))
             channel: Any = recording[table.channel]
             unit = recording.unit(table.channel)
         if unit != _TORQUE:
-            raise StudyError(f"{place}.channel = '{table.channel}' is in '{unit}'; a torque in {_TORQUE} is needed")
+            raise StudyError(f"{where}.channel = '{table.channel}' is in '{unit}'; a torque in {_TORQUE} is needed")
         if len(recording) < 2:
-            raise StudyError(f"{place}.recording: has one sample only; a profile needs two or more")
+            raise StudyError(f"{where}.recording: has one sample only; a profile needs two or more")
         time, torque, kind = recording.time - recording.time[0], table.scale * channel, recording.kind
     if not np.any(torque):
-        raise StudyError(f"{place}: is 0 {_TORQUE} throughout; there is nothing to size for")
+        raise StudyError(f"{where}: is 0 {_TORQUE} throughout; there is nothing to size for")
     # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
     # then jumps as the profile does.
     samples = time[:-1], torque[:-1]
@@ -132,22 +132,22 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
     return time[chosen], torque[chosen]
 
 
-def _profile_of_table(table: ProfileTable, place: str) -> tuple[Floats, Floats]:
+def _profile_of_table(table: ProfileTable, where: str) -> tuple[Floats, Floats]:
     if len(table.time) != len(table.torque) or len(table.time) < 2:
         raise StudyError(
-            f"{place}: time has {len(table.time)} and torque {len(table.torque)} entries; give as many of each, "
+            f"{where}: time has {len(table.time)} and torque {len(table.torque)} entries; give as many of each, "
             f"two or more"
         )
     series = []
     for texts, unit, name in ((table.time, "s", "time"), (table.torque, _TORQUE, "torque")):
         numbers = []
         for text in texts:
-            with refused_as(StudyError, f"{place}.{name}: '{text}'", UnitError):
+            with refused_as(StudyError, f"{where}.{name}: '{text}'", UnitError):
                 numbers.append(parse_quantity(text, unit))
         series.append(np.array(numbers))
     time, torque = series
     if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
-        raise StudyError(f"{place}.time: must begin with '0 s' and grow from entry to entry")
+        raise StudyError(f"{where}.time: must begin with '0 s' and grow from entry to entry")
     return time, table.scale * torque
 
 
@@ -281,7 +281,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
             )
     # The settings that multiply a torque error.
     quantities = CONTROLLERS[scenario.controller.kind].quantities
-    gains = tuple(f"controller.{item.name}" for item in quantities if "(N m" in item.unit)
+    gains = tuple(f"controller.{quantity.name}" for quantity in quantities if "(N m" in quantity.unit)
     lowest, highest = _pressures(document, scenario, file)
     use = document.use
     if (use.repetitions is None) == (use.hours is None):

@@ -175,24 +175,24 @@ def try_pressures(trials: Trials, valve: Part) -> Pressures:
     """Return the pressures that were tried with a valve, the lowest that works to within a tenth of a psi."""
     problem = trials.problem
     pressure = np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID)
-    found = _pressures(trials, valve, pressure)
-    if np.isnan(found.trial.error).all():
+    tried = _pressures(trials, valve, pressure)
+    if np.isnan(tried.trial.error).all():
         reason = next(iter(trials.failures), "no reason was given")
         raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
-    while found.first and found.pressure[found.first] - found.pressure[found.first - 1] > FINENESS:
-        lower, upper = found.pressure[found.first - 1], found.pressure[found.first]
+    while tried.first and tried.pressure[tried.first] - tried.pressure[tried.first - 1] > FINENESS:
+        lower, upper = tried.pressure[tried.first - 1], tried.pressure[tried.first]
         # Without both ends, which were tried before.
         finer = _pressures(trials, valve, np.linspace(lower, upper, GRID)[1:-1])
-        both = (found, finer)
-        pressure = np.concatenate([one.pressure for one in both])
+        both = (tried, finer)
+        pressure = np.concatenate([part.pressure for part in both])
         trial = Trial(
-            np.concatenate([one.trial.error for one in both]),
-            np.concatenate([one.trial.gas for one in both]),
-            np.concatenate([one.trial.gains for one in both]),
+            np.concatenate([part.trial.error for part in both]),
+            np.concatenate([part.trial.gas for part in both]),
+            np.concatenate([part.trial.gains for part in both]),
         )
         order = np.argsort(pressure, kind="stable")
-        found = Pressures(pressure[order], trial.at(order), np.concatenate([one.works for one in both])[order])
-    return found
+        tried = Pressures(pressure[order], trial.at(order), np.concatenate([part.works for part in both])[order])
+    return tried
 
 
 def _pressures(trials: Trials, valve: Part, pressure: Floats) -> Pressures:

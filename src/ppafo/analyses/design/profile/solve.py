@@ -66,13 +66,13 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     # The pressure with the lightest bottle, of these the lowest. Without a bottle it is the lowest that works; where
     # none works, the one with the smallest error, which is infinite for failed runs: argmin would take nan for it.
     if tried.first is None:
-        place = int(np.argmin(np.where(np.isnan(tried.trial.error), np.inf, tried.trial.error)))
+        least = int(np.argmin(np.where(np.isnan(tried.trial.error), np.inf, tried.trial.error)))
     else:
         full = [np.inf if bottle is None else bottle.full_mass for bottle in bottles]
         masses = np.where(tried.works, full, np.inf)
-        place = int(np.argmin(masses)) if np.isfinite(masses).any() else tried.first
-    pressure, error, gas = (float(series[place]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
-    gas_in_all, works = float(in_all[place]), tried.first is not None
+        least = int(np.argmin(masses)) if np.isfinite(masses).any() else tried.first
+    pressure, error, gas = (float(series[least]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
+    gas_in_all, works = float(in_all[least]), tried.first is not None
     bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure) if works else (None, False)
     rated = highest_pressure(problem, valve)
     notes = Notes(
@@ -80,7 +80,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         rated=rated if rated < problem.highest_pressure and not works else None,
         is_cold=is_cold,
     )
-    if works and bottles[place] is None:
+    if works and bottles[least] is None:
         largest = max(problem.bottles, key=lambda part: part.values["content"])
         notes = replace(notes, largest_bottle=largest, share=largest.values["content"] / gas_in_all)
     used = gas * problem.repetitions
@@ -97,7 +97,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         works=works,
         pressure=pressure,
         lowest_pressure=None if tried.first is None else float(tried.pressure[tried.first]),
-        gains=trials.gain_numbers(valve, pressure, int(tried.trial.gains[place])),
+        gains=trials.gain_numbers(valve, pressure, int(tried.trial.gains[least])),
         error=error,
         gas=gas,
         gas_in_all=gas_in_all,
@@ -123,7 +123,7 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
     needed = problem.repetitions * period
     # A second more than the use, so that a bottle that lasts is one whose time is up.
     schedule = Schedule(needed + 1.0, 0.0, max(needed, 1.0))
-    for place, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
+    for number, part in enumerate(sorted(enough, key=lambda bottle: bottle.full_mass)):
         changes = [
             f"{path}={entry.value} {entry.unit}"
             for path, entry in scaled_entries(part, paper.entries).items()
@@ -136,5 +136,5 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
             # Its regulator does not pass the flow even when it is full.
             continue
         if ended == TIME_IS_UP:
-            return part, place > 0
+            return part, number > 0
     return None, bool(enough)

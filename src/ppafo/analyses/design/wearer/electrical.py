@@ -80,13 +80,13 @@ def _power_text(power: float) -> str:
     return f"{power:.3g} W" if power >= 1.0 else f"{1000.0 * power:.3g} mW"
 
 
-def electrical_sentences(found: Electrical) -> list[str]:
+def electrical_sentences(electrical: Electrical) -> list[str]:
     """Return powers, and mass and minutes of the battery."""
-    parts = ", ".join(f"{name} {_power_text(power)}" for name, power in found.powers.items())
-    valve = "" if found.is_whole else ", without the valve: the catalogue states no power of it"
+    parts = ", ".join(f"{name} {_power_text(power)}" for name, power in electrical.powers.items())
+    valve = "" if electrical.is_whole else ", without the valve: the catalogue states no power of it"
     return [
-        f"electrical power: {found.power:.3g} W ({parts}){valve}",
-        f"battery: {found.cells} x {found.cell.title}, {1000.0 * found.mass:.0f} g, "
-        f"runs {found.lasts / 60.0:.0f} min; "
+        f"electrical power: {electrical.power:.3g} W ({parts}){valve}",
+        f"battery: {electrical.cells} x {electrical.cell.title}, {1000.0 * electrical.mass:.0f} g, "
+        f"runs {electrical.lasts / 60.0:.0f} min; "
         f"{100.0 * USABLE:.0f} % of its energy is counted",
     ]

@@ -37,7 +37,7 @@ _REQUESTS = (1.0, 1.3, 1.7)
 """Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
 _ABOVE = 1.1
 """Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
-_LIMIT = next(item.default or 0.0 for item in ASSISTANCE_QUANTITIES if item.name == "largest_torque")
+_LIMIT = next(quantity.default or 0.0 for quantity in ASSISTANCE_QUANTITIES if quantity.name == "largest_torque")
 """Torque [N m] above which a controller of walking requests no more, unless it is told."""
 _SHORTEST = 6.0
 """Time [s] that a walk on a bottle takes at least."""
@@ -45,7 +45,7 @@ _FEW = 0.15
 """Minutes of the walks that are compared at a constant supply."""
 _DORSIFLEXION = 0.9
 """Gauge pressure of dorsiflexion over plantarflexion's, of the walks with regulators: 45 of 50 psi."""
-_SHUT_OFF = {item.name: item.default or 0.0 for item in SHUT_OFF} | {"area": 1.0e-5}
+_SHUT_OFF = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
 _REGULATORS = ("pipeline-jacpac-regulator", "festo-lrma-qs-4")
 _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
 _HIGHEST_TOES = 0.2
@@ -56,7 +56,7 @@ _KEPT = 0.9
 """Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
 """Times the gauge pressure that are tried where no torque suffices."""
-_LESS_PRESSURE = tuple(0.95 - 0.05 * place for place in range(12))
+_LESS_PRESSURE = tuple(0.95 - 0.05 * step for step in range(12))
 """Times the gauge pressure that are tried where no bottle lasts."""
 _OFFERED = 5
 """Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
@@ -115,17 +115,17 @@ def size_for_wearer(wish: Wish, report: Report, catalogue: str | Path = DEFAULT)
         if rated_pressure(valve, actuator) >= wish.pressure
     ]
     tried: list[Tried] = []
-    for place, (valve, actuator) in enumerate(pairs):
-        report(Progress(f"walking with {valve.name}", place, len(pairs), noun="pairs"))
+    for number, (valve, actuator) in enumerate(pairs):
+        report(Progress(f"walking with {valve.name}", number, len(pairs), noun="pairs"))
         tried += _few_strides(wish, valve, actuator)
     bottles = sorted(shelf.groups["bottles"].values(), key=lambda bottle: bottle.full_mass)
-    found = _lightest(wish, tried, bottles, shelf, report)
-    if found is None:
+    lightest = _lightest(wish, tried, bottles, shelf, report)
+    if lightest is None:
         instead = tuple(offer.text(wish) for offer in _instead(wish, tried, bottles, shelf, report))
         if not tried:
             instead = ("no pair of valve and actuator may have this pressure, or none helps: take another pressure",)
         return WearerSizing(wish, healthy, tuple(tried), None, instead)
-    one, bottle, walked = found
+    one, bottle, walked = lightest
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
@@ -162,7 +162,7 @@ def _of_wearer(wish: Wish) -> tuple[str, ...]:
 
 def _check(wish: Wish) -> None:
     low, high = STATURES
-    mass = next(item for item in WEARER if item.name == "body_mass")
+    mass = next(quantity for quantity in WEARER if quantity.name == "body_mass")
     if not mass.minimum <= wish.mass <= mass.maximum:
         raise StudyError(
             f"--mass: {wish.mass:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg"
@@ -193,7 +193,7 @@ def _few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
     the toes would not clear the ground. Nearest are the most torque, and the highest toes with enough of it.
     """
     gauge = wish.pressure - STANDARD_ATMOSPHERE
-    units = {item.name: item.unit for item in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
+    units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     overrides = (
         *_of_wearer(wish),
@@ -265,27 +265,27 @@ def _lightest(
     No pair whose gas might do is left out, so that what is offered is found when it is asked for.
     """
     # Heaviest first: of pairs with the same overrides the lightest replaces the others.
-    able = {one.overrides: one for one in sorted(tried, key=lambda one: -one.mass) if one.has(wish)}
-    pairs = [(one, bottle) for one in able.values() for bottle in bottles]
+    able = {device.overrides: device for device in sorted(tried, key=lambda device: -device.mass) if device.has(wish)}
+    pairs = [(device, bottle) for device in able.values() for bottle in bottles]
     too_thirsty: dict[str, float] = {}
-    for one, bottle in sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass):
+    for device, bottle in sorted(pairs, key=lambda pair: pair[0].mass + pair[1].full_mass):
         largest_flow = min(bottle.values["content"] / wish.seconds, too_thirsty.get(bottle.name, np.inf))
-        if one.flow > largest_flow:
+        if device.flow > largest_flow:
             continue
         report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-        walked = _walked(one, shelf.bottle_name(bottle), wish.seconds)
+        walked = _walked(device, shelf.bottle_name(bottle), wish.seconds)
         if _time(walked) < wish.seconds:
-            too_thirsty[bottle.name] = _lasting_flow(one, _time(walked), wish.seconds)
+            too_thirsty[bottle.name] = _lasting_flow(device, _time(walked), wish.seconds)
         elif _keeps(walked, wish):
             assert walked is not None, "it lasts"
-            return one, bottle, walked
+            return device, bottle, walked
     return None
 
 
-def _walked(one: Tried, bottle: str, seconds: float) -> WalkResult | None:
+def _walked(device: Tried, bottle: str, seconds: float) -> WalkResult | None:
     """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
     try:
-        return walk(load_walk(WALKS[one.valve.kind], one.overrides, bottle=bottle), minutes=seconds / 60.0)
+        return walk(load_walk(WALKS[device.valve.kind], device.overrides, bottle=bottle), minutes=seconds / 60.0)
     except ScenarioError:
         return None
 
@@ -297,9 +297,9 @@ def _time(walked: WalkResult | None) -> float:
     return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
 
 
-def _lasting_flow(one: Tried, lasted: float, seconds: float) -> float:
+def _lasting_flow(device: Tried, lasted: float, seconds: float) -> float:
     """Return the flow [kg/s] above which no pair lasts on a bottle, from one that does not, with some allowance."""
-    return one.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
+    return device.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
 
 
 def _keeps(walked: WalkResult | None, wish: Wish) -> bool:
@@ -313,28 +313,30 @@ def _keeps(walked: WalkResult | None, wish: Wish) -> bool:
 def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, report: Report) -> Iterator[Offer]:
     """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
     largest = max(bottles, key=lambda bottle: bottle.values["content"])
-    lower = [(wish, one) for one in tried]
+    lower = [(wish, device) for device in tried]
     # At less pressure the pairs that have the most torque for their gas.
-    thrifty = sorted((one for one in tried if one.flow > 0.0), key=lambda one: -one.torque / one.flow)
+    thrifty = sorted((device for device in tried if device.flow > 0.0), key=lambda device: -device.torque / device.flow)
     # Actuators of the same numbers walk alike: one of them is enough.
-    pairs = list({(one.valve.name, one.torque, one.flow): one for one in thrifty}.values())[:_OFFERED]
-    for place, share in enumerate(_LESS_PRESSURE):
-        report(Progress("walking at less pressure", place, len(_LESS_PRESSURE), noun="pressures"))
+    pairs = list({(device.valve.name, device.torque, device.flow): device for device in thrifty}.values())[:_OFFERED]
+    for number, share in enumerate(_LESS_PRESSURE):
+        report(Progress("walking at less pressure", number, len(_LESS_PRESSURE), noun="pressures"))
         asked = wish.at_gauge(share)
         if STANDARD_ATMOSPHERE < asked.pressure < wish.pressure:
-            lower += [(asked, again) for one in pairs for again in _few_strides(asked, one.valve, one.actuator)]
-    able = sorted((item for item in lower if item[1].has(wish)), key=lambda item: item[1].flow)
+            lower += [
+                (asked, again) for device in pairs for again in _few_strides(asked, device.valve, device.actuator)
+            ]
+    able = sorted((offer for offer in lower if offer[1].has(wish)), key=lambda offer: offer[1].flow)
     # A device whose toes drag is no offer.
-    clear = [item for item in lower if item[1].toes >= wish.clearance and item[1].torque < wish.torque]
-    strong = [item for item in lower if item[1].torque >= wish.torque and 0.0 <= item[1].toes < wish.clearance]
-    weak = sorted(clear, key=lambda item: -item[1].torque)
-    low = sorted(strong, key=lambda item: -item[1].toes)
+    clear = [offer for offer in lower if offer[1].toes >= wish.clearance and offer[1].torque < wish.torque]
+    strong = [offer for offer in lower if offer[1].torque >= wish.torque and 0.0 <= offer[1].toes < wish.clearance]
+    weak = sorted(clear, key=lambda offer: -offer[1].torque)
+    low = sorted(strong, key=lambda offer: -offer[1].toes)
     report(Progress(f"walking on {largest.name}", 0, 0, noun="bottles"))
     nearest = [] if able else [_offered(*items[0], largest, shelf) for items in (weak, low) if items]
     made = [offer for offer in (_thriftiest(able, largest, shelf), *nearest) if offer is not None]
     yield from made
     if not able:
-        more = (_offered(*item, largest, shelf) for item in _at_more_pressure(wish, tried))
+        more = (_offered(*offer, largest, shelf) for offer in _at_more_pressure(wish, tried))
         yield from itertools.islice((offer for offer in more if offer is not None), 1)
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
     if all(offer.wish.seconds < wish.seconds for offer in made):
@@ -345,8 +347,8 @@ def _instead(wish: Wish, tried: list[Tried], bottles: list[Part], shelf: Shelf, 
 def _thriftiest(able: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
     offers = []
-    for asked, one in able[:_FIRST]:
-        offer = _offered(asked, one, bottle, shelf)
+    for asked, device in able[:_FIRST]:
+        offer = _offered(asked, device, bottle, shelf)
         if offer is not None and offer.wish.clearance >= asked.clearance:
             return offer
         offers += [] if offer is None else [offer]
@@ -356,23 +358,23 @@ def _thriftiest(able: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> O
 def _lasting(wish: Wish, weak: list[tuple[Wish, Tried]], bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what walks on a bottle for all of the time, of pairs with the most torque first; None if none does."""
     largest_flow = _USED * bottle.values["content"] / wish.seconds
-    for asked, one in weak:
-        if one.flow > largest_flow:
+    for asked, device in weak:
+        if device.flow > largest_flow:
             continue
-        offer = _offered(asked, one, bottle, shelf)
+        offer = _offered(asked, device, bottle, shelf)
         if offer is not None and offer.wish.seconds == wish.seconds:
             return offer
-        largest_flow = _lasting_flow(one, 0.0 if offer is None else offer.wish.seconds, wish.seconds)
+        largest_flow = _lasting_flow(device, 0.0 if offer is None else offer.wish.seconds, wish.seconds)
     return None
 
 
-def _offered(asked: Wish, one: Tried, bottle: Part, shelf: Shelf) -> Offer | None:
+def _offered(asked: Wish, device: Tried, bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
-    if one.torque < asked.torque:
-        asked = replace(asked, torque=math.floor(100.0 * one.torque) / 100.0)
-    if one.toes < asked.clearance:
-        asked = replace(asked, toes=_rounded_down(one.toes))
-    again = next((tried for tried in _few_strides(asked, one.valve, one.actuator) if tried.has(asked)), None)
+    if device.torque < asked.torque:
+        asked = replace(asked, torque=math.floor(100.0 * device.torque) / 100.0)
+    if device.toes < asked.clearance:
+        asked = replace(asked, toes=_rounded_down(device.toes))
+    again = next((tried for tried in _few_strides(asked, device.valve, device.actuator) if tried.has(asked)), None)
     walked = None if again is None else _walked(again, shelf.bottle_name(bottle), asked.seconds)
     if again is None or walked is None or not walked.averages:
         return None
@@ -380,7 +382,7 @@ def _offered(asked: Wish, one: Tried, bottle: Part, shelf: Shelf) -> Offer | Non
     if toes < asked.clearance:
         # The toes come down a little as the pressure falls: what is offered is what they then have.
         asked = replace(asked, toes=_rounded_down(toes))
-        if [tried.overrides for tried in _few_strides(asked, one.valve, one.actuator)] != [again.overrides]:
+        if [tried.overrides for tried in _few_strides(asked, device.valve, device.actuator)] != [again.overrides]:
             return None
     # Rounded down to what a command line can say, so that a run from that line still meets the offer.
     hundredths = math.floor(min(_time(walked), asked.seconds) / 0.6)  # of a minute
@@ -392,15 +394,15 @@ def _offered(asked: Wish, one: Tried, bottle: Part, shelf: Shelf) -> Offer | Non
 def _at_more_pressure(wish: Wish, tried: list[Tried]) -> Iterator[tuple[Wish, Tried]]:
     """Yield what does it at more pressure, the lowest first: of each kind of valve the strongest and the highest."""
     strongest: list[Tried] = []
-    for kind in dict.fromkeys(one.valve.kind for one in tried):
-        of_kind = [one for one in tried if one.valve.kind == kind]
-        both = (max(of_kind, key=lambda one: one.torque), max(of_kind, key=lambda one: one.toes))
-        strongest += {(one.valve.name, one.actuator.name): one for one in both}.values()
+    for kind in dict.fromkeys(device.valve.kind for device in tried):
+        of_kind = [device for device in tried if device.valve.kind == kind]
+        both = (max(of_kind, key=lambda device: device.torque), max(of_kind, key=lambda device: device.toes))
+        strongest += {(device.valve.name, device.actuator.name): device for device in both}.values()
     for more in _MORE_PRESSURE:
         asked = wish.at_gauge(more)
-        for one in strongest:
-            if rated_pressure(one.valve, one.actuator) < asked.pressure:
+        for device in strongest:
+            if rated_pressure(device.valve, device.actuator) < asked.pressure:
                 continue
-            for again in _few_strides(asked, one.valve, one.actuator):
+            for again in _few_strides(asked, device.valve, device.actuator):
                 if again.has(wish):
                     yield asked, again

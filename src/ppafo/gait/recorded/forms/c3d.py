@@ -203,11 +203,11 @@ def _events(group: Any) -> tuple[Events, tuple[str, ...]]:
             f"its events are not read: EVENT has {len(sides)} contexts, {count} labels and {times.size} times, which "
             "do not fit together",
         )
-    found: Events = {}
+    events: Events = {}
     for side, kind, time in zip(sides, kinds, (60.0 * pairs[0] + pairs[1]).tolist(), strict=True):
         if np.isfinite(time):
-            found.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
-    return {key: sorted(found[key]) for key in found}, (f"times of its events read as {said}",) if said else ()
+            events.setdefault((side.strip().lower(), kind.strip().lower()), []).append(time)
+    return {key: sorted(events[key]) for key in events}, (f"times of its events read as {said}",) if said else ()
 
 
 FORM = GaitForm(

@@ -101,12 +101,12 @@ def _load_maps(
     table: MotionTable, labels: Sequence[str], foot: str, vertical: str, body_mass: float
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Return the maps of the measured loads, each with the unit that its size shows, and remarks."""
-    found: dict[str, Any] = {}
+    maps: dict[str, Any] = {}
     remarks: list[str] = []
     moment = _label(labels, foot + _MOMENTS)
     if moment is not None and _is_measured(table, f"{moment}.x"):
         unit, said = load_unit(table, f"{moment}.x", "moment", body_mass)
-        found["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
+        maps["ankle_moment"] = MomentMap(terms=(f"{moment}.x",), positive="plantarflexion", unit=unit)
         remarks += said
     reactions = (_label(labels, foot + name) for name in _REACTIONS)
     force = next(
@@ -114,9 +114,9 @@ def _load_maps(
     )
     if force is not None:
         unit, said = load_unit(table, force, "force", body_mass)
-        found["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")
+        maps["vertical_force"] = ForceMap(terms=(force,), unit=unit or "-")
         remarks += said
-    return found, tuple(remarks)
+    return maps, tuple(remarks)
 
 
 def _is_measured(table: MotionTable, name: str) -> bool:

@@ -7,6 +7,7 @@ import pytest
 
 from ppafo.analyses.design.front.search import (
     Candidates,
+    Front,
     SearchTable,
     Worth,
     crowding,
@@ -118,8 +119,13 @@ def sphere(candidates: Candidates) -> Worth:
 SETTINGS = SearchTable(screening=512, population=128, generations=60, tolerance=0.0, seed=3)
 
 
-def test_a_known_front_is_found_and_its_choice_of_parts_too() -> None:
-    front = search_front(sphere, 4, 7, SETTINGS)
+@pytest.fixture(scope="module")
+def front() -> Front:
+    """What is found of the sphere."""
+    return search_front(sphere, 4, 7, SETTINGS)
+
+
+def test_a_known_front_is_found_and_its_choice_of_parts_too(front: Front) -> None:
     radius = np.linalg.norm(front.worth.objectives, axis=1)
     assert len(front.candidates) > 200
     assert float(np.median(radius)) < 1.01
@@ -128,24 +134,22 @@ def test_a_known_front_is_found_and_its_choice_of_parts_too() -> None:
     assert volume == pytest.approx(1.1**3 - np.pi / 6.0, rel=0.03)
 
 
-def test_generations_find_more_than_as_many_evenly_spread_designs() -> None:
-    front = search_front(sphere, 4, 7, SETTINGS)
+def test_generations_find_more_than_as_many_evenly_spread_designs(front: Front) -> None:
     even = sphere(evenly_spread(front.growth[-1][0], 4, 7, seed=3))
     reference = np.full(3, 1.1)
     assert hypervolume(front.worth.objectives, reference) > 1.3 * hypervolume(even.objectives, reference)
 
 
-def test_the_hypervolume_of_the_search_only_grows() -> None:
-    shares_found = [share for _, share in search_front(sphere, 4, 7, SETTINGS).growth]
+def test_the_hypervolume_of_the_search_only_grows(front: Front) -> None:
+    shares_found = [share for _, share in front.growth]
     assert len(shares_found) == SETTINGS.generations + 1
     assert all(later >= earlier - 1e-12 for earlier, later in pairwise(shares_found))
 
 
-def test_the_same_seed_gives_the_same_front_and_another_seed_another() -> None:
-    first, again = (search_front(sphere, 4, 7, SETTINGS) for _ in range(2))
-    assert np.array_equal(first.worth.objectives, again.worth.objectives)
-    other = search_front(sphere, 4, 7, SETTINGS.model_copy(update={"seed": 4}))
-    assert not np.array_equal(first.worth.objectives[:20], other.worth.objectives[:20])
+def test_the_same_seed_gives_the_same_front_and_another_seed_another(front: Front) -> None:
+    again, other = (search_front(sphere, 4, 7, SETTINGS.model_copy(update={"seed": seed})) for seed in (3, 4))
+    assert np.array_equal(front.worth.objectives, again.worth.objectives)
+    assert not np.array_equal(front.worth.objectives[:20], other.worth.objectives[:20])
 
 
 def test_a_search_that_no_longer_grows_stops() -> None:

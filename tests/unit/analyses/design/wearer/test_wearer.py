@@ -91,7 +91,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
 
 @pytest.mark.usefixtures("little")
 def test_toes_may_be_asked_to_drag_no_more_than_the_ground_and_no_device_lifts_them_by_five_centimetres() -> None:
-    wish = sized(2.5, 0.2, toes=0.004).wish
+    wish = Wish(72.5, 1.75, 2.5, 101325.0 + 50.0 * PSI, 12.0, 0.004)
     assert (wish.clearance, wish.toes) == (0.004, 0.004)
     high = sized(2.5, 0.2, toes=0.05)
     assert high.device is None

@@ -1,0 +1,164 @@
+"""What a fit moves and what it compares: numbers with priors, rows of residuals, and runs at scaled points."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.errors import IdentificationError
+from ppafo.progress import Report
+from ppafo.signals.recording import Floats
+
+Flags = NDArray[np.bool_]
+Residuals = Callable[[Floats], Floats]
+"""Measured less model [SI] (rows, points) at points [SI] (numbers, points), as one batch; NaN where a run fails."""
+
+
+@dataclass(frozen=True, slots=True)
+class Free:
+    """A number that the fit moves: start, bounds and typical size ``scale``, SI units.
+
+    ``deviation`` is the standard deviation of its prior about its start; infinite for a number that is sought, finite
+    for a tolerance. Tolerances of one ``family``, such as friction in each recording, are tested together.
+    """
+
+    name: str
+    start: float
+    low: float
+    high: float
+    scale: float
+    deviation: float = math.inf
+    family: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """Rows of the residuals that are one channel of one recording or a part of it, in the order of time.
+
+    ``floor`` is the error of the engine, or of the resolution [SI], below which no residual says anything: one for all
+    rows, or each row's. ``shared`` is an error [SI] by row that all rows of the recording have at once, as one normal
+    deviate times it. ``groups`` are further groups, such as a branch, whose numbers are compared with the numbers of
+    all.
+    """
+
+    recording: str
+    channel: str
+    rows: slice
+    floor: float | Floats = 0.0
+    shared: Floats | None = None
+    groups: tuple[str, ...] = ()
+
+
+_UNITS_OF_NOISE = 3.0
+"""Change of all residuals together, in units of noise, that a difference makes."""
+
+_STEPS = (1.0e-7, 1.0e-3)
+"""Shortest and longest difference over the scale of a number."""
+
+
+class Work:
+    """Runs of a fit in scaled numbers, with the last one kept."""
+
+    def __init__(
+        self,
+        residuals: Residuals,
+        numbers: tuple[Free, ...],
+        blocks: tuple[Block, ...],
+        report: Report,
+        memory: int,
+        is_motion: bool,
+    ) -> None:
+        self.residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
+        self.memory, self.is_motion = memory, is_motion
+        self.scale = np.array([one.scale for one in numbers])
+        self.start, self.low, self.high, deviation = (
+            np.array([getattr(one, name) for one in numbers]) / self.scale
+            for name in ("start", "low", "high", "deviation")
+        )
+        self.prior = 1.0 / deviation
+        self.mean = self.start
+        self.evaluations = 0
+        self.least: dict[str, float] = {}
+        self.step = np.full(len(numbers), _STEPS[1])
+        self.left_out = np.zeros(0, dtype=np.intp)
+        self._last: tuple[bytes, Floats] | None = None
+
+    def at(self, points: Floats) -> Floats:
+        """Return residuals [SI] (rows, points) at scaled points (numbers, points)."""
+        self.evaluations += points.shape[1]
+        return self.residuals(points * self.scale[:, None])
+
+    def one(self, point: Floats) -> Floats:
+        """Return residuals [SI] at a scaled point, which is run once."""
+        key = point.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self.at(point[:, None])[:, 0]
+        return self._last[1]
+
+    def jacobian(self, point: Floats, weight: Floats, *, is_central: bool = True) -> Floats:
+        """Return the derivative of the residuals [SI] by scaled numbers, differences of one batch.
+
+        ``weight`` [1/SI] by row sets the lengths of the differences of the next one. Differences to one side take half
+        the runs, and say well enough where to search.
+        """
+        above, below = np.minimum(point + self.step, self.high), np.maximum(point - self.step, self.low)
+        sides = [above, below] if is_central else [np.where(above - point >= point - below, above, below)]
+        values = self.at(np.concatenate([point[:, None] + np.diag(side - point) for side in sides], axis=1))
+        centre, count = self.one(point), len(point)
+        slopes = np.empty((len(centre), count))
+        for place in range(count):
+            tried = [(float(side[place]), values[:, place + number * count]) for number, side in enumerate(sides)]
+            ran = [(end, own) for end, own in tried if np.isfinite(own).all()]
+            if not is_central and not ran:
+                return self.jacobian(point, weight)
+            (up, last), (down, first) = [*ran, (float(point[place]), centre)][:2]
+            # Neither side runs: at a bound, or where a device is none.
+            if up == down:
+                free = self.numbers[place]
+                raise IdentificationError(
+                    f"{free.name}: no run succeeds near {point[place] * free.scale:.6g}; give other bounds or "
+                    "another start"
+                )
+            slopes[:, place] = (last - first) / (up - down)
+        # With a thousandth of the number 7 of 16 intervals held, with thirty units of noise 11, with three 28.
+        sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
+        self.step = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), *_STEPS)
+        return slopes
+
+    def rows_of(self, channel: str) -> list[slice]:
+        """Return the rows of a channel in each recording."""
+        return [one.rows for one in self.blocks if one.channel == channel]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """The channels, each once."""
+        return tuple(dict.fromkeys(one.channel for one in self.blocks))
+
+    def shared(self) -> Floats:
+        """Return the errors [SI] that rows of a recording share, a column for each recording that has some."""
+        names = dict.fromkeys(one.recording for one in self.blocks if one.shared is not None)
+        columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
+        for place, name in enumerate(names):
+            for one in self.blocks:
+                if one.recording == name and one.shared is not None:
+                    columns[one.rows, place] = one.shared
+        return columns
+
+    def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
+        """Return the noise [SI] of each row, and by channel, pooled over its recordings; no less than the floor.
+
+        ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
+        """
+        found, by_channel = np.empty(len(series)), {}
+        for channel in self.channels:
+            own = np.concatenate([series[rows] for rows in self.rows_of(channel)])
+            pooled = math.sqrt(float(np.square(own).sum()) / len(own))
+            # Of its own size at the start: channels have units of their own, and a law may fit exactly.
+            least = self.least.setdefault(channel, 1.0e-12 * (float(np.abs(own[:, 0]).max()) or 1.0))
+            blocks = [one for one in self.blocks if one.channel == channel]
+            by_channel[channel] = max(pooled, least, float(np.min(blocks[0].floor)))
+            for one in blocks:
+                found[one.rows] = np.maximum(max(pooled, least), one.floor)
+        return found, by_channel

@@ -1,0 +1,46 @@
+"""The functions of ``columns`` for one run, whose numbers are no columns: what a translated program has of them."""
+
+import math
+
+from ppafo.model import columns
+
+
+def root(number: float) -> float:
+    """Square root of a number."""
+    return math.sqrt(number)
+
+
+def larger(first: float, second: float) -> float:
+    """The larger of two numbers."""
+    return max(first, second)
+
+
+def smaller(first: float, second: float) -> float:
+    """The smaller of two numbers."""
+    return min(first, second)
+
+
+def choose(test: bool, yes: float, no: float) -> float:
+    """The first number where a test holds, else the second."""
+    return yes if test else no
+
+
+def truncated(number: float) -> float:
+    """A number from -2^63 to 2^63 without its fraction, as a float."""
+    return float(int(number))
+
+
+def whole(number: float) -> int:
+    """A whole number as an int."""
+    return int(number)
+
+
+FOR_ONE_RUN = {
+    columns.root: root,
+    columns.larger: larger,
+    columns.smaller: smaller,
+    columns.choose: choose,
+    columns.truncated: truncated,
+    columns.whole: whole,
+}
+"""What stands for each in a program of one run."""

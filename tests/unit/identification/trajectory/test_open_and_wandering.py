@@ -1,0 +1,78 @@
+"""What a fit says where recordings leave a combination open, and where a sensor's level moves from sample to sample."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from ppafo.identification.trajectory import (
+    Experiment,
+    FreeParameter,
+    Tolerances,
+    TrajectoryFit,
+    TrajectoryProblem,
+    fit,
+    tolerance_parameters,
+)
+from ppafo.identification.trajectory.tolerances import stated_by
+from ppafo.parameters.loading import load_parameter_set
+from ppafo.rig.experiments import record
+from ppafo.signals.recording import Channel, Recording
+from ppafo.simulation.loading import load_scenario
+
+STEP = ("motion.kind=free", "run.duration=0.35 s")
+LEAK = 0.3e-6
+
+
+def fitted(experiment: Experiment, *sought: FreeParameter) -> TrajectoryFit:
+    stated = stated_by(load_parameter_set("ppafo2011"), experiment.scenario)
+    tolerances = tolerance_parameters(Tolerances(), (experiment,), sought, stated)
+    return fit(TrajectoryProblem((*sought, *tolerances), (experiment,)))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_leak_beside_the_delay_of_a_valve_is_not_identifiable_and_its_interval_is_open(seed: int) -> None:
+    scenario = load_scenario("step-response", STEP)
+    recording = record("step-response", "paper-bench", seed, overrides=STEP).recording
+    delay = FreeParameter("valve.delay", start=2.0e-3, low=1.0e-4, high=2.0e-2)
+    sought = FreeParameter("valve.discharge_coefficient"), FreeParameter("actuator.leak.area"), delay
+
+    found = fitted(Experiment("step", scenario, recording), *sought)
+
+    leak = found.estimate("actuator.leak.area")
+    assert leak.verdict == "not identifiable"
+    assert leak.low < 0.1 * LEAK
+    assert leak.high > 50.0 * LEAK
+    assert "fix it, give a prior, or make another recording" in leak.explanation
+    assert not any(one.is_identified for one in found.estimates)
+
+
+def wandering_by(experiment: Experiment, size: float) -> TrajectoryFit:
+    """A fit of a recording whose first pressure has noise with a memory of some hundred samples, of a size [Pa]."""
+    recording, random = experiment.recording, np.random.default_rng(11)
+    level = random.normal(size=len(recording))
+    for place in range(1, len(level)):
+        level[place] = 0.99 * level[place - 1] + 0.14 * level[place]
+    moved = Channel(recording["pressure_1"] + size * level, "Pa")
+    other = Recording(recording.label, recording.time, {**recording.channels, "pressure_1": moved}, recording.kind)
+    found = dataclasses.replace(experiment, recording=other, noise={})
+    return fitted(found, FreeParameter("foot_plate.inertia"))
+
+
+def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_this_model_only(
+    experiment: Experiment,
+) -> None:
+    found = wandering_by(experiment, 6000.0)
+
+    assert "what is left of pressure_1 wanders by" in found.conflict
+    assert "its zero by 2.1 kPa at most; the model lacks something" in found.conflict
+    assert found.estimates[0].verdict == "holds for this model only"
+
+
+def test_noise_that_wanders_by_less_than_the_zero_of_its_sensor_may_be_off_is_the_sensors(
+    experiment: Experiment,
+) -> None:
+    found = wandering_by(experiment, 1000.0)
+
+    assert found.conflict == ""
+    assert found.estimates[0].is_identified
