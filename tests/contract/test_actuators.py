@@ -107,6 +107,14 @@ def test_the_pressures_of_some_gas_are_those_at_which_it_fills_the_chambers(kind
 
 
 @pytest.mark.parametrize("kind", SETS)
+def test_only_a_kind_that_says_so_has_chambers_that_no_pressure_widens(kind: str) -> None:
+    model, plant = actuator_of(kind)
+    filled = [model.chambers(plant, *point) for point in points_of(plant)[::97]]
+    widest = max(max(chamber.compliance_1, chamber.compliance_2) for chamber in filled)
+    assert model.gives or widest == 0.0
+
+
+@pytest.mark.parametrize("kind", SETS)
 def test_compliance_is_the_growth_of_the_volume_with_the_pressure(kind: str) -> None:
     model, plant = actuator_of(kind)
     step = 1.0

@@ -29,6 +29,8 @@ from ppafo.model.sensors import (
     measure,
     measure_gait,
 )
+from ppafo.parameters.loading import load_device
+from ppafo.parameters.plant import plant_parameters
 from ppafo.signals.meter import Course, FootSample, MeterKind, Sample, StrideSample
 from tests.compilers_here import first_compiler
 
@@ -127,13 +129,13 @@ def sensors(draw: random.Random) -> Iterator[Entry]:
         *(fault, Fault(0.01, 0.0, 0.0, 1.0, 0.8, 5.0, 90.0, 0.3, 0.7, 0.2, 0.02), *(Fault(9.0, 0.0, 1.0),) * 2),
         Fault(0.03, 0.0, 2e5),
     )
-    shown = GaitSeen(*(0.0,) * 8)
+    shown, plant = GaitSeen(*(0.0,) * 8), plant_parameters(load_device("ppafo2011"))
     readings, walking = [], []
     for sample in range(50):
         now = draw.uniform(0.9, 1.8), draw.uniform(1e5, 4e5), draw.uniform(1e5, 4e5)
-        readings.append((noisy, *now, 2.5e-5, sample))
+        readings.append((noisy, *now, plant, sample))
         walking.append(
-            (noisy, gait, shown, *now, draw.uniform(0, 400), draw.uniform(0, 400), 2.5e-5, 1e-3 * sample, sample)
+            (noisy, gait, shown, *now, draw.uniform(0, 400), draw.uniform(0, 400), plant, 1e-3 * sample, sample)
         )
         _, shown = measure_gait(*walking[-1])
     yield Entry("measure", measure, readings)

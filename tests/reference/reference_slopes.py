@@ -13,6 +13,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
+from ppafo.model.actuators.vane import chambers
 from ppafo.model.effects.kind import Moment
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
@@ -22,7 +23,6 @@ from ppafo.model.plant import (
     ThermalParameters,
     admitted_flow,
     chamber_pressures,
-    chamber_volumes,
 )
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 
@@ -95,6 +95,10 @@ def transport(
     return Transport(mass, thermal.heat_capacity_ratio * warmth * mass)
 
 
+NEAR = 1.0e-4
+"""Angle [rad] on either side at which a volume is looked at for its slope."""
+
+
 def thermal_gas_rates(
     plant: PlantParameters,
     thermal: ThermalParameters,
@@ -109,8 +113,10 @@ def thermal_gas_rates(
     """All rates of gas with an energy balance [kg/s]; contents as in ``PlantState``. Equations (3), (6) to (9)."""
     source_pressure_1, source_pressure_2 = plant.supply_pressure, plant.dorsiflexion_pressure
     room, full = plant.atmospheric_pressure, valve_orifice.conductance
-    volume_1, volume_2 = chamber_volumes(plant, angle)
     pressure_1, pressure_2 = chamber_pressures(plant, angle, contents[0], contents[1])
+    here = chambers(plant, angle, pressure_1, pressure_2)
+    less = chambers(plant, angle - NEAR, pressure_1, pressure_2)
+    more = chambers(plant, angle + NEAR, pressure_1, pressure_2)
     warmth_1, warmth_2 = contents[0] / masses[0], contents[1] / masses[1]
     supply_1 = exact_flow(source_pressure_1, pressure_1, supply_path(openings.source_1 * full), valve_orifice)
     supply_2 = exact_flow(source_pressure_2, pressure_2, supply_path(openings.source_2 * full), valve_orifice)
@@ -124,12 +130,23 @@ def thermal_gas_rates(
     vent_1 = transport(thermal, pressure_1, room, warmth_1, 1.0, outlet_1)
     vent_2 = transport(thermal, pressure_2, room, warmth_2, 1.0, outlet_2)
     leak = transport(thermal, pressure_1, pressure_2, warmth_1, warmth_2, across)
-    compression = (thermal.heat_capacity_ratio - 1.0) * plant.displacement_per_radian * angular_velocity
-    wall_1 = thermal.wall_exchange * volume_1 * (1.0 - warmth_1)
-    wall_2 = thermal.wall_exchange * volume_2 * (1.0 - warmth_2)
+    ratio, per_content = thermal.heat_capacity_ratio, plant.gas_product
+    growth_1 = (more.volume_1 - less.volume_1) / (2.0 * NEAR) * angular_velocity
+    growth_2 = (more.volume_2 - less.volume_2) / (2.0 * NEAR) * angular_velocity
+    enters_1 = source_1.content - vent_1.content - leak.content
+    enters_1 = enters_1 + thermal.wall_exchange * here.volume_1 * (1.0 - warmth_1)
+    enters_2 = source_2.content - vent_2.content + leak.content
+    enters_2 = enters_2 + thermal.wall_exchange * here.volume_2 * (1.0 - warmth_2)
+    # The pressure first, of a chamber that the angle widens and that gives: then the work on both.
+    stiff_1 = here.volume_1 + ratio * pressure_1 * here.compliance_1
+    stiff_2 = here.volume_2 + ratio * pressure_2 * here.compliance_2
+    rise_1 = (per_content * enters_1 - ratio * pressure_1 * growth_1) / stiff_1
+    rise_2 = (per_content * enters_2 - ratio * pressure_2 * growth_2) / stiff_2
+    work_1 = (ratio - 1.0) * pressure_1 / per_content * (growth_1 + here.compliance_1 * rise_1)
+    work_2 = (ratio - 1.0) * pressure_2 / per_content * (growth_2 + here.compliance_2 * rise_2)
     return ThermalGasRates(
-        content_1=source_1.content - vent_1.content - leak.content - compression * contents[0] / volume_1 + wall_1,
-        content_2=source_2.content - vent_2.content + leak.content + compression * contents[1] / volume_2 + wall_2,
+        content_1=enters_1 - work_1,
+        content_2=enters_2 - work_2,
         mass_1=source_1.mass - vent_1.mass - leak.mass,
         mass_2=source_2.mass - vent_2.mass + leak.mass,
         supplied=source_1.mass + source_2.mass,

@@ -98,8 +98,7 @@ class SampledControl:
                 pressure_2=pressure_2,
                 torque=run.program.actuator.torque(run.plant, angle, pressure_1, pressure_2),
             )
-        seen = measure(run.sensors, *signals, run.plant.torque_constant, sample)
-        return measurement_of(run.program.actuator, run.plant, seen) if run.program.has_shape else seen
+        return measurement_of(run.program.actuator, run.plant, measure(run.sensors, *signals, run.plant, sample))
 
 
 Floats = NDArray[np.float64]

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.simulation.scenario import FreeMotion, Scenario
+from tests.reference.joints import Joint
 
 UNIVERSAL_GAS_CONSTANT = 8.314
 REFERENCE_DENSITY = 1.185
@@ -113,7 +114,7 @@ class Leg(NamedTuple):
 
 
 class Rig(NamedTuple):
-    """Everything that the equations need, in SI units."""
+    """Everything that the equations need, in SI units; ``joint`` None stands for the vane."""
 
     torque_constant: float
     displacement_per_radian: float
@@ -147,6 +148,7 @@ class Rig(NamedTuple):
     path: Path
     wish: Path
     leg: Leg
+    joint: Joint | None
 
 
 class Answer(NamedTuple):
@@ -216,6 +218,8 @@ def place_of(rig: Rig, time: float, y: Any) -> tuple[float, float]:
 
 def gas_of(rig: Rig, angle: float, y: Any) -> tuple[float, float, float, float]:
     """Both pressures [Pa] and both temperatures over that of the device."""
+    if rig.joint is not None:
+        return gas_of_joint(rig, rig.joint, angle, y)
     volume_1 = rig.dead_1 + rig.displacement_per_radian * (angle - rig.lowest)
     volume_2 = rig.dead_2 + rig.displacement_per_radian * (rig.highest - angle)
     product = rig.gas_constant * rig.temperature
@@ -229,6 +233,35 @@ def gas_of(rig: Rig, angle: float, y: Any) -> tuple[float, float, float, float]:
         pressure_1 * volume_1 / (y[MASS_1] * product),
         pressure_2 * volume_2 / (y[MASS_2] * product),
     )
+
+
+def gas_of_joint(rig: Rig, joint: Joint, angle: float, y: Any) -> tuple[float, float, float, float]:
+    """The same in chambers that may follow the pressure."""
+    product = rig.gas_constant * rig.temperature
+    isothermal = y[MASS_1] * product, y[MASS_2] * product
+    if rig.thermal == 0.0:
+        return joint.pressure(0, angle, isothermal[0]), joint.pressure(1, angle, isothermal[1]), 1.0, 1.0
+    contents = (rig.k - 1.0) * y[ENERGY_1], (rig.k - 1.0) * y[ENERGY_2]
+    return (
+        joint.pressure(0, angle, contents[0]),
+        joint.pressure(1, angle, contents[1]),
+        contents[0] / isothermal[0],
+        contents[1] / isothermal[1],
+    )
+
+
+def energy_rate(
+    rig: Rig, joint: Joint, which: int, angle: float, velocity: float, pressure: float, given: Any
+) -> float:
+    """Rate of a chamber's energy [W] that is given enthalpy [W], and heat by its walls [W] per volume [m^3]."""
+    chamber = joint.chamber(which, angle, pressure)
+    entering = given[0] + given[1] * chamber.volume
+    # dE = entering - P dV and d(P V) = (k - 1) dE, with dV = V_angle dangle + V_P dP: two equations for dP and dE.
+    moved = chamber.by_angle * velocity
+    matrix = np.array(
+        [[chamber.volume + pressure * chamber.by_pressure, 1.0 - rig.k], [pressure * chamber.by_pressure, 1.0]]
+    )
+    return float(np.linalg.solve(matrix, np.array([-pressure * moved, entering - pressure * moved]))[1])
 
 
 def exchange(rig: Rig, inside: float, warmth: float, outside: float, share: float, oneway: bool) -> tuple[float, float]:
@@ -297,7 +330,10 @@ def torque_on_foot(rig: Rig, time: float, angle: float) -> float:
 
 def net_torque(rig: Rig, time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
     """What drives the vane before friction and damping [N m], equations (1) and (11)."""
-    actuator = rig.torque_constant * (pressure_1 - pressure_2)
+    if rig.joint is None:
+        actuator = rig.torque_constant * (pressure_1 - pressure_2)
+    else:
+        actuator = rig.joint.torque(angle, pressure_1, pressure_2)
     if rig.leg.is_worn > 0.0:
         return actuator + torque_on_foot(rig, time, angle) - rig.external
     gravity = -rig.gravity * math.sin(angle)
@@ -331,10 +367,17 @@ def rates(rig: Rig, time: float, state: Any, way: float, coils: Any, target: flo
     slope[TAKEN] = from_1 + from_2
     if rig.thermal > 0.0:
         enthalpy = rig.gas_constant * rig.temperature * rig.k / (rig.k - 1.0)
-        volume_rate = rig.displacement_per_radian * velocity if way != REST else 0.0
+        heat = rig.heat * rig.walls * rig.temperature
+        turning = velocity if way != REST else 0.0
+    if rig.thermal > 0.0 and rig.joint is not None:
+        given_1 = enthalpy * (warm_1 + cold_1 - carried), heat * (1.0 - warmth_1)
+        given_2 = enthalpy * (warm_2 + cold_2 + carried), heat * (1.0 - warmth_2)
+        slope[ENERGY_1] = energy_rate(rig, rig.joint, 0, angle, turning, pressure_1, given_1)
+        slope[ENERGY_2] = energy_rate(rig, rig.joint, 1, angle, turning, pressure_2, given_2)
+    elif rig.thermal > 0.0:
+        volume_rate = rig.displacement_per_radian * turning
         volume_1 = rig.dead_1 + rig.displacement_per_radian * (angle - rig.lowest)
         volume_2 = rig.dead_2 + rig.displacement_per_radian * (rig.highest - angle)
-        heat = rig.heat * rig.walls * rig.temperature
         slope[ENERGY_1] = enthalpy * (warm_1 + cold_1 - carried) - pressure_1 * volume_rate
         slope[ENERGY_2] = enthalpy * (warm_2 + cold_2 + carried) + pressure_2 * volume_rate
         slope[ENERGY_1] += heat * volume_1 * (1.0 - warmth_1)
@@ -655,15 +698,15 @@ def law_of(scenario: Scenario, bias: float) -> Law:
     return Law(CONTROLLERS[scenario.controller.kind], scenario.controller.period, s.get("command", 0.0), *gains, *seen)
 
 
-def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None) -> Rig:
-    """The numbers of a scenario."""
+def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None, joint: Joint | None = None) -> Rig:
+    """The numbers of a scenario; of an actuator that is no vane, the ``joint``."""
     device, motion, warm = scenario.device, scenario.motion, scenario.gas_model
     actuator, friction, supply, gas = device.actuator, device.friction, device.supply, device.gas
     free = isinstance(motion, FreeMotion)
     leg = motion.leg if free else None
     return Rig(
-        actuator.torque_constant,
-        actuator.displacement_per_radian,
+        actuator.torque_constant if joint is None else math.nan,
+        actuator.displacement_per_radian if joint is None else math.nan,
         actuator.angle_min,
         actuator.angle_max,
         actuator.dead_volume_1,
@@ -694,6 +737,7 @@ def rig_of(scenario: Scenario, bias: float = 0.0, relieving: bool | None = None)
         Path(CONSTANT, 0.0, 0.0, 0.0, 0.0) if free else path_of(motion.profile),
         path_of(scenario.reference),
         leg_of(leg),
+        joint,
     )
 
 
@@ -707,9 +751,13 @@ def start_of(scenario: Scenario, rig: Rig, moved: float) -> Any:
         y[VELOCITY] = scenario.motion.angular_velocity * (1.0 + moved)
     product = rig.gas_constant * rig.temperature
     content_1 = scenario.initial.pressure_1 * (1.0 + moved)
-    content_1 *= rig.dead_1 + rig.displacement_per_radian * (y[ANGLE] - rig.lowest)
     content_2 = scenario.initial.pressure_2 * (1.0 - moved)
-    content_2 *= rig.dead_2 + rig.displacement_per_radian * (rig.highest - y[ANGLE])
+    if rig.joint is None:
+        content_1 *= rig.dead_1 + rig.displacement_per_radian * (y[ANGLE] - rig.lowest)
+        content_2 *= rig.dead_2 + rig.displacement_per_radian * (rig.highest - y[ANGLE])
+    else:
+        content_1 *= rig.joint.chamber(0, y[ANGLE], content_1).volume
+        content_2 *= rig.joint.chamber(1, y[ANGLE], content_2).volume
     y[MASS_1], y[MASS_2] = content_1 / product, content_2 / product
     y[ENERGY_1], y[ENERGY_2] = content_1 / (rig.k - 1.0), content_2 / (rig.k - 1.0)
     return y
@@ -721,13 +769,15 @@ def independent_run(
     moved: float = 0.0,
     bias: float = 0.0,
     relieving: bool | None = None,
+    joint: Joint | None = None,
 ) -> Answer:
     """What the equations say of a scenario, at the times of its recording.
 
     ``tolerance`` is the error allowed in a step; ``moved`` moves the start, ``bias`` [Pa] what the controller measures.
     Supplies take gas back where ``relieving`` says so, or the device does; one that says nothing takes it back.
+    An actuator that is no vane is given as a ``joint``.
     """
-    rig = rig_of(scenario, bias, relieving)
+    rig = rig_of(scenario, bias, relieving, joint)
     records = np.full((round(scenario.run.duration / scenario.run.output_interval) + 1, 6), np.nan)
     impacts = np.zeros(10_000)
     start = start_of(scenario, rig, moved)

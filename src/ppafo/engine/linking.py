@@ -36,6 +36,8 @@ def link_program(program: Program, collector: Linked) -> None:
     """
     own = links_of(program.actuator)
     collector.links.update(own)
+    if own:
+        collector.links.update(program.gas.IN_SHAPES)
     if program.leg is not None:
         of_walk = program.leg.links(program)
         collector.links.update(of_walk)

@@ -48,6 +48,10 @@ class GasPhases(Protocol):
     def START(self) -> Callable[[Any, PlantState], Any] | None:  # noqa: N802
         """``START(plant, initial)`` makes the only group of states; None where there is none."""
 
+    @property
+    def IN_SHAPES(self) -> Mapping[Any, Any]:  # noqa: N802
+        """What stands for its functions in a program whose actuator has a shape of its own."""
+
     def stage(self, parts: "Program") -> Rows:
         """What the first stage leaves for later phases."""
 
@@ -429,14 +433,9 @@ class Program:
         return self.angle is CONSTANT
 
     @property
-    def has_shape(self) -> bool:
-        """True where the actuator is no vane, so that its kind gives chambers and torque."""
-        return self.actuator is not VANE
-
-    @property
     def keeps_volumes(self) -> bool:
-        """True where the chamber volumes of a locked vane are computed once; all others are treated as moving."""
-        return self.is_locked and not (self.has_true_masses or self.feed is not None or self.has_shape)
+        """True where the chamber volumes of a locked joint are computed once; all others are treated as moving."""
+        return self.is_locked and not (self.has_true_masses or self.feed is not None or self.actuator.gives)
 
     @property
     def hands_chambers_on(self) -> bool:

@@ -9,6 +9,7 @@ the same.
 from typing import NamedTuple
 
 from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
+from ppafo.model.plant import PlantParameters, joint_torque
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
@@ -113,16 +114,20 @@ def quantise(value: float, resolution: float) -> float:
 
 
 def measure(
-    sensors: SensorParameters, angle: float, pressure_1: float, pressure_2: float, torque_constant: float, sample: int
+    sensors: SensorParameters, angle: float, pressure_1: float, pressure_2: float, plant: PlantParameters, sample: int
 ) -> Measurement:
-    """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute]."""
+    """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute].
+
+    The torque is what the actuator of the plant would have at the angle and pressures shown.
+    """
     seed = int(sensors.seed)
     angle = quantise(angle + sensors.angle_noise * standard_noise(seed, sample, 0), sensors.angle_resolution)
     first = quantise(pressure_1 + sensors.pressure_noise * standard_noise(seed, sample, 1), sensors.pressure_resolution)
     second = quantise(
         pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_resolution
     )
-    return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque_constant * (first - second))
+    torque = joint_torque(plant, angle, first, second)
+    return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque)
 
 
 class GaitMeasurement(NamedTuple):
@@ -266,7 +271,7 @@ def measure_gait(
     pressure_2: float,
     heel_force: float,
     toe_force: float,
-    torque_constant: float,
+    plant: PlantParameters,
     time: float,
     sample: int,
 ) -> tuple[GaitMeasurement, GaitSeen]:
@@ -281,7 +286,7 @@ def measure_gait(
     smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
     # Channels of the noise: 0 to 4 values, 5 to 9 lost samples, 10 faults; 11 is the controller's own
     # (plant_faults.py).
-    seen = measure(sensors, smooth_angle, smooth_1, smooth_2, torque_constant, sample)
+    seen = measure(sensors, smooth_angle, smooth_1, smooth_2, plant, sample)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
     was_angle = previous_reading(last.angle, seen.angle, sample)
@@ -312,7 +317,7 @@ def measure_gait(
         smooth_pressure_2=smooth_2,
     )
     # The torque follows from the readings, right or wrong.
-    shown = late_measurement(shown_heel, shown_toe, shown_angle, shown_1, shown_2, torque_constant)
+    shown = late_measurement(shown_heel, shown_toe, shown_angle, shown_1, shown_2, plant)
     return shown, remembered
 
 
@@ -324,14 +329,14 @@ def samples_late(fault: Fault, time: float, sample: int) -> int:
 
 
 def late_measurement(
-    heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, torque_constant: float
+    heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, plant: PlantParameters
 ) -> GaitMeasurement:
     """What a controller gets of readings, late ones too: forces [N], angle [rad], pressures [Pa]."""
     return GaitMeasurement(
         angle=angle,
         pressure_1=pressure_1,
         pressure_2=pressure_2,
-        torque=torque_constant * (pressure_1 - pressure_2),
+        torque=joint_torque(plant, angle, pressure_1, pressure_2),
         heel_force=heel_force,
         toe_force=toe_force,
     )

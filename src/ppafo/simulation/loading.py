@@ -149,8 +149,6 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         raise ScenarioError(f"{request.file}: {problem}")
     # Refuse what only a vane has.
     try:
-        if scenario.gas_model is not None:
-            scenario.device.check_vane("gas with an energy balance")
         if CONTROLLERS[scenario.controller.kind].plan is not None:
             scenario.device.check_vane("a fixed-point controller")
     except ParameterError as error:

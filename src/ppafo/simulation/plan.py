@@ -20,7 +20,6 @@ from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step import isothermal
 from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
-from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
     Number,
@@ -39,7 +38,7 @@ from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass, chamber_volumes
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_mass
 from ppafo.model.ports import gas_density
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
@@ -321,16 +320,20 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     )
     tolerance = relative_tolerance(scenario.run.tolerance)
-    # The error decides about the parts of a step, but for a held vane whose chambers are slow enough for plain steps.
+    # The error decides about the parts of a step, but for a held joint whose chambers no pressure widens, and which are
+    # slow enough for plain steps.
     needs_parts: Any = True
-    is_bare_vane = scenario.supply_lines is None and scenario.device.actuator.kind == VANE.name
-    angle = vane_motion(scenario).locked_angle if is_bare_vane else None
+    model = ACTUATORS[scenario.device.actuator.kind].model
+    is_alone = scenario.supply_lines is None and not model.gives
+    angle = vane_motion(scenario).locked_angle if is_alone else None
     if angle is not None:
         # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
         stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
         # A stricter tolerance counts as a longer step; a looser one as the default.
         step = counts.step / smaller(1.0, tolerance)
-        needs_parts = np.logical_not(is_slow_locked(plant, step, angle, stiffness))
+        held = smaller(larger(angle, plant.angle_min), plant.angle_max)
+        room = plant.atmospheric_pressure
+        needs_parts = np.logical_not(is_slow(plant, step, *volumes_of(model, plant, held, room, room), stiffness))
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
@@ -381,12 +384,8 @@ def initial_state(scenario: Scenario, plant: PlantParameters) -> PlantState:
         numbers = [motion.profile.settings[quantity.name] for quantity in path.quantities]
         angle, rate, _ = over_runs(lambda *values: path.value(rebuilt(path.parameters, values), 0.0), *numbers)
     pressures = scenario.initial.pressure_1, scenario.initial.pressure_2
-    kind = scenario.device.actuator.kind
-    if kind == VANE.name:
-        return state_at_start(plant, angle, rate, *pressures)
-    return state_with_volumes(
-        plant, angle, rate, *volumes_of(ACTUATORS[kind].model, plant, angle, *pressures), *pressures
-    )
+    model = ACTUATORS[scenario.device.actuator.kind].model
+    return state_with_volumes(plant, angle, rate, *volumes_of(model, plant, angle, *pressures), *pressures)
 
 
 def exact_orifice(orifice: Orifice | SonicOrifice, device: Device) -> ExactOrifice:
@@ -428,11 +427,6 @@ def nearly_whole(steps: Number) -> Number:
     return found
 
 
-def is_slow_locked(plant: PlantParameters, step: float, angle: float, stiffness: float) -> bool:
-    """True where plain steps [s] follow the gas of a vane that is held at an angle [rad]; see ``is_slow``."""
-    return is_slow(plant, step, larger(angle, plant.angle_min), smaller(angle, plant.angle_max), stiffness)
-
-
 def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:
     """How a gas with an energy balance takes up heat."""
     exchange = wall_exchange(
@@ -441,14 +435,6 @@ def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:
     return ThermalParameters(
         heat_capacity_ratio=gas.heat_capacity_ratio, wall_exchange=exchange, temperature=gas.temperature
     )
-
-
-def state_at_start(
-    plant: PlantParameters, angle: Any, angular_velocity: Any, pressure_1: float, pressure_2: float
-) -> PlantState:
-    """The vane at an angle [rad] with a rate [rad/s], and the gas of two absolute pressures [Pa]."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    return state_with_volumes(plant, angle, angular_velocity, volume_1, volume_2, pressure_1, pressure_2)
 
 
 def state_with_volumes(

@@ -125,7 +125,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
                 pressure_2=pressure_2,
                 torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
-        seen = measure(sensors, angle, pressure_1, pressure_2, plant.torque_constant, sample)
+        seen = measure(sensors, angle, pressure_1, pressure_2, plant, sample)
         return measurement_of(actuator, plant, seen)
 
     return see
@@ -160,7 +160,7 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
                 toe_force=toe,
             )
         seen, last = measure_gait(
-            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant.torque_constant, sample * period, sample
+            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, sample * period, sample
         )
         return measurement_of(actuator, plant, seen)
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
-from ppafo.engine.scheme.thermal_gas import ThermalFlows, thermal_flows
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, WarmChambers, thermal_flows
 from ppafo.model.orifice import orifice_flow
 from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import (
@@ -87,7 +87,8 @@ def thermal_gas_flows(
     in_1, in_2, leak = port_flows(plant, openings, pressure_1, pressure_2)
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
     growth = plant.displacement_per_radian * state.angular_velocity
-    return thermal_flows(thermal, state, masses, volume_1, volume_2, growth, in_1, in_2, leak)
+    at = WarmChambers(volume_1=volume_1, volume_2=volume_2, growth_1=growth, growth_2=-growth, give_1=0.0, give_2=0.0)
+    return thermal_flows(thermal, state, masses, at, in_1, in_2, leak)
 
 
 def gas_rates(

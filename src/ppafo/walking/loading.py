@@ -11,7 +11,7 @@ from typing import Any
 from ppafo.arguments import Overrides, checked
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
+from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
@@ -185,9 +185,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     reading = Reading(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    if "gas_model" in document:
-        with refused_as(ParameterError, f"{reading.file}: [device]", ParameterError):
-            device.check_vane("gas with an energy balance")
     named_sequence = _named_file("task_sequence", request, document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if named_sequence is None else load_task_sequence(named_sequence)

@@ -11,6 +11,7 @@ import ppafo
 from ppafo.engine.loading import BACKEND_VARIABLE
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.sensors import Measurement, measure
+from ppafo.parameters.plant import plant_parameters
 
 gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
@@ -206,11 +207,11 @@ def test_replayed_commands_of_a_law_have_the_bits_of_its_walk_and_its_sensors_ar
         assert [state[f"state.{channel}"] for state in states] == recording[channel][:701].tolist()
     assert max(recording["torque"][:701]) > 3.0
     late = 3
-    sensors, constant = env.episode().sensors, env.episode().device.actuator.torque_constant
+    sensors, plant = env.episode().sensors, plant_parameters(env.episode().device)
     pressures = recording["pressure_1"], recording["pressure_2"]
     for sample in (late, 400, 700):
         then = sample - late
-        seen = measure(sensors, recording["angle"][then], *(item[then] for item in pressures), constant, then)
+        seen = measure(sensors, recording["angle"][then], *(item[then] for item in pressures), plant, then)
         shown = (seen.angle, seen.pressure_1 / BAR, seen.pressure_2 / BAR, seen.torque)
         assert np.array_equal(observations[sample][:4], np.array(shown, dtype=np.float32))
 

@@ -19,6 +19,8 @@ from ppafo.model.plant import (
     vane_acceleration,
 )
 from ppafo.model.sensors import SensorParameters, measure, quantise, standard_noise
+from ppafo.parameters.loading import load_device
+from ppafo.parameters.plant import plant_parameters
 
 
 def test_printed_volumes_are_the_case_without_dead_volume_and_lower_stop() -> None:
@@ -86,5 +88,6 @@ def test_quantised_values_are_whole_quanta_within_half_of_one(value: float, quan
 
 
 def test_ideal_sensors_change_nothing() -> None:
-    seen = measure(SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0), 1.2, 3e5, 1e5, 1.451e-5, 4)
-    assert seen == (1.2, 3e5, 1e5, pytest.approx(1.451e-5 * 2e5))
+    plant = plant_parameters(load_device("ppafo2011"))
+    seen = measure(SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0), 1.2, 3e5, 1e5, plant, 4)
+    assert seen == (1.2, 3e5, 1e5, pytest.approx(plant.torque_constant * 2e5))

@@ -14,11 +14,14 @@ from ppafo.model.sensors import (
     SensorParameters,
     measure_gait,
 )
+from ppafo.parameters.loading import load_device
+from ppafo.parameters.plant import plant_parameters
 
 QUIET = SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0)
 NEVER = Fault(1.0e9, 0.0, 0.0)
 IDEAL = GaitSensors(200.0, *(0.0,) * 7, *(NEVER,) * 5)
-TORQUE_CONSTANT = 1.7e-5
+PLANT = plant_parameters(load_device("ppafo2011"))
+TORQUE_CONSTANT = PLANT.torque_constant
 PERIOD = 1.0e-3
 TRUE = (1.5, 3.0e5, 1.0e5, 400.0, 120.0)
 
@@ -26,7 +29,7 @@ TRUE = (1.5, 3.0e5, 1.0e5, 400.0, 120.0)
 def seen(
     sensors: GaitSensors, sample: int, last: GaitSeen, true: tuple[float, ...] = TRUE, quiet: SensorParameters = QUIET
 ) -> tuple[GaitMeasurement, GaitSeen]:
-    return measure_gait(quiet, sensors, last, *true, TORQUE_CONSTANT, sample * PERIOD, sample)
+    return measure_gait(quiet, sensors, last, *true, PLANT, sample * PERIOD, sample)
 
 
 def test_an_ideal_sensor_shows_what_is_there() -> None:

@@ -17,6 +17,7 @@ from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.walk import WalkResult
 from tests.actuators import vane_of_others
+from tests.actuators.soft import soft
 
 EXAMPLES = Path(__file__).parents[2] / "actuators"
 CYLINDER = "device.set=cylinder-lever"
@@ -30,27 +31,6 @@ def _with_the_kind_of_another_package() -> Iterator[None]:
     ACTUATORS["vane_of_others"] = vane_of_others.KIND
     yield
     del ACTUATORS["vane_of_others"]
-
-
-def soft(folder: Path, chambers: int = 2) -> str:
-    """A set with a soft actuator of one or two chambers as strong as the vane of the paper; how an override names it.
-
-    Its chambers grow by half from vented to full, most of it at low pressure, as cloth does until it is taut.
-    """
-    angles, gauges = np.linspace(20.0, 110.0, 4), (0.0, 40.0, 400.0)
-    lines = ["angle [deg],pressure [kPa_g],volume_1 [mL]" + ",volume_2 [mL]" * (chambers - 1)]
-    for angle in angles:
-        turn = np.radians(angle - 20.0)
-        for gauge, more in zip(gauges, (0.0, 0.3, 0.5), strict=True):
-            first = float((30.0 + 40.0 * turn) * (1.0 + more))
-            second = float((30.0 + 20.0 * (np.radians(90.0) - turn)) * (1.0 + more))
-            lines.append(f"{angle},{gauge},{first!r}" + f",{second!r}" * (chambers - 1))
-    (folder / "soft.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    text = (EXAMPLES / "measured-bladder.toml").read_text(encoding="utf-8")
-    text = text.replace("measured-bladder.csv", "soft.csv").replace("measured-bladder", "soft")
-    text = text.replace("value = 166.8", "value = 300.0")
-    (folder / "soft.toml").write_text(text, encoding="utf-8")
-    return f"device.set={folder / 'soft.toml'}"
 
 
 def written_by_others(folder: Path) -> str:

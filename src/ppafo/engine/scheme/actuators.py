@@ -53,27 +53,13 @@ def pressures_held(plant: PlantParameters, held: HeldChambers, state: PlantState
     return chamber_pressures(plant, held.angle, state.mass_1, state.mass_2)
 
 
-def seen_with_torque(plant: PlantParameters, seen: Measurement) -> Measurement:
-    """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
-    torque = joint_torque(plant, seen.angle, seen.pressure_1, seen.pressure_2)
-    return Measurement(angle=seen.angle, pressure_1=seen.pressure_1, pressure_2=seen.pressure_2, torque=torque)
-
-
-def gait_seen_with_torque(plant: PlantParameters, seen: GaitMeasurement) -> GaitMeasurement:
-    """What the sensors of a walk show, with the torque at the angle and pressures shown."""
-    torque = joint_torque(plant, seen.angle, seen.pressure_1, seen.pressure_2)
-    return GaitMeasurement(
-        angle=seen.angle,
-        pressure_1=seen.pressure_1,
-        pressure_2=seen.pressure_2,
-        torque=torque,
-        heel_force=seen.heel_force,
-        toe_force=seen.toe_force,
-    )
-
-
 def begin_shaped_gas(
-    plant: PlantParameters, state: PlantState, next_angle: float, flowing: SlopedFlows, step: float
+    plant: PlantParameters,
+    state: PlantState,
+    _held: HeldChambers,
+    next_angle: float,
+    flowing: SlopedFlows,
+    step: float,
 ) -> MovingGas:
     """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``.
 

@@ -449,14 +449,13 @@ def filling_time(plant: PlantParameters, volume: float) -> float:
     return volume / ((plant.valve_conductance + plant.leak_conductance) * plant.gas_product)
 
 
-def is_slow(plant: PlantParameters, step: float, lowest_angle: float, highest_angle: float, stiffness: float) -> bool:
-    """True where a step [s] is at most 1/70 of the time in which a chamber fills, for angles between two [rad].
+def is_slow(plant: PlantParameters, step: float, volume_1: float, volume_2: float, stiffness: float) -> bool:
+    """True where a step [s] is at most 1/70 of the time in which either chamber fills, of two volumes [m^3].
 
     This keeps the error of a plain step below 1e-3 of the pressure range (docs/decisions/0002). ``stiffness`` [-] is
     how much stiffer than at constant temperature the gas is: 1, or the heat capacity ratio, by which adiabatic chambers
     also fill faster. Any of the numbers may be an array (runs,), and the result is one then.
     """
-    # The smaller chamber fills fastest: its volume at the end of the range where it is least.
-    volume = smaller(chamber_volumes(plant, lowest_angle)[0], chamber_volumes(plant, highest_angle)[1])
-    # 1e-9 above, so that a step that was made from this very limit passes.
-    return step * STEPS_PER_FILLING * stiffness <= filling_time(plant, volume) * (1.0 + 1.0e-9)
+    # The smaller chamber fills fastest. 1e-9 above, so that a step that was made from this very limit passes.
+    filling = filling_time(plant, smaller(volume_1, volume_2))
+    return step * STEPS_PER_FILLING * stiffness <= filling * (1.0 + 1.0e-9)

@@ -21,7 +21,7 @@ from ppafo.engine.scheme.pneumatics import (
     linearise,
     pressure_that_matters,
 )
-from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, begin_thermal_stage, transport, volumes_at_begin
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, begin_thermal_stage, chambers_at_begin, transport
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,
@@ -175,15 +175,18 @@ def begin_fed_thermal_gas(
     step: float,
 ) -> FedThermalGas:
     """First stage of one step [s] as ``begin_fed_gas``, for gas with an energy balance."""
-    at_begin = volumes_at_begin(plant, state, next_angle, step)
-    share_1, share_2 = at_begin.volume_1 / lines.volume_1, at_begin.volume_2 / lines.volume_2
+    at_begin = chambers_at_begin(plant, state, next_angle, step)
+    at, ratio = at_begin.chambers, thermal.heat_capacity_ratio
+    # A chamber that gives takes more gas for a rise of its pressure.
+    share_1 = at.volume_1 * (1.0 + ratio * at.give_1) / lines.volume_1
+    share_2 = at.volume_2 * (1.0 + ratio * at.give_2) / lines.volume_2
     # What comes from a line brings more energy than mass, by the ratio of heat capacities.
-    per_line = 1.0 / thermal.heat_capacity_ratio
-    in_1 = with_line(flowing.in_1, per_line * share_1)
-    in_2 = with_line(flowing.in_2, per_line * share_2)
-    chambers = begin_thermal_stage(thermal, state, masses, at_begin, SlopedFlows(in_1, in_2, flowing.leak), step)
+    in_1 = with_line(flowing.in_1, 1.0 / ratio * share_1)
+    in_2 = with_line(flowing.in_2, 1.0 / ratio * share_2)
+    flowing = SlopedFlows(in_1, in_2, flowing.leak)
+    chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step)
     first, by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
-    drift_2 = by_2 * state.mass_2 * chambers.growth / at_begin.volume_2
+    drift_2 = -by_2 * state.mass_2 * at.growth_2 / at.volume_2
     taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + by_2 * first.content_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
     return FedThermalGas(chambers=chambers, taken_2=taken_2, drift_2=drift_2, lines=stepped)

@@ -5,6 +5,18 @@ at the reference temperature. Content over true mass is ``T / T_0``. Gas comes f
 at ``T_0``. Where the gas is isothermal the content is the mass, so all that reads pressures from ``PlantState`` stays
 as it is; here the true masses stand beside it. The matrix leaves out how the flows depend on the temperature upstream,
 which changes no faster than a chamber fills; the method keeps its order with any matrix.
+
+A chamber may give under pressure: ``V(angle, P)`` then takes part of what enters as work on its wall. With ``c`` the
+content, ``e`` the rate of content that enters with gas and heat, ``g`` the rate at which the angle alone widens the
+chamber, ``x = P/V dV/dP`` and the heat capacity ratio ``k``, the energy balance of ``P V/(k - 1)`` is
+
+    dc/dt = e - (k - 1) c/V dV/dt,   dV/dt = g + dV/dP dP/dt,   P V = R T_0/M c.
+
+The last one in time, ``dP/dt (V + P dV/dP) = R T_0/M dc/dt - P g``, takes dP/dt and dV/dt out of it:
+
+    dc/dt = (e (1 + x) - (k - 1) c g/V) / (1 + k x).
+
+A rigid chamber has ``x`` 0 (docs/equations.md).
 """
 
 import math
@@ -52,7 +64,10 @@ class ThermalFlows(NamedTuple):
 
 
 class FlowSlopes(NamedTuple):
-    """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents; walls and work left out."""
+    """Gamma h times the derivatives of ``ThermalFlows`` with respect to both contents; walls and work left out.
+
+    Those of contents are what enters the chambers, of which they keep the shares ``kept_1`` and ``kept_2`` [-].
+    """
 
     content_1_by_1: float
     content_1_by_2: float
@@ -68,6 +83,22 @@ class FlowSlopes(NamedTuple):
     leaked_by_2: float
     source_content_by_1: float
     source_content_by_2: float
+    kept_1: float
+    kept_2: float
+
+
+class WarmChambers(NamedTuple):
+    """Both chambers at one end of a step: volumes [m^3], and rates at which the angle widens them [m^3/s].
+
+    ``give`` is P dV/dP over the volume [-], 0 of a rigid chamber.
+    """
+
+    volume_1: float
+    volume_2: float
+    growth_1: float
+    growth_2: float
+    give_1: float
+    give_2: float
 
 
 class Transport(NamedTuple):
@@ -107,13 +138,22 @@ def wall_rate(thermal: ThermalParameters, volume: float, content: float, mass: f
     return thermal.wall_exchange * volume * (1.0 - content / mass)
 
 
+def kept_share(ratio: float, give: float) -> float:
+    """Share of the energy that enters which stays in a chamber [-]; the rest is work on a wall that gives."""
+    return (1.0 + give) / (1.0 + ratio * give)
+
+
+def content_rate(thermal: ThermalParameters, entering: float, work: float, heat: float, give: float) -> float:
+    """Rate of a content [kg/s] from what enters with gas, the work by the angle and the heat of the wall [kg/s]."""
+    kept = 1.0 + give
+    return (entering * kept - work + heat * kept) / (1.0 + thermal.heat_capacity_ratio * give)
+
+
 def thermal_flows(
     thermal: ThermalParameters,
     state: PlantState,
     masses: ThermalState,
-    volume_1: float,
-    volume_2: float,
-    growth: float,
+    at: WarmChambers,
     in_1: PortFlow,
     in_2: PortFlow,
     leak: float,
@@ -135,14 +175,16 @@ def thermal_flows(
     source_2 = in_2.from_source * source_2_carries.content
     enthalpy_1 = source_1 + vent_1 * vent_1_carries.content
     enthalpy_2 = source_2 + vent_2 * vent_2_carries.content
-    heat_1 = wall_rate(thermal, volume_1, state.mass_1, masses.mass_1)
-    heat_2 = wall_rate(thermal, volume_2, state.mass_2, masses.mass_2)
+    heat_1 = wall_rate(thermal, at.volume_1, state.mass_1, masses.mass_1)
+    heat_2 = wall_rate(thermal, at.volume_2, state.mass_2, masses.mass_2)
     leaked_enthalpy = leak * leak_carries.content
     # In units of content, the work P dV of a chamber is (k - 1) times its content over its volume.
-    work = (thermal.heat_capacity_ratio - 1.0) * growth
+    less = thermal.heat_capacity_ratio - 1.0
+    work_1 = less * at.growth_1 * state.mass_1 / at.volume_1
+    work_2 = less * at.growth_2 * state.mass_2 / at.volume_2
     return ThermalFlows(
-        content_1=enthalpy_1 - leaked_enthalpy - work * state.mass_1 / volume_1 + heat_1,
-        content_2=enthalpy_2 + leaked_enthalpy + work * state.mass_2 / volume_2 + heat_2,
+        content_1=content_rate(thermal, enthalpy_1 - leaked_enthalpy, work_1, heat_1, at.give_1),
+        content_2=content_rate(thermal, enthalpy_2 + leaked_enthalpy, work_2, heat_2, at.give_2),
         mass_1=supplied_1 + vent_1 * vent_1_carries.mass - leaked,
         mass_2=supplied_2 + vent_2 * vent_2_carries.mass + leaked,
         supplied=supplied_1 + supplied_2,
@@ -164,8 +206,9 @@ def flow_slopes(
     leak: LeakSlopes,
     near_1: float,
     near_2: float,
+    at: WarmChambers,
 ) -> FlowSlopes:
-    """How all flows respond to both contents; weights are gamma h times pressure over content [Pa s/kg].
+    """How all flows respond to both contents; weights are gamma h times how pressure follows content [Pa s/kg].
 
     ``near_1`` and ``near_2`` [Pa] are differences of pressure below which a flow may turn.
     """
@@ -198,14 +241,16 @@ def flow_slopes(
         leaked_by_2=by_2 * leak_carries.mass,
         source_content_by_1=in_1.source_slope * source_1.content * weight_1,
         source_content_by_2=in_2.source_slope * source_2.content * weight_2,
+        kept_1=kept_share(thermal.heat_capacity_ratio, at.give_1),
+        kept_2=kept_share(thermal.heat_capacity_ratio, at.give_2),
     )
 
 
 def flow_response(slopes: FlowSlopes, content_1: float, content_2: float) -> ThermalFlows:
     """Gamma h times the change of all flows but heat [kg/s] while both contents change at two rates [kg/s]."""
     return ThermalFlows(
-        content_1=slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2,
-        content_2=slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2,
+        content_1=slopes.kept_1 * (slopes.content_1_by_1 * content_1 + slopes.content_1_by_2 * content_2),
+        content_2=slopes.kept_2 * (slopes.content_2_by_1 * content_1 + slopes.content_2_by_2 * content_2),
         mass_1=slopes.mass_1_by_1 * content_1 + slopes.mass_1_by_2 * content_2,
         mass_2=slopes.mass_2_by_1 * content_1 + slopes.mass_2_by_2 * content_2,
         supplied=slopes.supplied_by_1 * content_1 + slopes.supplied_by_2 * content_2,
@@ -248,57 +293,46 @@ class ThermalMatrix(NamedTuple):
 
 
 class ThermalBegin(NamedTuple):
-    """Both chambers at the begin of a step: volumes then and at its end [m^3], rate at which chamber 1 grows [m^3/s].
+    """Both chambers at the begin of a step, and how their absolute pressures follow their contents [Pa/kg]."""
 
-    Then absolute pressures over contents [Pa/kg].
-    """
-
-    volume_1: float
-    volume_2: float
-    next_1: float
-    next_2: float
-    growth: float
+    chambers: WarmChambers
     per_content_1: float
     per_content_2: float
 
 
 class ThermalGas(NamedTuple):
-    """First stage of a step: its matrix, the stage, the changes in time, the gas and volumes it leads to.
-
-    ``growth`` is the rate [m^3/s] at which chamber 1 grows.
-    """
+    """First stage of a step: its matrix, the stage, the changes in time, the gas and chambers it leads to."""
 
     matrix: ThermalMatrix
     first: ThermalFlows
     drift: ThermalFlows
     end: PlantState
     end_masses: ThermalState
-    volume_1: float
-    volume_2: float
-    growth: float
+    ended: WarmChambers
 
 
 def thermal_matrix(
     thermal: ThermalParameters,
     state: PlantState,
     masses: ThermalState,
-    volume_1: float,
-    volume_2: float,
-    growth: float,
+    at: WarmChambers,
     weight: float,
     slopes: FlowSlopes,
 ) -> ThermalMatrix:
     """The matrix of a step; ``weight`` is gamma h [s]."""
-    cooling_1 = weight * thermal.wall_exchange * volume_1 / masses.mass_1
-    cooling_2 = weight * thermal.wall_exchange * volume_2 / masses.mass_2
+    cooling_1 = weight * thermal.wall_exchange * at.volume_1 / masses.mass_1
+    cooling_2 = weight * thermal.wall_exchange * at.volume_2 / masses.mass_2
     wall_1 = cooling_1 * state.mass_1 / masses.mass_1
     wall_2 = cooling_2 * state.mass_2 / masses.mass_2
-    work = weight * (thermal.heat_capacity_ratio - 1.0) * growth
+    ratio = thermal.heat_capacity_ratio
+    work_1 = weight * (ratio - 1.0) * at.growth_1 / (at.volume_1 * (1.0 + ratio * at.give_1))
+    work_2 = weight * (ratio - 1.0) * at.growth_2 / (at.volume_2 * (1.0 + ratio * at.give_2))
+    kept_1, kept_2 = slopes.kept_1, slopes.kept_2
     # The masses are eliminated first: they respond to the contents alone, so that a 2 by 2 matrix is left.
-    a = 1.0 - slopes.content_1_by_1 + work / volume_1 + cooling_1 - wall_1 * slopes.mass_1_by_1
-    b = -slopes.content_1_by_2 - wall_1 * slopes.mass_1_by_2
-    c = -slopes.content_2_by_1 - wall_2 * slopes.mass_2_by_1
-    d = 1.0 - slopes.content_2_by_2 - work / volume_2 + cooling_2 - wall_2 * slopes.mass_2_by_2
+    a = 1.0 - kept_1 * slopes.content_1_by_1 + work_1 + kept_1 * cooling_1 - kept_1 * wall_1 * slopes.mass_1_by_1
+    b = -kept_1 * slopes.content_1_by_2 - kept_1 * wall_1 * slopes.mass_1_by_2
+    c = -kept_2 * slopes.content_2_by_1 - kept_2 * wall_2 * slopes.mass_2_by_1
+    d = 1.0 - kept_2 * slopes.content_2_by_2 + work_2 + kept_2 * cooling_2 - kept_2 * wall_2 * slopes.mass_2_by_2
     return ThermalMatrix(
         slopes=slopes,
         a=a,
@@ -316,8 +350,8 @@ def thermal_matrix(
 def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFlows:
     """Stage slopes [kg/s] from the right-hand sides [kg/s]."""
     # Right-hand sides of the contents after the masses are eliminated.
-    right_1 = right.content_1 + matrix.wall_1 * right.mass_1
-    right_2 = right.content_2 + matrix.wall_2 * right.mass_2
+    right_1 = right.content_1 + matrix.slopes.kept_1 * matrix.wall_1 * right.mass_1
+    right_2 = right.content_2 + matrix.slopes.kept_2 * matrix.wall_2 * right.mass_2
     content_1 = (matrix.d * right_1 - matrix.b * right_2) * matrix.scale
     content_2 = (matrix.a * right_2 - matrix.c * right_1) * matrix.scale
     by_contents = flow_response(matrix.slopes, content_1, content_2)
@@ -348,51 +382,61 @@ def begin_thermal_gas(
     step: float,
 ) -> ThermalGas:
     """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
-    at_begin = volumes_at_begin(plant, state, next_angle, step)
-    return begin_thermal_stage(thermal, state, masses, at_begin, flowing, step)
+    at_begin = chambers_at_begin(plant, state, next_angle, step)
+    return begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step)
 
 
-def volumes_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
+def chambers_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
     """Both chambers at the begin of a step [s] whose volumes run towards ``next_angle`` [rad]. Equation (3)."""
     volume_1, volume_2 = chamber_volumes(plant, state.angle)
-    next_1, next_2 = chamber_volumes(plant, next_angle)
+    next_1, _ = chamber_volumes(plant, next_angle)
+    # The chambers of a vane are opposite: what one gains in volume the other loses.
     growth = (next_1 - volume_1) / max(step, SHORTEST)
     per_content_1, per_content_2 = pressures_per_mass(plant, state.angle)
     return ThermalBegin(
-        volume_1=volume_1,
-        volume_2=volume_2,
-        next_1=next_1,
-        next_2=next_2,
-        growth=growth,
+        chambers=WarmChambers(
+            volume_1=volume_1, volume_2=volume_2, growth_1=growth, growth_2=-growth, give_1=0.0, give_2=0.0
+        ),
         per_content_1=per_content_1,
         per_content_2=per_content_2,
     )
 
 
+def chambers_at_end(
+    plant: PlantParameters, begun: WarmChambers, _state: PlantState, _end: PlantState, next_angle: float, _step: float
+) -> WarmChambers:
+    """Both chambers at ``next_angle`` [rad], to which a step [s] leads that has ``begun`` with these. Equation (3)."""
+    volume_1, volume_2 = chamber_volumes(plant, next_angle)
+    return begun._replace(volume_1=volume_1, volume_2=volume_2)
+
+
 def begin_thermal_stage(
+    plant: PlantParameters,
     thermal: ThermalParameters,
     state: PlantState,
     masses: ThermalState,
     at_begin: ThermalBegin,
+    next_angle: float,
     flowing: SlopedFlows,
     step: float,
 ) -> ThermalGas:
-    """First stage of one step [s] with moving volumes, from all flows and their slopes."""
+    """First stage of one step [s] with chambers that run to ``next_angle`` [rad], from all flows and their slopes."""
     in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
-    volume_1, volume_2, growth = at_begin.volume_1, at_begin.volume_2, at_begin.growth
+    at = at_begin.chambers
     per_content_1, per_content_2 = at_begin.per_content_1, at_begin.per_content_2
     flow_1 = PortFlow(in_1.total, in_1.from_source)
     flow_2 = PortFlow(in_2.total, in_2.from_source)
-    flows = thermal_flows(thermal, state, masses, volume_1, volume_2, growth, flow_1, flow_2, leak.flow)
+    flows = thermal_flows(thermal, state, masses, at, flow_1, flow_2, leak.flow)
     weight = GAMMA * step
     root_1 = math.sqrt(state.mass_1 / masses.mass_1)
     root_2 = math.sqrt(state.mass_2 / masses.mass_2)
     near_1, near_2 = NEARLY_EQUAL * per_content_1 * state.mass_1, NEARLY_EQUAL * per_content_2 * state.mass_2
     weight_1, weight_2 = weight * per_content_1, weight * per_content_2
-    slopes = flow_slopes(thermal, root_1, root_2, weight_1, weight_2, in_1, in_2, leak, near_1, near_2)
-    matrix = thermal_matrix(thermal, state, masses, volume_1, volume_2, growth, weight, slopes)
+    slopes = flow_slopes(thermal, root_1, root_2, weight_1, weight_2, in_1, in_2, leak, near_1, near_2, at)
+    matrix = thermal_matrix(thermal, state, masses, at, weight, slopes)
     # A growing volume lowers the pressure as a loss of content at this rate would.
-    drift = flow_response(slopes, -state.mass_1 * growth / volume_1, state.mass_2 * growth / volume_2)
+    lost_1, lost_2 = -state.mass_1 * at.growth_1 / at.volume_1, -state.mass_2 * at.growth_2 / at.volume_2
+    drift = flow_response(slopes, lost_1, lost_2)
     first = solve_thermal_stage(matrix, combine_flows(flows, 1.0, drift, 1.0))
     change = combine_flows(first, step, first, 0.0)
     end, end_masses = with_thermal_gas(state, masses, change)
@@ -402,33 +446,21 @@ def begin_thermal_stage(
         drift=drift,
         end=end,
         end_masses=end_masses,
-        volume_1=at_begin.next_1,
-        volume_2=at_begin.next_2,
-        growth=growth,
+        ended=chambers_at_end(plant, at, state, end, next_angle, step),
     )
 
 
 def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, float]:
     """Absolute pressures [Pa] to which the first stage leads. Equation (3)."""
     return (
-        begun.end.mass_1 * plant.gas_product / begun.volume_1,
-        begun.end.mass_2 * plant.gas_product / begun.volume_2,
+        begun.end.mass_1 * plant.gas_product / begun.ended.volume_1,
+        begun.end.mass_2 * plant.gas_product / begun.ended.volume_2,
     )
 
 
 def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: StageFlows) -> ThermalFlows:
     """Second stage [kg/s] of a step."""
-    flows = thermal_flows(
-        thermal,
-        begun.end,
-        begun.end_masses,
-        begun.volume_1,
-        begun.volume_2,
-        begun.growth,
-        flowing.in_1,
-        flowing.in_2,
-        flowing.leak,
-    )
+    flows = thermal_flows(thermal, begun.end, begun.end_masses, begun.ended, flowing.in_1, flowing.in_2, flowing.leak)
     # Right-hand side of ROS2: the flows at the end of the first stage less twice that stage, less the drift.
     right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)
     return solve_thermal_stage(begun.matrix, right)
@@ -445,8 +477,8 @@ def thermal_change(
     to_2 = kept - to_1
     carries = enthalpy_flow_ratio(1.0, thermal.heat_capacity_ratio)
     return ThermalFlows(
-        content_1=change.content_1 + to_1 * carries,
-        content_2=change.content_2 + to_2 * carries,
+        content_1=change.content_1 + to_1 * carries * begun.matrix.slopes.kept_1,
+        content_2=change.content_2 + to_2 * carries * begun.matrix.slopes.kept_2,
         mass_1=change.mass_1 + to_1,
         mass_2=change.mass_2 + to_2,
         supplied=supplied,
@@ -484,11 +516,10 @@ def thermal_opening_error(plant: PlantParameters, begun: ThermalGas, shift: floa
 
 def over_allowed(plant: PlantParameters, begun: ThermalGas, rate_1: float, rate_2: float, step: float) -> float:
     """Errors of both contents [kg/s] over a step [s], as the larger of both pressures' over what is allowed [-]."""
-    end_1 = begun.end.mass_1 * plant.gas_product / begun.volume_1
-    end_2 = begun.end.mass_2 * plant.gas_product / begun.volume_2
+    end_1, end_2 = end_pressures(plant, begun)
     larger = max(
-        abs(rate_1) / (begun.volume_1 * pressure_that_matters(plant, end_1)),
-        abs(rate_2) / (begun.volume_2 * pressure_that_matters(plant, end_2)),
+        abs(rate_1) / (begun.ended.volume_1 * pressure_that_matters(plant, end_1)),
+        abs(rate_2) / (begun.ended.volume_2 * pressure_that_matters(plant, end_2)),
     )
     return larger * step * plant.gas_product / ALLOWED_OF_PRESSURE
 

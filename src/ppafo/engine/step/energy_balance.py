@@ -1,9 +1,10 @@
 """Gas with an energy balance in a step."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme import thermal_gas
+from ppafo.engine.scheme import thermal_gas, warm_actuators
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
 from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
@@ -12,6 +13,12 @@ PARAMETERS: Mapping[str, type] = {"thermal": ThermalParameters}
 STATES: Mapping[str, type] = {"masses": ThermalState}
 CHANGE: Mapping[str, type] = {"thermal_change": ThermalFlows}
 START = thermal_gas.masses_at_start
+IN_SHAPES: Mapping[Any, Any] = {
+    thermal_gas.chambers_at_begin: warm_actuators.chambers_at_begin,
+    thermal_gas.chambers_at_end: warm_actuators.chambers_at_end,
+    thermal_gas.after_motion: warm_actuators.after_motion,
+    thermal_gas.with_work: warm_actuators.with_work,
+}
 
 
 def stage(parts: Program) -> Mapping[str, type]:
@@ -65,11 +72,11 @@ def add(parts: Program, lane: Lane) -> None:
 
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
-    """The gas does its work up to where the vane came [rad], not to where the stages assumed it."""
+    """The gas does its work up to where the joint came [rad], not to where the stages assumed it."""
     return thermal_gas.after_motion(lane.plant, lane.thermal, state, assumed, reached)
 
 
 def work(parts: Program, lane: Lane) -> None:
-    """Count what the gas did on the vane; a locked one takes no work."""
-    if not parts.is_locked:
+    """Count what the gas did on shaft and walls; a locked joint whose chambers are rigid takes no work."""
+    if not parts.is_locked or parts.actuator.gives:
         lane.warmed = thermal_gas.with_work(lane.plant, lane.warmed, lane.state, lane.after)

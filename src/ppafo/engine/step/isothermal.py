@@ -1,9 +1,11 @@
 """Gas that keeps its temperature in a step: of a vane at rest or in motion, and of other actuators."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme import actuators, pneumatics
+from ppafo.engine.scheme import pneumatics
+from ppafo.engine.scheme.actuators import begin_shaped_gas
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
 from ppafo.engine.step.lane import Lane
@@ -13,6 +15,7 @@ PARAMETERS: Mapping[str, type] = {}
 STATES: Mapping[str, type] = {}
 CHANGE: Mapping[str, type] = {"change": GasChange}
 START = None
+IN_SHAPES: Mapping[Any, Any] = {pneumatics.begin_moving_gas: begin_shaped_gas}
 
 
 def stage(parts: Program) -> Mapping[str, type]:
@@ -21,11 +24,9 @@ def stage(parts: Program) -> Mapping[str, type]:
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """The first stage, of chambers that stand still, move, or are no vane's."""
+    """The first stage, of chambers that stand still or move."""
     if parts.keeps_volumes:
         lane.still_gas = pneumatics.begin_still_gas(lane.state, lane.held, lane.flowing, length)
-    elif parts.has_shape:
-        lane.moving_gas = actuators.begin_shaped_gas(lane.plant, lane.state, next_angle, lane.flowing, length)
     else:
         held = lane.held if parts.hands_chambers_on else pneumatics.held_chambers(lane.plant, lane.state.angle)
         lane.moving_gas = pneumatics.begin_moving_gas(lane.plant, lane.state, held, next_angle, lane.flowing, length)

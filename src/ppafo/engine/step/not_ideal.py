@@ -1,6 +1,7 @@
 """Gas that is not ideal in a step: its stages, and their errors, are those of an ideal one, on true masses."""
 
 from collections.abc import Mapping
+from typing import Any
 
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import pneumatics, real_gas
@@ -13,6 +14,7 @@ PARAMETERS: Mapping[str, type] = {}
 STATES: Mapping[str, type] = {"masses": TrueMasses}
 CHANGE: Mapping[str, type] = {"real_change": RealChange}
 START = real_gas.masses_at_start
+IN_SHAPES: Mapping[Any, Any] = {}
 
 ends, first_flows = isothermal.ends, isothermal.first_flows
 error, shift_error = isothermal.error, isothermal.shift_error

@@ -1,7 +1,6 @@
 """What is done at a sample of the controller: sense, decide, and keep what comes late."""
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.actuators import gait_seen_with_torque, seen_with_torque
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.engine.step.phases import present_pressures
 from ppafo.model.plant import joint_torque
@@ -63,9 +62,7 @@ def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
     if parts.ideal_sensors:
         torque = joint_torque(lane.plant, angle, pressure_1, pressure_2)
         return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
-    seen = measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant.torque_constant, now.sample)
-    # The sensors' torque follows from pressures by a constant, which another actuator does not have.
-    return seen_with_torque(lane.plant, seen) if parts.has_shape else seen
+    return measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant, now.sample)
 
 
 def present_signals(parts: Program, lane: Lane) -> tuple[float, float, float]:
@@ -117,16 +114,10 @@ def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
         pressure_2,
         lane.walk.heel_force,
         lane.walk.toe_force,
-        lane.plant.torque_constant,
+        lane.plant,
         now.step * lane.timing.step,
         now.sample,
     )
-    lane.seen = with_torque_of(parts, lane, lane.seen)
-
-
-def with_torque_of(parts: Program, lane: Lane, seen: GaitMeasurement) -> GaitMeasurement:
-    """What the sensors of a walk show, with the torque of an actuator that is no vane."""
-    return gait_seen_with_torque(lane.plant, seen) if parts.has_shape else seen
 
 
 def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
@@ -142,15 +133,14 @@ def remember_readings(parts: Program, lane: Lane, now: Now) -> None:
 def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
     """The readings of a walk, each sensor's as late as its fault says."""
     sensors = lane.gait_sensors
-    seen = late_measurement(
+    return late_measurement(
         lane.signal_history[0, place_of_late(parts, lane, now, sensors.heel_fault)],
         lane.signal_history[1, place_of_late(parts, lane, now, sensors.toe_fault)],
         lane.signal_history[2, place_of_late(parts, lane, now, sensors.angle_fault)],
         lane.signal_history[3, place_of_late(parts, lane, now, sensors.pressure_1_fault)],
         lane.signal_history[4, place_of_late(parts, lane, now, sensors.pressure_2_fault)],
-        lane.plant.torque_constant,
+        lane.plant,
     )
-    return with_torque_of(parts, lane, seen)
 
 
 def place_of_late(parts: Program, lane: Lane, now: Now, fault: Fault) -> int:

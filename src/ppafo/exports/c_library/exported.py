@@ -39,7 +39,8 @@ class ExportedProgram:
     def loops(self) -> dict[str, Program]:
         """Programs of its lane loops, by their names in C.
 
-        A locked vane without lines has two: its settings decide whether the error decides about the parts of a step.
+        A locked joint with rigid chambers and without lines has two: its settings decide whether the error decides
+        about the parts of a step.
         """
         if not self.chooses_parts:
             return {WHOLE: self.program}
@@ -48,7 +49,7 @@ class ExportedProgram:
     @property
     def chooses_parts(self) -> bool:
         """True where the settings decide whether the error decides about the parts of a step."""
-        return self.program.is_locked and self.program.feed is None and not self.program.has_shape
+        return self.program.is_locked and self.program.feed is None and not self.program.actuator.gives
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -155,7 +155,7 @@ def plant_library(scenario: Scenario) -> dict[str, bytes]:
 
 def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
     """Conditions in C that both chambers of a prescribed vane have a volume, now and at the end of the step."""
-    if "angle" not in names or alone.library.program.program.has_shape:
+    if "angle" not in names or alone.library.program.program.actuator.shape is not None:
         return []
     plant = "run->parameters.plant"
     # Where V = V_dead + B (angle - stop) is 0: beyond it a chamber would have no volume.

@@ -12,6 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
+from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.exports.c_library.boundary import Boundary
@@ -19,7 +20,7 @@ from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
-from ppafo.model.columns import smaller
+from ppafo.model.columns import larger, smaller
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.gait import ShankSeries
 from ppafo.model.gas import specific_gas_constant
@@ -43,9 +44,7 @@ from ppafo.simulation.numbers import (
     time_texts,
 )
 from ppafo.simulation.plan import (
-    is_slow_locked,
     relative_tolerance,
-    state_at_start,
     state_with_volumes,
     step_counts,
     thermal_gas,
@@ -193,7 +192,8 @@ class Writing:
             section: self.section(section, [quantity.name for quantity in members(section, kind)])
             for section in SEEN_BY_EFFECTS
         }
-        if self.program.has_shape:
+        has_shape = self.program.actuator.shape is not None
+        if has_shape:
             # The vane's own numbers have no meaning for another shape; the text that reads them is shared.
             fields["actuator"] |= {"torque_constant": "0.0", "displacement_per_radian": "0.0"}
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
@@ -213,9 +213,9 @@ class Writing:
                 continue
             settings = self.row(f"{effect.name.title().replace('_', '')}Settings", own)
             yield f"{effect.name} = {add(effect.prepare)}({settings}, device)"
-        made = f"vane_{name}" if self.program.has_shape else name
+        made = f"vane_{name}" if has_shape else name
         yield f"{made} = {add(plant_with)}(device, valve_restriction, leak_restriction, {torque})"
-        if self.program.has_shape:
+        if has_shape:
             yield from self._shape(made, name)
 
     def _shape(self, vane: str, name: str) -> Iterator[str]:
@@ -395,12 +395,15 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
     yield f"tolerance = {add(relative_tolerance)}(run_tolerance)"
     yield from writing.timing("sensors_delay", "tolerance")
     level = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
-    if scenario.supply_lines is not None or not program.is_locked or program.has_shape:
+    if scenario.supply_lines is not None or not program.is_locked or program.actuator.gives:
         yield "needs_parts = True"
     else:
         stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
         shortened = f"step / {add(smaller)}(1.0, tolerance)"
-        yield f"needs_parts = not {add(is_slow_locked)}(plant, {shortened}, {level}, {stiffness})"
+        within = f"{add(smaller)}({add(larger)}({level}, plant.angle_min), plant.angle_max)"
+        room = "plant.atmospheric_pressure"
+        yield f"held = {add(program.actuator.chambers)}(plant, {within}, {room}, {room})"
+        yield f"needs_parts = not {add(is_slow)}(plant, {shortened}, held.volume_1, held.volume_2, {stiffness})"
 
     # Controller, reference, prescribed angle and gas.
     if program.controller is not None:
@@ -427,12 +430,9 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
         assert program.angle is not None, "the angle is prescribed"
         yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
     pressures = "initial_pressure_1, initial_pressure_2"
-    if program.has_shape:
-        yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {pressures})"
-        volumes = "filled.volume_1, filled.volume_2"
-        yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {pressures})"
-    else:
-        yield f"state = {add(state_at_start)}(plant, {', '.join(moved)}, {pressures})"
+    yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {pressures})"
+    volumes = "filled.volume_1, filled.volume_2"
+    yield f"state = {add(state_with_volumes)}(plant, {', '.join(moved)}, {volumes}, {pressures})"
     yield from writing.start()
 
 

@@ -135,6 +135,6 @@ KIND = ActuatorKind(
     name="cylinder",
     summary="A double-acting cylinder between two pins that drives a lever.",
     settings=CylinderSettings,
-    model=ActuatorModel(Cylinder, prepare, chambers, pressures, torque),
+    model=ActuatorModel(Cylinder, prepare, chambers, pressures, torque, gives=False),
     problem=problem,
 )

@@ -40,7 +40,7 @@ class ActuatorModel:
     file for, which ``prepare`` is then given third; None for a kind without a file.
     ``chambers(plant, angle, pressure_1, pressure_2)`` returns ``Chambers``, ``pressures(plant, angle, mass_1, mass_2)``
     the two pressures at which p V = m R T, and ``torque(plant, angle, pressure_1, pressure_2)`` the torque [N m],
-    positive in plantarflexion.
+    positive in plantarflexion. ``gives`` is False where no pressure widens a chamber: all compliances are 0.
     """
 
     shape: type | None
@@ -49,6 +49,7 @@ class ActuatorModel:
     pressures: Callable[..., tuple[float, float]]
     torque: Callable[..., float]
     table: type | None = None
+    gives: bool = True
 
     @property
     def plant(self) -> type:

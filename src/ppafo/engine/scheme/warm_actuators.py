@@ -1,0 +1,85 @@
+"""Gas with an energy balance in chambers of any actuator: what a program calls in place of the vane's functions.
+
+A chamber's volume follows angle and pressure, and the energy balance is that of ``thermal_gas``.
+"""
+
+from ppafo.engine.scheme.pneumatics import SHORTEST
+from ppafo.engine.scheme.thermal_gas import ThermalBegin, WarmChambers
+from ppafo.model.actuators.kind import Chambers
+from ppafo.model.actuators.vane import chambers
+from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, chamber_pressures
+
+
+def widening(
+    now: Chambers, here: Chambers, ahead: Chambers, pressure_1: float, pressure_2: float, step: float
+) -> WarmChambers:
+    """Both chambers as they are ``now``, which widen from ``here`` to ``ahead`` in a step [s] at pressures [Pa]."""
+    duration = max(step, SHORTEST)
+    return WarmChambers(
+        volume_1=now.volume_1,
+        volume_2=now.volume_2,
+        growth_1=(ahead.volume_1 - here.volume_1) / duration,
+        growth_2=(ahead.volume_2 - here.volume_2) / duration,
+        give_1=pressure_1 * now.compliance_1 / now.volume_1,
+        give_2=pressure_2 * now.compliance_2 / now.volume_2,
+    )
+
+
+def chambers_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
+    """Both chambers at the begin of a step [s] whose angle runs to ``next_angle`` [rad]."""
+    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    # Volumes at both angles at one pressure: their difference is what the angle alone does.
+    here = chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = chambers(plant, next_angle, pressure_1, pressure_2)
+    return ThermalBegin(
+        chambers=widening(here, here, ahead, pressure_1, pressure_2, step),
+        per_content_1=plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1),
+        per_content_2=plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2),
+    )
+
+
+def chambers_at_end(
+    plant: PlantParameters, _begun: WarmChambers, state: PlantState, end: PlantState, next_angle: float, step: float
+) -> WarmChambers:
+    """Both chambers at ``next_angle`` [rad] with the contents to which the first stage of a step [s] leads."""
+    pressure_1, pressure_2 = chamber_pressures(plant, next_angle, end.mass_1, end.mass_2)
+    here = chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = chambers(plant, next_angle, pressure_1, pressure_2)
+    return widening(ahead, here, ahead, pressure_1, pressure_2, step)
+
+
+def after_motion(
+    plant: PlantParameters, thermal: ThermalParameters, state: PlantState, assumed_angle: float, angle: float
+) -> PlantState:
+    """State whose gas did its work up to the angle [rad] that the joint reached, where the stages assumed another."""
+    ratio = thermal.heat_capacity_ratio
+    pressure_1, pressure_2 = chamber_pressures(plant, assumed_angle, state.mass_1, state.mass_2)
+    assumed = chambers(plant, assumed_angle, pressure_1, pressure_2)
+    turned = chambers(plant, angle, pressure_1, pressure_2)
+    # The isentrope k P dV = -V dP, of which the wall's part goes with the pressure: the pressure there, then the work.
+    reached_1 = pressure_1 - ratio * pressure_1 * (turned.volume_1 - assumed.volume_1) / (
+        assumed.volume_1 + ratio * pressure_1 * assumed.compliance_1
+    )
+    reached_2 = pressure_2 - ratio * pressure_2 * (turned.volume_2 - assumed.volume_2) / (
+        assumed.volume_2 + ratio * pressure_2 * assumed.compliance_2
+    )
+    reached = chambers(plant, angle, reached_1, reached_2)
+    half = 0.5 * (ratio - 1.0)
+    mean_1, mean_2 = 0.5 * (reached.volume_1 + assumed.volume_1), 0.5 * (reached.volume_2 + assumed.volume_2)
+    work_1, work_2 = half * (reached.volume_1 - assumed.volume_1), half * (reached.volume_2 - assumed.volume_2)
+    return state._replace(
+        mass_1=state.mass_1 * (mean_1 - work_1) / (mean_1 + work_1),
+        mass_2=state.mass_2 * (mean_2 - work_2) / (mean_2 + work_2),
+    )
+
+
+def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, after: PlantState) -> ThermalState:
+    """True masses and totals with the work of the gas between two states, on shaft and walls."""
+    before_1, before_2 = chamber_pressures(plant, before.angle, before.mass_1, before.mass_2)
+    after_1, after_2 = chamber_pressures(plant, after.angle, after.mass_1, after.mass_2)
+    first = chambers(plant, before.angle, before_1, before_2)
+    last = chambers(plant, after.angle, after_1, after_2)
+    # The trapezoidal rule over the volumes: exact along a wall that gives in proportion to the pressure.
+    work_1 = 0.5 * (before_1 + after_1) * (last.volume_1 - first.volume_1)
+    work_2 = 0.5 * (before_2 + after_2) * (last.volume_2 - first.volume_2)
+    return masses._replace(gas_work=masses.gas_work + work_1 + work_2)

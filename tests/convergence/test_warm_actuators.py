@@ -1,0 +1,187 @@
+"""Gas with an energy balance in chambers that are no vane's: closed forms, an independent run, the reference solver."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.run import batch_of
+from ppafo.engine.scheme.actuators import volumes_of
+from ppafo.running import simulate
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
+from tests.actuators.soft import soft
+from tests.reference.joints import BladderJoint, Chamber, CylinderJoint, Joint
+from tests.reference.reference_solver import chamber_pressures_of, compare_with_reference, plant_states
+from tests.reference.simulator import independent_run
+
+EXAMPLES = Path(__file__).parents[1] / "actuators"
+RATIO = 1.4
+WARM = (
+    "gas_model.kind=thermal",
+    "gas_model.heat_transfer_coefficient=50 W/(m^2 K)",
+    "gas_model.wall_area_per_volume=300 1/m",
+)
+ADIABATIC = (*WARM[:1], "gas_model.heat_transfer_coefficient=0 W/(m^2 K)", *WARM[2:])
+Case = tuple[Scenario, Joint]
+
+
+def cylinder(_folder: Path) -> Case:
+    """The cylinder with a lever, from its lower stop to its upper one."""
+    scenario = load_scenario(EXAMPLES / "step-response-cylinder.toml", [*WARM, "run.duration=0.3 s"])
+    return scenario, CylinderJoint(scenario)
+
+
+def bladder(_folder: Path) -> Case:
+    """The measured bladder, which fills while it begins to move."""
+    given = [*WARM, "run.duration=0.3 s", "initial.pressure_2=atmosphere"]
+    scenario = load_scenario(EXAMPLES / "step-response-measured-bladder.toml", given)
+    return scenario, BladderJoint(scenario, EXAMPLES / "measured-bladder.csv")
+
+
+def soft_case(folder: Path, chambers: int) -> Case:
+    """A soft actuator that begins in the middle of its range."""
+    base, given = EXAMPLES / "step-response-measured-bladder.toml", soft(folder, chambers)
+    more = ["initial.pressure_2=40 psi_g", "motion.angle=60 deg", "run.duration=0.25 s"]
+    scenario = load_scenario(base, [*WARM, given, *more])
+    return scenario, BladderJoint(scenario, folder / "soft.csv")
+
+
+CASES: dict[str, Callable[[Path], Case]] = {
+    "cylinder": cylinder,
+    "bladder": bladder,
+    "soft, one chamber": lambda folder: soft_case(folder, 1),
+    "soft, two chambers": lambda folder: soft_case(folder, 2),
+}
+
+
+def gaps(scenario: Scenario, joint: Joint) -> tuple[float, float, float]:
+    """Largest gap of the angle over its range, of both pressures over theirs, and of the gas drawn over all of it."""
+    record, answer = simulate(scenario).recording, independent_run(scenario, joint=joint)
+    actuator, supply = scenario.device.actuator, scenario.device.supply
+    pressed = max(float(np.abs(record[name] - getattr(answer, name)).max()) for name in ("pressure_1", "pressure_2"))
+    turned = float(np.abs(record["angle"] - answer.angle).max())
+    drawn = float(np.abs(record["supplied_mass"] - answer.drawn).max())
+    return (
+        turned / (actuator.angle_max - actuator.angle_min),
+        pressed / (supply.pressure - supply.atmospheric_pressure),
+        drawn / float(answer.drawn.max()),
+    )
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_warm_gas_of_any_actuator_is_what_the_independent_run_says(case: str, tmp_path: Path) -> None:
+    scenario, joint = CASES[case](tmp_path)
+    turned, pressed, drawn = gaps(scenario, joint)
+    assert turned < 2.0e-4
+    assert pressed < 1.0e-3
+    assert drawn < 1.0e-3
+    record = simulate(scenario).recording
+    assert np.ptp(record["temperature_1"]) > 0.5, "the gas must change its temperature for this to say anything"
+
+
+class Stiff(BladderJoint):
+    """A bladder whose walls take no work."""
+
+    def chamber(self, which: int, angle: float, pressure: float) -> Chamber:
+        """The chamber as if no pressure widened it from here on."""
+        return super().chamber(which, angle, pressure)._replace(by_pressure=0.0)
+
+
+def test_the_independent_run_would_see_gas_that_does_no_work_on_a_wall_that_gives(tmp_path: Path) -> None:
+    scenario, _ = soft_case(tmp_path, 2)
+    _, pressed, drawn = gaps(scenario, Stiff(scenario, tmp_path / "soft.csv"))
+    assert max(pressed, drawn) > 1.0e-2
+
+
+@pytest.mark.parametrize("case", ["cylinder", "soft, two chambers"])
+def test_warm_gas_of_any_actuator_agrees_with_the_reference_solver(case: str, tmp_path: Path) -> None:
+    scenario, _ = CASES[case](tmp_path)
+    found = compare_with_reference(plan_run(scenario))
+    assert found.angle < 2.0e-4
+    assert found.worst_pressure < 1.0e-3
+
+
+def squeezed(folder: Path, step: float) -> float:
+    """Largest relative departure from the isentrope of closed soft chambers while the joint swings, in steps [s]."""
+    base = load_scenario(
+        EXAMPLES / "step-response-measured-bladder.toml",
+        [*ADIABATIC, soft(folder, 2), "initial.pressure_1=200 kPa_g", "initial.pressure_2=150 kPa_g"],
+    )
+    swing = ProfileChoice("sine", {"level": 1.1, "amplitude": 0.5, "frequency": 2.0, "phase": 0.0})
+    shut = dataclasses.replace(base.controller, kind="constant", settings={"command": 0.0}, period=step)
+    planned = plan_run(dataclasses.replace(base, motion=PrescribedMotion(swing), controller=shut))
+    counts = {"steps_per_sample": 1, "step_count": round(0.5 / step), "record_every": 1}
+    run = dataclasses.replace(planned, step=step, tolerance=1e9, **counts)
+    states = plant_states(run, run_batch(batch_of(run)))
+    pressures = chamber_pressures_of(run, states)
+    volumes = volumes_of(run.program.actuator, run.plant, states[:, 0], *pressures)
+    return max(
+        float(np.abs(pressure * volume**RATIO / (pressure[0] * volume[0] ** RATIO) - 1.0).max())
+        for pressure, volume in zip(pressures, volumes, strict=True)
+    )
+
+
+def test_a_closed_chamber_that_gives_follows_the_isentrope_with_order_two(tmp_path: Path) -> None:
+    coarse, fine = squeezed(tmp_path, 2.0e-3), squeezed(tmp_path, 1.0e-3)
+    assert fine < 2.0e-4
+    assert 3.5 < coarse / fine < 4.5
+
+
+def held(folder: Path, *more: str) -> Scenario:
+    """A soft actuator held in the middle of its range, whose chamber 1 is filled from the supply."""
+    given = [
+        *(soft(folder, 2), "motion.kind=locked", "motion.angle=60 deg", "initial.pressure_1=120 kPa_a"),
+        *("initial.pressure_2=atmosphere", "run.duration=0.2 s"),
+    ]
+    return load_scenario(EXAMPLES / "torque-task-measured-bladder.toml", [*given, *more])
+
+
+def test_what_enters_a_held_chamber_is_energy_of_its_gas_and_work_on_its_wall(tmp_path: Path) -> None:
+    result = simulate(held(tmp_path, *ADIABATIC, "controller.kind=constant", "controller.command=1"))
+    record, run = result.recording, plan_run(result.scenario)
+    pressure, other = record["pressure_1"], record["pressure_2"]
+    volume, _ = volumes_of(run.program.actuator, run.plant, record["angle"], pressure, other)
+    # The wall gives in proportion to the pressure from one measured pressure to the next: few terms are exact.
+    grid = np.linspace(pressure[0], pressure[-1], 20001)
+    volumes, _ = volumes_of(run.program.actuator, run.plant, np.full(grid.size, record["angle"][0]), grid, other[0])
+    wall = float(np.trapezoid(grid, volumes))
+    energy = (pressure[-1] * volume[-1] - pressure[0] * volume[0]) / (RATIO - 1.0)
+    entered = RATIO / (RATIO - 1.0) * run.plant.gas_product * (record["mass_1"][-1] - record["mass_1"][0])
+    assert wall > 0.04 * entered
+    assert energy + wall == pytest.approx(entered, rel=5.0e-5)
+    assert record["gas_work"][-1] == pytest.approx(wall, rel=2.0e-3)
+    assert abs(result.metrics["energy_imbalance"].value) < 1.0e-4 * entered
+
+
+LINES = ("supply_line.plantarflexion.droop=3e7 Pa s/kg", "supply_line.plantarflexion.volume=20 cm^3")
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_behind_regulators_warm_gas_is_kept_and_a_finer_tolerance_changes_little(case: str, tmp_path: Path) -> None:
+    scenario, _ = CASES[case](tmp_path)
+    kept = [text for text in scenario.origin.overrides if not text.startswith("initial.pressure_2")]
+    given = (*kept, *LINES, "supply.dorsiflexion_pressure=60 kPa_g", "initial.pressure_2=50 kPa_g")
+    file = str(EXAMPLES / f"{scenario.name}.toml")
+    usual = simulate(load_scenario(file, given))
+    finer = simulate(load_scenario(file, (*given, "run.tolerance=1e-5"))).recording
+    supply = scenario.device.supply
+    for name in ("pressure_1", "pressure_2", "line_pressure_1", "line_pressure_2"):
+        gap = float(np.abs(usual.recording[name] - finer[name]).max())
+        assert gap < 1.0e-3 * (supply.pressure - supply.atmospheric_pressure), name
+    assert np.ptp(usual.recording["line_pressure_1"]) > 5.0e3
+    assert abs(usual.metrics["gas_imbalance"].value) < 1.0e-12 * usual.metrics["gas_supplied"].value
+
+
+def test_warm_walls_make_the_gas_of_a_soft_actuator_isothermal(tmp_path: Path) -> None:
+    warmer = "gas_model.heat_transfer_coefficient=1e8 W/(m^2 K)"
+    given = ("controller.kind=constant", "controller.command=0.4")
+    isothermal = simulate(held(tmp_path, *given)).recording
+    warm = simulate(held(tmp_path, *given, *WARM[:1], warmer, *WARM[2:])).recording
+    cold = simulate(held(tmp_path, *given, *ADIABATIC)).recording
+    gap, far = (float(np.abs(other["pressure_1"] - isothermal["pressure_1"]).max()) for other in (warm, cold))
+    assert gap < 50.0 < 0.01 * far
