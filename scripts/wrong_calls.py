@@ -18,7 +18,7 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -318,8 +318,9 @@ def names(message: str, argument: str) -> bool:
 
 
 def begins(message: str, value: Any) -> bool:
-    """Tell whether a message begins with the path that was given, or with a file below that folder."""
-    return isinstance(value, str | Path) and re.match(rf"{re.escape(str(value))}[:/,]", message) is not None
+    """Tell whether a message begins with the path that was given, the first of several, or a file below that folder."""
+    first = value if isinstance(value, str | Path) else next(iter(value), None) if isinstance(value, Iterable) else None
+    return isinstance(first, str | Path) and re.match(rf"{re.escape(str(first))}[:/,]", message) is not None
 
 
 class _TooLongError(Exception):

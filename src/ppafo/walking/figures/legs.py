@@ -406,7 +406,7 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
     least = display_value(atmosphere + 10.0 * PASCALS_PER_PSI, "pressure", atmosphere)
     traces.set_ylim(top=max(least, traces.get_ylim()[1]))
     traces.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
-    traces.set_ylabel(axis_unit("pressure"), fontsize=8.5)
+    traces.set_ylabel(f"pressure\n({axis_unit('pressure')})", fontsize=8.5)
     traces.tick_params(labelsize=8)
     traces.locator_params(axis="y", nbins=3)
     traces.legend(

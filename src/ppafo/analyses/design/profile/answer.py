@@ -203,7 +203,7 @@ def torque_panel(sizing: Sizing) -> Panel:
     marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
     recording, choice = sizing.recording, sizing.choice
     if recording is not None and choice is not None:
-        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.1f')} psig"
+        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
         colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
     return Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))
@@ -222,6 +222,9 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
             errors.append(Mark("line", [sized.pressure], [sized.error], colour=colour, style=RING))
             gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=RING))
 
+    torque_kind = replace(_TORQUE, words="RMS error")
+    highest = float(torque_kind.values(_MAXIMUM_OF_LIMIT * limit))
+
     def set_gas(axes: "Axes") -> None:
         # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
         axes.margins(y=0.15)
@@ -231,11 +234,11 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     return [
         Panel(
             _PRESSURE,
-            replace(_TORQUE, words="RMS error"),
+            torque_kind,
             errors,
             "RMS error, limit dashed",
             legend="inside",
-            then=lambda axes: axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit),
+            then=lambda axes: axes.set_ylim(0.0, highest),
         ),
         Panel(_PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
     ]
