@@ -42,12 +42,16 @@ def interval_ends(work: Work, point: Floats, linear: Linear, times: float) -> tu
     wide = times * np.sqrt(np.diag(covariance))
     low, high = np.maximum(point - wide, work.low), np.minimum(point + wide, work.high)
     least = cost_of(work, work.one(point), point, linear)
-    for number in np.flatnonzero(work.prior == 0.0).tolist():
-        for ends, bound in ((low, work.low[number]), (high, work.high[number])):
-            offset = float(ends[number] - point[number])
-            if offset != 0.0:
-                straight = point + covariance[:, number] / covariance[number, number] * offset
-                ends[number] = _end(work, point, least, linear, number, float(bound), straight, times)
+    sides = [(number, ends) for number in np.flatnonzero(work.prior == 0.0).tolist() for ends in (low, high)]
+    held = [number for number, _ in sides]
+    offsets = np.array([ends[number] - point[number] for number, ends in sides])
+    straight = point[:, None] + covariance[:, held] / covariance[held, held] * offsets
+    first = _least_beside(work, straight, held, linear)
+    for place, (number, ends) in enumerate(sides):
+        bound = float((work.low if ends is low else work.high)[number])
+        if offsets[place] != 0.0:
+            tried = float(first[0][place]), first[1][:, place]
+            ends[number] = _end(work, point, least, linear, number, bound, tried, times)
     return low, high
 
 
@@ -58,18 +62,17 @@ def _end(
     linear: Linear,
     number: int,
     bound: float,
-    straight: Floats,
+    straight: tuple[float, Floats],
     times: float,
 ) -> float:
     """Return one end of the interval of a number, between the one of the straight line and its bound.
 
-    ``least`` are the squares at the estimate, ``straight`` is the point where the straight line has the end.
+    ``least`` are the squares at the estimate, ``straight`` those at the end of the straight line and where they are.
     """
     inner, near = point, 0.0
     outer: Floats | None = None
-    far, tried = math.inf, straight
+    far, (squares, reached) = math.inf, straight
     for _ in range(_TRIES):
-        squares, reached = _least_beside(work, tried, number, linear)
         # By how many standard errors priors and samples tell this point from the estimate.
         parted = math.sqrt(max(squares - least, 0.0))
         if parted * (_BENT if inner is point else 1.0) < times:
@@ -77,40 +80,44 @@ def _end(
             if float(inner[number]) == bound:
                 return bound
         elif inner is point:
-            return float(straight[number])
+            return float(reached[number])
         else:
             outer, far = reached, parted
         if outer is not None and abs(outer[number] - inner[number]) < _NARROW * abs(inner[number] - point[number]):
             break
         further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
         tried = point + further * (inner - point) if outer is None else 0.5 * (inner + outer)
+        (squares,), points = _least_beside(work, tried[:, None], [number], linear)
+        reached = points[:, 0]
     if outer is None:
         return bound
     share = (times - near) / (far - near)
     return float(inner[number] + share * (outer[number] - inner[number]))
 
 
-def _least_beside(work: Work, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
-    """Return the least squares with a number held where it is at a point, and where they are.
+def _least_beside(work: Work, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
+    """Return the least squares with one number of each scaled point held where it is, and the points where they are.
 
-    The others take Gauss-Newton steps on the Jacobian of the estimate. Infinite where no run succeeds.
+    The other numbers take Gauss-Newton steps on the Jacobian of the estimate. Infinite where no run succeeds.
     """
     covariance, slopes = linear.root @ linear.root.T, linear.rows[:, 1:]
-    least, best = math.inf, np.clip(point, work.low, work.high)
-    tried = best
+    low, high, each = work.low[:, None], work.high[:, None], np.arange(len(held))
+    tried = best = np.clip(points, low, high)
+    least = np.full(len(held), np.inf)
     for _ in range(_CORRECTIONS + 1):
-        errors = whitened_errors(work, work.at(tried[:, None]), linear)
-        squares = float(squares_of(work, errors, tried[:, None])[0])
-        if squares < least:
-            least, best = squares, tried
-        pull = slopes.T @ errors[:, 0] + np.square(work.prior) * (tried - work.mean)
+        errors = whitened_errors(work, work.at(tried), linear)
+        squares = squares_of(work, errors, tried)
+        is_less = squares < least
+        least, best = np.where(is_less, squares, least), np.where(is_less, tried, best)
+        pull = slopes.T @ errors + np.square(work.prior)[:, None] * (tried - work.mean[:, None])
         step = -covariance @ pull
         # Of all steps, the one that leaves the number where it is held.
-        step -= covariance[:, number] / covariance[number, number] * step[number]
-        # To first order the squares fall by that much.
-        if not -float(pull @ step) > _STILL:
+        step -= covariance[:, held] / covariance[held, held] * step[held, each]
+        # To first order the squares fall by that much; where no run succeeds they are no numbers.
+        moves = -np.sum(pull * step, axis=0) > _STILL
+        if not moves.any():
             break
-        tried = np.clip(tried + step, work.low, work.high)
+        tried = np.where(moves, np.clip(tried + step, low, high), tried)
     return least, best
 
 

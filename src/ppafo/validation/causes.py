@@ -209,11 +209,13 @@ def causes_of(
             first = max(named, key=lambda one: one.gain)
             # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
             is_fitted = len(first.candidate.sizes) > 1 and not first.candidate.name.startswith(_SAMPLES)
-            if not is_fitted or not search.needs_another(first, sized):
-                # With errors of sensors that any bench has, other small changes may explain as much as one alone.
-                others = search.beside_usual(sized, none, {one.candidate.name for one in named}) if is_fitted else []
-                return Causes(_cause_of(named, search.penalty, others), None, len(tried))
-            return Causes(None, _cause_of([first], search.penalty), len(tried))
+            # One Jacobian, where the first explains, tells what a second would add and what would do in its place.
+            slopes = search.slopes(first.candidate.at(first.size), first.left, sized) if is_fitted else []
+            if search.needs_another(first, slopes):
+                return Causes(None, _cause_of([first], search.penalty), len(tried))
+            # With errors of sensors that any bench has, other small changes may explain as much as one alone.
+            others = search.beside_usual(slopes, none, {one.candidate.name for one in named})
+            return Causes(_cause_of(named, search.penalty, others), None, len(tried))
     # What is wrong with samples is seen in them, whatever else is wrong.
     nearest = max(tried, key=lambda one: (one.candidate.name.startswith(_SAMPLES), one.gain), default=None)
     # Of a measured angle only samples were searched: that no change explains the recordings would say too much.
@@ -387,7 +389,7 @@ class _Search:
                 runs.append((one.candidate, min(max(size, low), high)))
         return runs
 
-    def _slopes(self, change: Change, left: _Left, beside: Sequence[Candidate]) -> list[tuple[Candidate, Floats]]:
+    def slopes(self, change: Change, left: _Left, beside: Sequence[Candidate]) -> list[tuple[Candidate, Floats]]:
         """Return how the errors that a change leaves grow with the size of each of others beside it."""
         steps = [_SMALL * min(map(abs, one.grid)) for one in beside]
         moved = self.evaluated([joined(change, one.at(step)) for one, step in zip(beside, steps, strict=True)])
@@ -399,19 +401,20 @@ class _Search:
 
     def together(self, usual: Sequence[Candidate], none: _Left) -> list[Candidate]:
         """Return the errors that any bench has, all at once, each as large as explains most; none without a sensor."""
-        slopes = self._slopes(Change(), none, usual)
+        slopes = self.slopes(Change(), none, usual)
         if not slopes:
             return []
         change = reduce(joined, [one.at(size) for one, size, _ in _bounded(slopes, none.errors)])
         words = "zeros, gains and delays of several sensors seem to be off"
         return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
-    def beside_usual(self, sized: Sequence[Candidate], none: _Left, named: Collection[str]) -> list[_Tried]:
+    def beside_usual(
+        self, slopes: Sequence[tuple[Candidate, Floats]], none: _Left, named: Collection[str]
+    ) -> list[_Tried]:
         """Return the changes larger than on any bench that explain recordings beside what any bench has, at no cost.
 
-        Their sizes are those of a straight line from none; a run says whether they explain. Those ``named`` are known.
+        Their sizes are those of straight lines; a run says whether they explain. Those ``named`` are known.
         """
-        slopes = self._slopes(Change(), none, sized)
         usual, found = [pair for pair in slopes if pair[0].usual], list[tuple[Candidate, float, Change]]()
         for one, column in slopes:
             if one.name in named:
@@ -433,25 +436,25 @@ class _Search:
         ]
         return [one for one in tried if one.explains and one.is_inside]
 
-    def needs_another(self, first: _Tried, candidates: Sequence[Candidate]) -> bool:
+    def needs_another(self, first: _Tried, slopes: Sequence[tuple[Candidate, Floats]]) -> bool:
         """Return whether a second change, larger than on any bench, explains what a first leaves.
 
         To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its size costs as much
         and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise is
         correlation, for which a square counts less. What the engine may be off needs no cause.
         """
-        change, errors = first.candidate.at(first.size), first.left.errors
-        own = np.zeros_like(errors)
-        if len(first.candidate.sizes) > 1:
-            step = _SMALL * min(map(abs, first.candidate.grid))
-            near = self.evaluated([first.candidate.at(first.size + step)])[0]
-            own = own if near is None else (near.errors - errors) / step
-            own /= max(float(np.linalg.norm(own)), 1.0e-300)
+        errors = first.left.errors
+        if not slopes:
+            return False
+        step = _SMALL * min(map(abs, first.candidate.grid))
+        near = self.evaluated([first.candidate.at(first.size + step)])[0]
+        own = np.zeros_like(errors) if near is None else near.errors - errors
+        own /= max(float(np.linalg.norm(own)), 1.0e-300)
         # Beside a second change the first would have another size: what it can take over is no merit of the second.
         rest = errors - (own @ errors) * own
-        threshold = 2.0 * (self.penalty + math.log(len(candidates)))
+        threshold = 2.0 * (self.penalty + math.log(len(slopes)))
         engine = sum(float(np.square(one.engine) @ one.good.sum(axis=1)) for one in self.records)
-        for one, column in self._slopes(change, first.left, candidates):
+        for one, column in slopes:
             across = column - (own @ column) * own
             size = float(across @ across)
             # What does the same as the first leaves rounding, along which anything may seem to be explained.

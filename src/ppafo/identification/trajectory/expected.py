@@ -6,15 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.errors import IdentificationError
+from ppafo.errors import IdentificationError, refused_as
 from ppafo.identification.noise import Noise, whiten
+from ppafo.identification.residuals import Work
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.problem import FITTED_CHANNELS, reach_of
 from ppafo.identification.trajectory.runs import Measured, columns_in, numbers_in, prepare_samples, signals_at
+from ppafo.progress import report_nothing
+from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
-
-_STEPS, _UNITS_OF_NOISE = (1.0e-7, 1.0e-3), 3.0
-"""Shortest and longest difference over the scale of a number, and the change of the samples that one makes."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,23 +69,20 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     channels = [Measured(name, np.zeros(times.size)) for name in noise]
     given = numbers_in("", acting, point)
     prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(acting), given)
-    low, high = (np.array([getattr(item.free, end) for item in acting]) for end in ("low", "high"))
-    step = _STEPS[1] * scale
-    # As in the fit, the second differences are as long as changes the samples by three units of noise in all.
-    for _ in range(2):
-        above, below = np.minimum(point + step, high), np.maximum(point - step, low)
-        moved = point[:, None] + np.concatenate([np.diag(above - point), np.diag(below - point)], axis=1)
-        signals = signals_at(prepared, columns_in("", acting, moved), moved.shape[1])
-        slopes = {
-            name: np.nan_to_num((values[:, : len(place)] - values[:, len(place) :]) / (above - below))
-            for name, values in signals.items()
-        }
-        size = np.sqrt(sum(np.square(slopes[name] / deviation).sum(axis=0) for name, deviation in noise.items()))
-        step = np.clip(_UNITS_OF_NOISE / np.maximum(size * scale, 1.0e-300), *_STEPS) * scale
+
+    def samples(points: Floats) -> Floats:
+        signals = signals_at(prepared, columns_in("", acting, points), points.shape[1])
+        return np.concatenate([signals[name] for name in noise])
+
+    work = Work(samples, tuple(item.free for item in acting), (), report_nothing, 0, is_motion=True)
+    weight = 1.0 / np.repeat(list(noise.values()), times.size)
+    with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
+        # As in the fit, the second differences are as long as changes the samples by three units of noise in all.
+        *_, slopes = (work.jacobian(point / scale, weight) for _ in range(2))
     rows = []
-    for name, deviation in noise.items():
+    for own, (name, deviation) in zip(np.split(slopes / scale, len(noise)), noise.items(), strict=True):
         known = fit.fit.sensors.get(name)
-        rows.append(whiten(slopes[name], replace(known, deviation=deviation) if known else Noise(deviation)))
+        rows.append(whiten(own, replace(known, deviation=deviation) if known else Noise(deviation)))
     whole = fit.fit.covariance
     sizes = np.sqrt(np.diag(whole))
     jacobian = np.concatenate(rows) * sizes[place]
