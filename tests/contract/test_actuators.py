@@ -115,6 +115,14 @@ def test_only_a_kind_that_says_so_has_chambers_that_no_pressure_widens(kind: str
 
 
 @pytest.mark.parametrize("kind", SETS)
+def test_only_a_kind_that_says_so_has_a_torque_constant(kind: str) -> None:
+    model, plant = actuator_of(kind)
+    for angle, first, second in points_of(plant)[::397]:
+        by_constant = plant.torque_constant * (first - second)
+        assert not model.has_torque_constant or model.torque(plant, angle, first, second) == by_constant
+
+
+@pytest.mark.parametrize("kind", SETS)
 def test_compliance_is_the_growth_of_the_volume_with_the_pressure(kind: str) -> None:
     model, plant = actuator_of(kind)
     step = 1.0

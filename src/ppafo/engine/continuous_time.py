@@ -11,7 +11,6 @@ from ppafo.engine.run import Run
 from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.model.plant import (
     PlantParameters,
-    chamber_pressures,
     chamber_volumes,
     driving_torque,
     holds_still,
@@ -69,12 +68,6 @@ class Roots(NamedTuple):
 
     first: float
     second: float
-
-
-def torque_on_vane(plant: PlantParameters, angle: float, mass_1: float, mass_2: float) -> float:
-    """Driving torque [N m] from the masses in the chambers."""
-    pressure_1, pressure_2 = chamber_pressures(plant, angle, mass_1, mass_2)
-    return driving_torque(plant, angle, pressure_1, pressure_2)
 
 
 def mode_at_rest(plant: PlantParameters, angle: float, torque: float) -> float:

@@ -145,7 +145,6 @@ class World:
         else:
             own = () if duration is None else (f"run.duration={float(duration)!r} s",)
             chosen = load_scenario(file, over(words, own, ScenarioError))
-            chosen.device.check_vane("an environment")
             if task == "torque" and chosen.controlled != TORQUE:
                 raise ScenarioError(
                     f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "

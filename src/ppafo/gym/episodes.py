@@ -43,7 +43,7 @@ from ppafo.gym.tasks import (
     valve_or_vent,
     within,
 )
-from ppafo.model.plant import actuator_torque, chamber_pressures
+from ppafo.model.plant import chamber_pressures, joint_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
@@ -95,7 +95,7 @@ def observe(
     torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
     wanted = Requested(torque_wanted, rate)
     pressure_1, pressure_2 = chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
-    torque = actuator_torque(pressure_1, pressure_2, lane.plant.torque_constant)
+    torque = joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     gas = lane.state.supplied_mass - lane.memory.supplied_mass
     lane.memory = task.kept(lane.memory, lane.state.supplied_mass, lane.seen, time)
     lane.view = task.observed(lane.seen, lane.goal, lane.memory, wanted, lane.result.command, time)

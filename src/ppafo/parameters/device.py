@@ -8,6 +8,7 @@ from typing import Annotated, Any, ClassVar
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.declaration import Number, held
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
@@ -173,7 +174,10 @@ class Device:
     joint: Joint = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
-    def check_vane(self, what: str) -> None:
-        """Raise ParameterError where the actuator is no vane, for ``what`` is made for a vane alone."""
-        if self.actuator.kind != VANE:
-            raise ParameterError(f"{what} is made for a vane, and '{self.name}' has an actuator '{self.actuator.kind}'")
+    def check_torque_constant(self, what: str) -> None:
+        """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""
+        if not ACTUATORS[self.actuator.kind].model.has_torque_constant:
+            raise ParameterError(
+                f"{what} needs a torque that is a constant times the difference of both pressures, as a vane has it; "
+                f"'{self.name}' has an actuator '{self.actuator.kind}', whose torque depends on the angle, too"
+            )

@@ -184,7 +184,7 @@ def integer_form(scenario: Scenario) -> Scenario:
             f"{scenario.name}: the controller '{kind}' has no fixed-point form; controllers that have one: "
             f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
-    scenario.device.check_vane("a fixed-point controller")
+    scenario.device.check_torque_constant("a fixed-point controller")
     settings = {**scenario.controller.settings, **{quantity.name: quantity.default or 0.0 for quantity in SETTINGS}}
     return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))
 

@@ -150,7 +150,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     # Refuse what only a vane has.
     try:
         if CONTROLLERS[scenario.controller.kind].plan is not None:
-            scenario.device.check_vane("a fixed-point controller")
+            scenario.device.check_torque_constant("a fixed-point controller")
     except ParameterError as error:
         raise _of_device(reading, error) from error
     return scenario

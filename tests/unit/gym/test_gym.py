@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 import ppafo
 from ppafo.engine.loading import BACKEND_VARIABLE
 from ppafo.errors import ScenarioError, SimulationError
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.sensors import Measurement, measure
 from ppafo.parameters.plant import plant_parameters
 
@@ -319,3 +321,18 @@ def test_seeds_and_masks_of_another_length_are_refused() -> None:
         many.reset(seed=[1, 2, 3])
     with pytest.raises(ScenarioError, match="reset_mask must be 2"):
         many.reset(options={"reset_mask": [True, False]})
+
+
+def test_an_environment_of_another_actuator_shows_the_torque_of_its_kind() -> None:
+    file = Path(__file__).parents[2] / "actuators" / "torque-task-cylinder.toml"
+    env = one(TORQUE, scenario=str(file), randomise=False)
+    observation, _ = env.reset(seed=1)
+    for _ in range(30):
+        observation, *_ = env.step([0.5])
+    numbers, device = env.numbers(), env.episode().device
+    kind, plant = ACTUATORS[device.actuator.kind].model, plant_parameters(device)
+    angle = numbers["state.angle"]
+    pressures = kind.pressures(plant, angle, numbers["state.mass_1"], numbers["state.mass_2"])
+    torque = kind.torque(plant, angle, *pressures)
+    assert abs(torque) > 0.5
+    assert observation[3] == pytest.approx(torque, rel=1e-5)

@@ -11,8 +11,8 @@ import numpy as np
 
 from ppafo.engine.lanes import Floats, StepInputs, replay
 from ppafo.engine.run import batch_of, state_row_numbers
+from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.errors import ScenarioError, nearest_name, one_line
-from ppafo.model.plant import chamber_pressures
 from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Column, Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
@@ -225,9 +225,9 @@ def _torque(model: LinearModel, command: float) -> Floats:
     record = replay(batch_of(run), StepInputs(np.full(run.step_count, command), {})).record[:, :, 0]
     rows = state_row_numbers(run)
     angle, *masses = (record[:, rows[f"state.{name}"]] for name in ("angle", "mass_1", "mass_2"))
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, *masses)
-    every = max(1, run.steps_per_sample)
-    return np.asarray(run.plant.torque_constant * np.subtract(pressure_1, pressure_2))[::every]
+    actuator, every = run.program.actuator, max(1, run.steps_per_sample)
+    pressures = pressures_of(actuator, run.plant, angle, *masses)
+    return np.asarray(torque_of(actuator, run.plant, angle, *pressures))[::every]
 
 
 _POINTS = 400

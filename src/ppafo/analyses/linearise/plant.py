@@ -8,12 +8,11 @@ from ppafo.engine.led_leg import LedLeg, shank_at
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.engine.run import Run
-from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
-from ppafo.model.plant import ThermalParameters, actuator_torque
+from ppafo.model.plant import ThermalParameters
 from ppafo.model.ports import at_valve
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
-from ppafo.translation.plant_rates import gas_rates, thermal_gas_rates, vane_acceleration
+from ppafo.translation.plant_rates import SINES, Turning, acceleration_of, gas_rates, thermal_gas_rates
 from ppafo.translation.symbolic import Compare, both_sides, symbolic
 
 VALVE = "valve_"
@@ -88,38 +87,34 @@ def plant_of(run: Run, way: float | None, compare: Compare = both_sides, time: f
     acting = dict(zip(program.effects, run.effects, strict=True))
     turn: tuple[Any, Any] = (symbols["angle"], symbols["angular_velocity"])
     pressures: tuple[Any, Any] = (symbols["pressure_1"], symbols["pressure_2"])
+    turning = Turning(program.actuator, plant, *turn, pressures, compare, acting)
     if isinstance(run.thermal, ThermalParameters):
         temperatures = symbols["temperature_1"], symbols["temperature_2"]
-        rates = thermal_gas_rates(plant, run.thermal, openings, *turn, pressures, temperatures, compare, acting)
+        rates = thermal_gas_rates(turning, run.thermal, openings, temperatures)
     else:
-        rates = gas_rates(plant, openings, *turn, pressures, compare=compare, acting=acting)
+        rates = gas_rates(turning, openings)
     gas = {name: getattr(rates, name) for name in ("pressure_1", "pressure_2", *warm)}
     spool = dict(zip(valve_names, moves, strict=True))
-    turning: dict[str, Any] = {}
+    moving: dict[str, Any] = {}
     # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
     if way:
         added = 0.0 if run.leg is None else _torque_of_leg(run.program, run.leg, time, symbols["angle"])
-        acceleration = vane_acceleration(plant, *turn, pressures, way, compare, acting, added)
-        turning = {"angle": symbols["angular_velocity"], "angular_velocity": acceleration}
-    outputs = {"torque": actuator_torque(*pressures, plant.torque_constant)}
-    outputs |= {name: symbols[name] for name in (*turning, *gas)}
+        acceleration = acceleration_of(turning, way, added)
+        moving = {"angle": symbols["angular_velocity"], "angular_velocity": acceleration}
+    outputs = {"torque": turning.torque()}
+    outputs |= {name: symbols[name] for name in (*moving, *gas)}
     outputs |= {"supplied_flow": rates.supplied, "vented_flow": rates.vented}
     # What the valve takes from its command at once is no state: nothing asks for what it was before.
     used = casadi.vertcat(*gas.values(), *moves, *outputs.values())
     kept = {name: rate for name, rate in spool.items() if casadi.depends_on(used, symbols[name])}
     inputs = (*driven[:3], *(motion if way is None else driven[3:] if way else ()))
-    return Plant(symbols, turning | gas | kept, inputs, outputs | {name: symbols[name] for name in kept})
+    return Plant(symbols, moving | gas | kept, inputs, outputs | {name: symbols[name] for name in kept})
 
 
 def _torque_of_leg(program: Program, leg: LedLeg, time: float, angle: Any) -> Any:
     """Torque of a leg [N m] at an angle that is a symbol, with the shank as it is at a time [s]."""
-    import casadi
-
-    def turned(_own: Any, turns: Any) -> tuple[Any, Any]:
-        return casadi.sin(TURN * turns), casadi.cos(TURN * turns)
-
     assert program.shank is not None, "a leg has a shank"
-    torque = symbolic(torque_on_foot, FootLoad, ShankNow, float, around={sine_and_cosine_of_turns: turned})
+    torque = symbolic(torque_on_foot, FootLoad, ShankNow, float, around=SINES)
     return torque(leg.load, shank_at(program.shank, leg.shank, time), angle)
 
 

@@ -9,15 +9,16 @@ import numpy as np
 from ppafo.analyses.linearise.plant import VALVE, plant_of, valve_states, without_slew_limit
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import CONSTANT
-from ppafo.engine.continuous_time import mode_at_rest, torque_on_vane
+from ppafo.engine.continuous_time import mode_at_rest
 from ppafo.engine.lanes import Floats, run_batch
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.linking import python_place
 from ppafo.engine.rows import numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
+from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.controlled import TORQUE
-from ppafo.model.plant import ThermalParameters, chamber_mass, chamber_pressures, chamber_volumes
+from ppafo.model.plant import ThermalParameters, gravity_torque, net_driving_torque
 from ppafo.model.ports import friction_at_rest
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
@@ -67,7 +68,9 @@ def _after(scenario: Scenario, run: Run, steps: int) -> tuple[dict[str, float], 
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     if run.program.angle is not None:
         angle, rate, _ = run.program.angle.value(run.path, steps * run.step)
-    pressure_1, pressure_2 = chamber_pressures(run.plant, angle, rows["state.mass_1"], rows["state.mass_2"])
+    pressure_1, pressure_2 = pressures_of(
+        run.program.actuator, run.plant, angle, rows["state.mass_1"], rows["state.mass_2"]
+    )
     values = {"angle": angle, "angular_velocity": rate, "command": rows["result.command"]}
     values |= {"pressure_1": float(pressure_1), "pressure_2": float(pressure_2)}
     driven = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
@@ -86,14 +89,14 @@ def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
     rate, angle = values["angular_velocity"], values["angle"]
     if rate != 0.0:
         return 1.0 if rate > 0.0 else -1.0
-    volumes, product = chamber_volumes(run.plant, angle), run.plant.gas_product
-    masses = [chamber_mass(values[f"pressure_{side}"], volumes[side - 1], product) for side in (1, 2)]
     limit, plant = python_place(friction_at_rest, run.program.effects, run.effects), run.plant
+    pressures = values["pressure_1"], values["pressure_2"]
     if limit is not None:
-        pressures = values["pressure_1"], values["pressure_2"]
         plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
     added = 0.0 if run.leg is None else torque_of_leg(run.program, run.leg, time, angle)
-    return mode_at_rest(plant, angle, torque_on_vane(plant, angle, *masses) + added)
+    weight = gravity_torque(angle, plant.gravity_torque)
+    torque = net_driving_torque(run.program.actuator.torque(plant, angle, *pressures), weight, plant.external_torque)
+    return mode_at_rest(plant, angle, torque + added)
 
 
 def equilibrium(scenario: Scenario) -> Point:
@@ -125,7 +128,8 @@ def equilibrium(scenario: Scenario) -> Point:
         full = dict.fromkeys(("command", *opening_names(values)), 1.0 if wanted > 0.0 else -1.0)
         most = _steady(run, held, {**values, **full}, None)
         if most is not None:
-            torque = run.plant.torque_constant * (most["pressure_1"] - most["pressure_2"])
+            at = run.plant, most["angle"], most["pressure_1"], most["pressure_2"]
+            torque = run.program.actuator.torque(*at)
             line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
         other = " or hold the ankle" if isinstance(scenario.motion, FreeMotion) else ""
         raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")

@@ -32,7 +32,6 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     run = plan_run(scenario)
     if scenario.supply_lines is not None:
         raise ScenarioError(f"{scenario.name}: linear models are for constant supplies; omit [supply_line]")
-    scenario.device.check_vane("a linear model")
     if not opens_in_proportion(run):
         raise ScenarioError(
             f"{scenario.name}: valve '{scenario.device.valve_name}' is on or off, or moves at one speed: its flow "

@@ -41,6 +41,7 @@ class ActuatorModel:
     ``chambers(plant, angle, pressure_1, pressure_2)`` returns ``Chambers``, ``pressures(plant, angle, mass_1, mass_2)``
     the two pressures at which p V = m R T, and ``torque(plant, angle, pressure_1, pressure_2)`` the torque [N m],
     positive in plantarflexion. ``gives`` is False where no pressure widens a chamber: all compliances are 0.
+    ``has_torque_constant`` is True where the torque is ``plant.torque_constant`` times the difference of pressures.
     """
 
     shape: type | None
@@ -50,6 +51,7 @@ class ActuatorModel:
     torque: Callable[..., float]
     table: type | None = None
     gives: bool = True
+    has_torque_constant: bool = False
 
     @property
     def plant(self) -> type:

@@ -21,7 +21,7 @@ def prepare(_settings: Any, _stops: Range) -> None:
     """Nothing: the numbers of a vane stand in the plant itself."""
 
 
-MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, joint_torque, gives=False)
+MODEL = ActuatorModel(None, prepare, chambers, chamber_pressures, joint_torque, gives=False, has_torque_constant=True)
 SMALLEST_VOLUME = 1e-18
 """A cube of a micrometre [m^3]: less is a slip, and what is divided by it leaves the range of floats."""
 

@@ -16,6 +16,7 @@ from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
+from ppafo.engine.scheme.thermal_gas import WarmChambers
 from ppafo.errors import ArgumentError, ScenarioError
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState
 from ppafo.model.valves.proportional import openings_of, spool_acceleration
@@ -78,7 +79,9 @@ def of_the_textbook(run: Run, way: float | None, at: Mapping[str, float]) -> dic
         masses = [content / warm for content, warm in zip(contents, warmth, strict=True)]
         state = PlantState(at["angle"], at["angular_velocity"], *contents, 0.0, 0.0, 0.0)
         held = ThermalState(*masses, 0.0, 0.0, 0.0, 0.0)
-        thermal = thermal_gas_flows(plant, run.thermal, openings, state, held, *pressures)
+        thermal = thermal_gas_flows(
+            plant, run.thermal, openings, state, held, WarmChambers(*volumes, growth, -growth, 0.0, 0.0), *pressures
+        )
         gained, entered = (thermal.content_1, thermal.content_2), (thermal.mass_1, thermal.mass_2)
         supplied, vented = thermal.supplied, thermal.supplied - sum(entered)
         for side in (0, 1):

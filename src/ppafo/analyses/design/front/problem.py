@@ -343,7 +343,7 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
         reason = lacking(scenario, METRICS[error]) if error in METRICS else ""
         if reason:
             raise StudyError(f"{file}: task '{table.name}': scenario '{scenario.name}' has no '{error}': {reason}")
-        scenario.device.check_vane("a design")
+        scenario.device.check_torque_constant("a design")
         own = scenario.device.valve.kind
         if own != kind:
             raise StudyError(

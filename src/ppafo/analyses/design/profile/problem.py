@@ -320,7 +320,7 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     """Return the scenario with the profile as its reference, for a whole number of samples over all repetitions."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
-    plain.device.check_vane("the size of a device")
+    plain.device.check_torque_constant("the size of a device")
     if plain.controller.kind == OPEN_LOOP:
         raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
     # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
