@@ -134,11 +134,15 @@ def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
 
 def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
-    """Return which samples are off the median of the five around by more than 6 times the noise, a standard deviation.
+    """Return which samples of what a model leaves stand out, though one beside them may: ``noise`` as above.
 
-    One or two of five in a row do not move it. Of what a model leaves this is enough; a signal itself also turns.
+    They are off the median of five by more than 6 times the noise, and more than 3 times what three of the four others
+    range over. An event that a model has at another time leaves a longer course, which is none of them.
     """
-    return np.asarray(off_neighbours(values) > 6.0 * noise)
+    others = np.sort(_five_around(values)[:, [0, 1, 3, 4]], axis=1)
+    spread = np.minimum(others[:, 2] - others[:, 0], others[:, 3] - others[:, 1])
+    away = off_neighbours(values)
+    return np.asarray((away > 6.0 * noise) & (away > 3.0 * spread))
 
 
 def off_neighbours(values: Floats) -> Floats:
