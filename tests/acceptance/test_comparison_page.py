@@ -26,6 +26,8 @@ def test_a_row_is_what_both_runs_give(override: str, error: str, gas: str) -> No
     assert [f"{value:.1f}" for value in less] == [error, gas]
 
 
+@pytest.mark.long
+@pytest.mark.thorough
 def test_walks_at_equal_work_are_what_the_script_of_the_page_prints(capsys: pytest.CaptureFixture[str]) -> None:
     (script,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
     (shown,) = re.findall(r"^```text\n(at 50 psi_g.*?)^```", PAGE, re.DOTALL | re.MULTILINE)

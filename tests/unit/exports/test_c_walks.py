@@ -71,6 +71,9 @@ other actuators."""
 BY_PYTHON = ("proportional-regulators", EVERYTHING)
 """The walk whose lanes Python runs, so that no translator stands on both sides; it takes minutes."""
 
+WHOLE = [("proportional-learning", ()), ("solenoid-recycling", ()), *VARIED[-3:]]
+"""Walks whose whole example is compared with Python at every change; those of others are thorough tests."""
+
 
 def choose_compiler(name: str, overrides: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """Let Python run the lanes of ``BY_PYTHON``."""
@@ -232,7 +235,7 @@ def shortened(walked: Scenario, folder: Path, seconds: float) -> str:
 
 @pytest.mark.parametrize(
     ("name", "overrides"),
-    [pytest.param(*one, marks=pytest.mark.thorough) if one == BY_PYTHON else one for one in VARIED],
+    [one if one in WHOLE else pytest.param(*one, marks=pytest.mark.thorough) for one in VARIED],
 )
 def test_every_sample_of_a_walk_has_the_bits_of_python(
     name: str, overrides: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
