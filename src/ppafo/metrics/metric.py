@@ -13,7 +13,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
 from ppafo.model.controlled import CONTROLLED, TORQUE, Controlled
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
 from ppafo.units import from_si

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from ppafo.kinds import Kinds, declared_kinds
-from ppafo.model.declaration import Quantity
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction, Quantity
 
 if TYPE_CHECKING:
     from ppafo.control.kind import ControllerKind
