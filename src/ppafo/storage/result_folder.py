@@ -291,8 +291,9 @@ def read_recording(
 ) -> Recording:
     """Return the recording in a ``.nc`` file or a table of text such as ``.csv``, or in a result folder, of a walk too.
 
-    Gauge pressure in a table counts from ``atmosphere`` [Pa absolute]. ``columns`` is a column map, ``logger.toml:bench``,
-    for a table with other columns, signs or separators, and for a ``.mat`` file. DataError for a file that is not usable.
+    Gauge pressure in a table counts from ``atmosphere`` [Pa absolute]. ``columns`` is a column map, or the name of one,
+    ``logger.toml:bench``, for a table with other columns, signs or separators and for a ``.mat`` file. DataError for a
+    file that is not usable.
 
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("step")
