@@ -14,9 +14,10 @@ if TYPE_CHECKING:
     from ppafo.analyses.validate.solve import Validation
     from ppafo.report.finding import Finding
     from ppafo.signals import Recording
-    from ppafo.storage.result_folder import ColumnsLike
+    from ppafo.storage.foreign import ColumnMap
 
 SetLike = Annotated[str | Path, Word("PARAMETERS")]
+ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 Recorded = Annotated["Recording | str | Path", Word("RECORDING")]
 Motion = Annotated[str, Word("free|measured|locked|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
