@@ -18,7 +18,7 @@ import sys
 import tempfile
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -133,192 +133,138 @@ class Function(NamedTuple):
     """The argument that takes the place of all others."""
 
 
-def _function(given: Mapping[str, Any], optional: str = "", alone: str = "", **kinds: str) -> Function:
-    return Function(given, kinds, frozenset(optional.split()), alone)
+KINDS: Mapping[str, str] = {
+    "object": "parameter_set parent recording result scenario study tuning",
+    "overrides": "overrides",
+    "name": (
+        "baseline bottle catalogue columns configuration folder gait method metric "
+        "motion part path problem statistic such_that task_sequence valve vary width"
+    ),
+    "names": "also configurations initial metrics recordings scenarios thresholds",
+    "positive": "atmosphere gas_per_stride mass minutes peak_flow pressure stature stride_time torque volume",
+    "from zero": "longest longest_delay rest walk",
+    "seed": "seed",
+    "count": "draws first_draws grid samples threads wearers",
+    "function": "progress",
+    "fraction": "confidence maximum_failed",
+    "content": "content tasks",
+    "flag": "agreed check highest independent",
+    "number": "at toes",
+    "path": "out",
+    "address": "scheduler",
+}
+"""Arguments by the kind that they have where a function does not say another one."""
+
+ARGUMENTS: Mapping[str, str] = {
+    "apply_overrides": "parameter_set overrides valve?",
+    "audit": "parameter_set parent?",
+    "bottle": "recordings gas_per_stride? stride_time? peak_flow? bottle? walk? rest? longest overrides",
+    "compare": (
+        "overrides seed? threads? progress? confidence maximum_failed configurations? study? tasks "
+        "baseline? draws check"
+    ),
+    "compare_walks": "scenario minutes? progress",
+    "design": ("problem:object? seed? threads? mass? stature? torque? pressure? minutes? toes? catalogue? progress?"),
+    "endurance_of_walk": "result bottle?",
+    "estimate": (
+        "overrides seed? threads? progress? confidence maximum_failed study metric statistic width? also "
+        "configuration first_draws draws"
+    ),
+    "evaluate": "recording",
+    "find": "scenario vary such_that highest grid overrides threads? progress?",
+    "identify": "problem progress",
+    "linearise": "scenario at overrides",
+    "load_catalogue": "catalogue",
+    "load_design": "problem seed?",
+    "load_device": "parameter_set overrides valve?",
+    "load_gait": "gait",
+    "load_parameter_set": "parameter_set:name",
+    "load_scenario": "scenario:name overrides parameter_set?",
+    "load_study": "study overrides draws? seed?",
+    "load_study_results": "folder",
+    "load_tuning": "tuning overrides",
+    "load_walk": "scenario:name overrides gait? task_sequence? bottle? parameter_set?",
+    "parts": "part? catalogue",
+    "read_recording": "path atmosphere",
+    "read_result": "folder",
+    "reproduce": "study:name overrides progress?",
+    "scenario_from_dict": "content overrides",
+    "sensitivity": (
+        "overrides seed? threads? progress? confidence maximum_failed study method? metrics samples? "
+        "configuration independent"
+    ),
+    "simulate": "scenario overrides",
+    "simulate_many": "scenarios threads?",
+    "sweep": "overrides seed? threads? progress? study draws? out? scheduler? agreed",
+    "tune": "overrides seed? threads? progress? tuning",
+    "validate": (
+        "parameter_set:name recordings valve? overrides motion volume? initial thresholds longest_delay "
+        "columns? progress?"
+    ),
+    "walk": "scenario overrides gait? task_sequence? bottle? minutes? progress",
+    "walk_population": "scenario wearers minutes? seed progress",
+    "workbench": "scenarios overrides",
+}
+"""Arguments of every public function that takes some; ``?`` where None is right too, ``:KIND`` for another kind."""
+
+
+ALONE = {"design": "problem"}
+"""The argument of a function that takes the place of all others."""
+
+
+def right_values(recording: Path) -> dict[str, dict[str, Any]]:
+    """Arguments that are right, by function; ``recording`` is a file that can be read."""
+    return {
+        "apply_overrides": {"parameter_set": ppafo.load_parameter_set(SET), "overrides": ()},
+        "audit": {"parameter_set": SET},
+        "bottle": {"gas_per_stride": 3e-4},
+        "compare": {"configurations": [TASK, "torque-task-solenoid"], "draws": 64},
+        "compare_walks": {"scenario": WALK},
+        "design": {"mass": 72.5, "torque": 2.5, "pressure": 4.46e5, "minutes": 5.0},
+        "endurance_of_walk": {"result": ppafo.walk(WALK, minutes=0.1)},
+        "estimate": {"study": STUDY, "metric": "rms_error", "draws": 512, "configuration": "proportional"},
+        "evaluate": {"recording": recording},
+        "find": {
+            "scenario": TASK,
+            "vary": "supply.pressure=20..90 psi_g",
+            "such_that": "rms_error <= 0.3 N m",
+            "grid": 4,
+        },
+        "identify": {"problem": recording},
+        "linearise": {"scenario": TASK},
+        "load_design": {"problem": "push-off"},
+        "load_device": {"parameter_set": SET},
+        "load_parameter_set": {"parameter_set": SET},
+        "load_scenario": {"scenario": TASK},
+        "load_study": {"study": STUDY},
+        "load_study_results": {"folder": "no-such-folder"},
+        "load_tuning": {"tuning": "pid-gains"},
+        "load_walk": {"scenario": WALK},
+        "read_recording": {"path": recording},
+        "read_result": {"folder": "no-such-folder"},
+        "scenario_from_dict": {"content": {}},
+        "sensitivity": {"study": STUDY, "samples": 64, "configuration": "proportional"},
+        "simulate": {"scenario": TASK},
+        "simulate_many": {"scenarios": [TASK]},
+        "sweep": {"study": STUDY, "draws": 8},
+        "tune": {"tuning": "pid-gains"},
+        "validate": {"parameter_set": SET, "recordings": [recording]},
+        "walk": {"scenario": WALK, "minutes": 0.05},
+        "walk_population": {"scenario": WALK, "wearers": 2, "minutes": 0.05},
+    }
 
 
 def functions(recording: Path) -> dict[str, Function]:
     """Every public function that takes arguments; ``recording`` is a file that can be read."""
-    study = {"overrides": "overrides", "seed": "seed", "threads": "count", "progress": "function"}
-    drawn = {**study, "confidence": "fraction", "maximum_failed": "fraction"}
-    none = "seed threads progress"
-    known = {
-        "apply_overrides": _function(
-            {"parameter_set": ppafo.load_parameter_set(SET), "overrides": ()},
-            "valve",
-            parameter_set="object",
-            overrides="overrides",
-            valve="name",
-        ),
-        "audit": _function({"parameter_set": SET}, "parent", parameter_set="object", parent="object"),
-        "bottle": _function(
-            {"gas_per_stride": 3e-4},
-            "gas_per_stride stride_time peak_flow bottle walk rest",
-            recordings="names",
-            gas_per_stride="positive",
-            stride_time="positive",
-            peak_flow="positive",
-            bottle="name",
-            walk="from zero",
-            rest="from zero",
-            longest="from zero",
-            overrides="overrides",
-        ),
-        "compare": _function(
-            {"configurations": [TASK, "torque-task-solenoid"], "draws": 64},
-            f"{none} configurations study baseline",
-            **drawn,
-            configurations="names",
-            study="object",
-            tasks="content",
-            baseline="name",
-            draws="count",
-            check="flag",
-        ),
-        "compare_walks": _function(
-            {"scenario": WALK}, "minutes", scenario="object", minutes="positive", progress="function"
-        ),
-        "design": _function(
-            {"mass": 72.5, "torque": 2.5, "pressure": 4.46e5, "minutes": 5.0},
-            "problem seed threads mass stature torque pressure minutes toes catalogue progress",
-            problem="object",
-            seed="seed",
-            threads="count",
-            mass="positive",
-            stature="positive",
-            torque="positive",
-            pressure="positive",
-            minutes="positive",
-            toes="number",
-            catalogue="name",
-            progress="function",
-            alone="problem",
-        ),
-        "endurance_of_walk": _function(
-            {"result": ppafo.walk(WALK, minutes=0.1)}, "bottle", result="object", bottle="name"
-        ),
-        "estimate": _function(
-            {"study": STUDY, "metric": "rms_error", "draws": 512, "configuration": "proportional"},
-            f"{none} width",
-            **drawn,
-            study="object",
-            metric="name",
-            statistic="name",
-            width="name",
-            also="names",
-            configuration="name",
-            first_draws="count",
-            draws="count",
-        ),
-        "evaluate": _function({"recording": recording}, recording="object"),
-        "find": _function(
-            {"scenario": TASK, "vary": "supply.pressure=20..90 psi_g", "such_that": "rms_error <= 0.3 N m", "grid": 4},
-            "threads progress",
-            scenario="object",
-            vary="name",
-            such_that="name",
-            highest="flag",
-            grid="count",
-            overrides="overrides",
-            threads="count",
-            progress="function",
-        ),
-        "identify": _function({"problem": recording}, "", problem="name", progress="function"),
-        "linearise": _function({"scenario": TASK}, "", scenario="object", at="number", overrides="overrides"),
-        "load_catalogue": _function({}, "", catalogue="name"),
-        "load_design": _function({"problem": "push-off"}, "seed", problem="name", seed="seed"),
-        "load_device": _function(
-            {"parameter_set": SET}, "valve", parameter_set="object", overrides="overrides", valve="name"
-        ),
-        "load_gait": _function({}, "", gait="name"),
-        "load_parameter_set": _function({"parameter_set": SET}, "", parameter_set="name"),
-        "load_scenario": _function(
-            {"scenario": TASK}, "parameter_set", scenario="name", overrides="overrides", parameter_set="object"
-        ),
-        "load_study": _function(
-            {"study": STUDY}, "draws seed", study="object", overrides="overrides", draws="count", seed="seed"
-        ),
-        "load_study_results": _function({"folder": "no-such-folder"}, "", folder="name"),
-        "load_tuning": _function({"tuning": "pid-gains"}, "", tuning="object", overrides="overrides"),
-        "load_walk": _function(
-            {"scenario": WALK},
-            "gait task_sequence bottle parameter_set",
-            scenario="name",
-            overrides="overrides",
-            gait="name",
-            task_sequence="name",
-            bottle="name",
-            parameter_set="object",
-        ),
-        "parts": _function({}, "part", part="name", catalogue="name"),
-        "read_recording": _function({"path": recording}, "", path="name", atmosphere="positive"),
-        "read_result": _function({"folder": "no-such-folder"}, "", folder="name"),
-        "reproduce": _function({}, "progress", study="name", overrides="overrides", progress="function"),
-        "scenario_from_dict": _function({"content": {}}, "", content="content", overrides="overrides"),
-        "sensitivity": _function(
-            {"study": STUDY, "samples": 64, "configuration": "proportional"},
-            f"{none} method samples",
-            **drawn,
-            study="object",
-            method="name",
-            metrics="names",
-            samples="count",
-            configuration="name",
-            independent="flag",
-        ),
-        "simulate": _function({"scenario": TASK}, "", scenario="object", overrides="overrides"),
-        "simulate_many": _function({"scenarios": [TASK]}, "threads", scenarios="names", threads="count"),
-        "sweep": _function(
-            {"study": STUDY, "draws": 8},
-            f"{none} draws out scheduler",
-            **study,
-            study="object",
-            draws="count",
-            out="path",
-            scheduler="address",
-            agreed="flag",
-        ),
-        "tune": _function({"tuning": "pid-gains"}, none, **study, tuning="object"),
-        "validate": _function(
-            {"parameter_set": SET, "recordings": [recording]},
-            "valve volume columns progress",
-            parameter_set="name",
-            recordings="names",
-            valve="name",
-            overrides="overrides",
-            motion="name",
-            volume="positive",
-            initial="names",
-            thresholds="names",
-            longest_delay="from zero",
-            columns="name",
-            progress="function",
-        ),
-        "walk": _function(
-            {"scenario": WALK, "minutes": 0.05},
-            "gait task_sequence bottle minutes",
-            scenario="object",
-            overrides="overrides",
-            gait="name",
-            task_sequence="name",
-            bottle="name",
-            minutes="positive",
-            progress="function",
-        ),
-        "walk_population": _function(
-            {"scenario": WALK, "wearers": 2, "minutes": 0.05},
-            "minutes",
-            scenario="object",
-            wearers="count",
-            minutes="positive",
-            seed="seed",
-            progress="function",
-        ),
-        "workbench": _function({}, "", scenarios="names", overrides="overrides"),
-    }
-    for name in PLUGINS:
-        function = known[name]
-        known[name] = function._replace(kinds={**function.kinds, "plugins": "names"})
+    right, known = right_values(recording), {}
+    kind_of = {name: kind for kind, names in KINDS.items() for name in names.split()}
+    for function, words in ARGUMENTS.items():
+        optional = frozenset(word.partition(":")[0].removesuffix("?") for word in words.split() if word.endswith("?"))
+        parts = [word.removesuffix("?").partition(":") for word in words.split()]
+        kinds = {name: kind or kind_of[name] for name, _, kind in parts}
+        if function in PLUGINS:
+            kinds["plugins"] = "names"
+        known[function] = Function(right.get(function, {}), kinds, optional, ALONE.get(function, ""))
     return known
 
 
@@ -372,8 +318,9 @@ def names(message: str, argument: str) -> bool:
 
 
 def begins(message: str, value: Any) -> bool:
-    """Tell whether a message begins with the path that was given, or with a file below that folder."""
-    return isinstance(value, str | Path) and re.match(rf"{re.escape(str(value))}[:/,]", message) is not None
+    """Tell whether a message begins with the path that was given, the first of several, or a file below that folder."""
+    first = value if isinstance(value, str | Path) else next(iter(value), None) if isinstance(value, Iterable) else None
+    return isinstance(first, str | Path) and re.match(rf"{re.escape(str(first))}[:/,]", message) is not None
 
 
 class _TooLongError(Exception):

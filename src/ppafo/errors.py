@@ -144,7 +144,7 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
             if now in known:
                 return f", which is now called '{now}'"
     sheet = _OF_DATA_SHEETS.get(_SPELT_OTHERWISE.get(last.lower(), last.lower()))
-    if sheet is not None and any(one.rpartition(".")[2] == _C for one in known):
+    if sheet is not None and any(name.rpartition(".")[2] == _C for name in known):
         return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"
     # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
     near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=0.6)
@@ -154,8 +154,10 @@ def nearest_name(name: str, allowed: Iterable[str]) -> str:
         near = [max(alike, key=lambda name: _letters_shared(name, word))]
     else:
         # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
-        words = [(re.split(r"[^0-9A-Za-z]+", one), one) for one in known]
-        near = [one for found, one in words if found[0] == word] or [one for found, one in words if word in found[1:]]
+        words = [(re.split(r"[^0-9A-Za-z]+", name), name) for name in known]
+        near = [name for found, name in words if found[0] == word] or [
+            name for found, name in words if word in found[1:]
+        ]
     return f", did you mean '{near[0]}'?" if near else ""
 
 

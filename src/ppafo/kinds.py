@@ -40,7 +40,9 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         self._places = {name: kind for name, kind in own.items() if isinstance(kind, str)}
         self._kinds = {name: kind for name, kind in own.items() if not isinstance(kind, str)}
         self._own = dict.fromkeys(own)
-        self._absent = {name: package_of(place) for name, place in self._places.items() if not is_installed(place)}
+        self._absent = {
+            name: package_of(location) for name, location in self._places.items() if not is_installed(location)
+        }
         for name in self._absent:
             del self._own[name], self._places[name]
 
@@ -87,7 +89,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
 
     def load_own(self) -> None:
         """Load every kind of this package."""
-        self._kinds |= {name: kind_at(place) for name, place in self._places.items() if name not in self._kinds}
+        self._kinds |= {name: kind_at(location) for name, location in self._places.items() if name not in self._kinds}
 
     def load_all(self) -> tuple[str, ...]:
         """Load every kind that is installed; return one line for each that cannot be used, and log it."""
@@ -145,14 +147,14 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
         return kind
 
 
-def package_of(place: str) -> str:
+def package_of(location: str) -> str:
     """Return the package of a place, ``ppafo.page`` of ``ppafo.page.workbench:live_part``."""
-    return ".".join(place.partition(":")[0].split(".")[:2])
+    return ".".join(location.partition(":")[0].split(".")[:2])
 
 
-def is_installed(place: str) -> bool:
+def is_installed(location: str) -> bool:
     """Tell whether the package of a place is there."""
-    return _is_there(package_of(place))
+    return _is_there(package_of(location))
 
 
 @lru_cache(maxsize=64)
@@ -181,9 +183,9 @@ def declared_kinds(group: str) -> dict[str, str]:
     return found
 
 
-def kind_at(place: str) -> Any:
+def kind_at(location: str) -> Any:
     """Return what stands at ``module:NAME``, a place in this package."""
-    module, _, name = place.partition(":")
+    module, _, name = location.partition(":")
     return getattr(importlib.import_module(module), name)
 
 

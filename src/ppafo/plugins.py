@@ -127,7 +127,7 @@ def object_of(word: str) -> Any:
     named = {plugin.module: plugin for plugin in named_plugins()}
     # Who names a package means its modules too.
     parents = [module[:end] for end, character in enumerate(module) if character == "."]
-    plugin = next((named[one] for one in (module, *reversed(parents)) if one in named), None)
+    plugin = next((named[known] for known in (module, *reversed(parents)) if known in named), None)
     if plugin is None and module not in sys.modules:
         raise KindError(
             f"a file runs no code, and you have not named the module '{module}'; if you trust it, add "

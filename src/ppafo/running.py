@@ -16,6 +16,7 @@ from ppafo.simulation.simulate import Result
 if TYPE_CHECKING:
     from ppafo.control.kind import ControllerKind
     from ppafo.simulation.oscillation import Gains, Oscillation
+    from ppafo.simulation.standstill import Standstill
 
 
 @checked()
@@ -58,6 +59,14 @@ def oscillation(result: Result) -> "Oscillation | None":
     strides = metrics.get("strides", 0.0) if result.scenario.walks else 0.0
     stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
     return oscillation_of(result.scenario, law, result.recording, metrics, stride_time)
+
+
+def standstill(result: Result) -> "Standstill | None":
+    """Return the verdict on a run whose loop does not move at all; None where it does."""
+    from ppafo.simulation.standstill import standstill_of
+
+    law = _law(result.scenario)
+    return None if law is None else standstill_of(result.scenario, law, result.recording)
 
 
 def most_reversals(scenario: Scenario) -> float:

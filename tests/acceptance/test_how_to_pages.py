@@ -300,21 +300,53 @@ def test_the_valve_of_the_page_agrees_with_the_reference_solver() -> None:
     assert agreement.worst_pressure < 1e-3
 
 
-def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(tmp_path: Path) -> None:
+@pytest.fixture
+def elbow(tmp_path: Path) -> Path:
+    """The set of the page: the shipped cylinder with the section of the page in the place of its actuator."""
     shipped = (files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
     before, after = shipped.index("[actuator]"), shipped.index("[actuator.angle_min]")
     (tmp_path / "mine.toml").write_text(
         shipped[:before] + extension('kind = "table"') + "\n" + shipped[after:], encoding="utf-8"
     )
     (tmp_path / "measured-bladder.csv").write_bytes((MEASURED / "measured-bladder.csv").read_bytes())
-    within = ["actuator.angle_max=110 deg", "supply.pressure=65 kPa_g"]
-    device = ppafo.load_device(tmp_path / "mine.toml", overrides=within)
+    return tmp_path / "mine.toml"
+
+
+WITHIN = ("actuator.angle_max=110 deg", "supply.pressure=60 kPa_g")
+"""What keeps the elbow within the table."""
+
+
+def test_a_set_with_the_section_of_the_page_has_the_actuator_that_was_measured(elbow: Path) -> None:
+    device = ppafo.load_device(elbow, overrides=list(WITHIN))
     actuator = device.actuator
     assert (device.joint.name, device.joint.positive) == ("elbow", "extension")
     same = ppafo.load_device(MEASURED / "measured-bladder.toml").actuator
     assert actuator.kind == "table"
     assert actuator.settings == same.settings
     assert actuator.table == same.table
+
+
+def test_the_elbow_rests_where_friction_holds_it_as_the_page_says_and_an_integral_brings_it_there(elbow: Path) -> None:
+    page = (Path(ppafo.__file__).parents[2] / "docs" / "how-to" / "control-an-angle.md").read_text(encoding="utf-8")
+    written = tomllib.loads(block_with("how-to/control-an-angle.md", 'kind = "cascade"'))
+    content = {
+        "schema_version": 1,
+        "name": "elbow-servo",
+        "device": {"set": str(elbow), "overrides": list(WITHIN)},
+        "run": {"duration": "4 s", "output_interval": "2 ms"},
+        "motion": {"kind": "free", "angle": "40 deg"},
+        **written,
+    }
+    levels = ["reference.start_level=40 deg", "reference.level=70 deg"]
+    plain, with_integral = (
+        ppafo.simulate(scenario_from_dict(content, [*levels, *more]))
+        for more in ([], ["controller.angle_integral=8 N m/(rad s)"])
+    )
+    rest, brought = (math.degrees(result.metrics["final_angle_error"].value) for result in (plain, with_integral))
+    stiffness, friction = (plain.scenario.controller.angle_stiffness, plain.scenario.device.friction.static_torque)
+    assert rest < math.degrees(friction / stiffness)
+    said = f"rests {rest:.1f} deg away ({friction:.2g} N m over {stiffness:.2g} N m/rad is "
+    assert f"{said}{math.degrees(friction / stiffness):.1f} deg), and {brought:.1g} deg with" in page
 
 
 @pytest.fixture

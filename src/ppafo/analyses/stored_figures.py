@@ -6,11 +6,18 @@ from typing import TYPE_CHECKING, Any
 from ppafo.analyses.endurance.draw import WALK_FILE
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.errors import DataError, reason
-from ppafo.report.recording_figure import draw_stored_result, draw_stored_walk, recording_figure, stated_atmosphere
+from ppafo.report.recording_figure import (
+    draw_stored_result,
+    draw_stored_walk,
+    recording_figure,
+    stated_atmosphere,
+    stated_units,
+)
 from ppafo.rig.experiments import RIG_FILE
 from ppafo.storage import read_recording, read_result
 from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
 from ppafo.study.manifest import MANIFEST
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,18 +46,21 @@ def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     if RIG_FILE in names:
         file = folder / RIG_FILE
         document, tables = _document(file), [name for name in names if name.endswith(".csv")]
-        # Gauge pressure of a recording counts from the atmosphere of its device.
-        zeros = {name: stated_atmosphere(file, document, "recordings", name, "device") for name in tables}
-        return {
-            name.removesuffix(".csv"): recording_figure(read_recording(folder / name), atmosphere=zero)
-            for name, zero in zeros.items()
-        }
+        return {name.removesuffix(".csv"): _draw_rig_recording(file, document, name) for name in tables}
     if NETCDF_FILE in names and MARK in names:
         # Of a walk its end is recorded.
         file = folder / WALK_FILE
         document = _document(file) if WALK_FILE in names else {}
         return {_FIGURE: draw_stored_walk(file, document, read_recording(folder / NETCDF_FILE))}
     return {}
+
+
+def _draw_rig_recording(file: Path, document: dict[str, Any], name: str) -> "Figure":
+    """Return the figure of a recording of the rig, whose truth the document of its folder holds."""
+    # Gauge pressure of a recording counts from the atmosphere of its device.
+    atmosphere = stated_atmosphere(file, document, "recordings", name, "device")
+    with shown_in(stated_units(file, document, "recordings", name)):
+        return recording_figure(read_recording(file.parent / name), atmosphere=atmosphere)
 
 
 def _document(file: Path) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar
 
-from ppafo.arguments.values import Taken, annotations_of, shown, taken
+from ppafo.arguments.values import Taken, annotated_parameters, shown, taken
 from ppafo.errors import ArgumentError, PpafoError, nearest_name
 
 P = ParamSpec("P")
@@ -85,9 +85,9 @@ def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callab
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.cache
         def signature() -> _Signature:
-            parameters, annotations = inspect.signature(function).parameters, annotations_of(function)
+            parameters = annotated_parameters(function)
             return _Signature(
-                {name: _Parameter(each.default, taken(annotations[name])) for name, each in parameters.items()},
+                {name: _Parameter(each.default, taken(each.annotation)) for name, each in parameters.items()},
                 tuple(name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
             )
 

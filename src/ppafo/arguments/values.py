@@ -40,14 +40,15 @@ class _Names(dict[str, Any]):
         return getattr(builtins, name) if hasattr(builtins, name) else type(name, (NotLoaded,), {})
 
 
-def annotations_of(function: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return the annotation of each parameter by name; a class that the module does not load is a ``NotLoaded``.
+def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
+    """Return the parameters by name, each with what its annotation says; a class that is not loaded is a ``NotLoaded``.
 
     A parameter without an annotation has that of ``inspect``, as a function of somebody else may.
     """
     names = _Names(vars(sys.modules[function.__module__]))
-    written = {name: parameter.annotation for name, parameter in inspect.signature(function).parameters.items()}
-    return written | typing.get_type_hints(function, localns=names, include_extras=True)
+    said = typing.get_type_hints(function, localns=names, include_extras=True)
+    parameters = inspect.signature(function).parameters.values()
+    return {each.name: each.replace(annotation=said.get(each.name, each.annotation)) for each in parameters}
 
 
 class Taken(NamedTuple):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, final
 
 from ppafo.arguments import Word, number, whole_number
 from ppafo.arguments.door import without_names
-from ppafo.arguments.values import annotations_of
+from ppafo.arguments.values import annotated_parameters
 from ppafo.cli import output
 from ppafo.errors import ArgumentError, PpafoError, nearest_name
 from ppafo.kinds import kind_at
@@ -152,10 +152,9 @@ def reading_of(annotation: Any) -> Reading:
 
 def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, Reading]]:
     """Return each parameter that words of the line fill, with how its text is read."""
-    annotations = annotations_of(verb)
-    for parameter in inspect.signature(verb).parameters.values():
-        if parameter.name not in (PROGRESS, PLUGINS):
-            yield parameter, reading_of(annotations[parameter.name])
+    for name, parameter in annotated_parameters(verb).items():
+        if name not in (PROGRESS, PLUGINS):
+            yield parameter, reading_of(parameter.annotation)
 
 
 def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:

@@ -24,7 +24,7 @@ FIGURE = "figure"
 def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = (), out: Folder | None = None) -> Said:
     """Run a scenario and write its recording, metrics and figure.
 
-    Exit code 1 where it diverged, or a check finds it numerically sensitive or its torque loop oscillating.
+    Exit code 1 where it diverged, or a check finds it numerically sensitive, its loop oscillating or at a standstill.
 
     check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated
     out: result folder with the report; default out/NAME of the scenario
@@ -45,11 +45,12 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
 @in_units(lambda scenario, *_: scenario.device.shown)
 def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
-    from ppafo.running import gains, oscillation
+    from ppafo.running import gains, oscillation, standstill
     from ppafo.simulation.simulate import simulate
 
     result = simulate(chosen)
     in_force, verdict = gains(chosen), oscillation(result)
+    stands = standstill(result) if result.status.is_completed else None
     # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None
     error = None if checked is None else checked.error
@@ -64,7 +65,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     from ppafo.report.recording_figure import figure_files
 
     figures = figure_files(result.plot())
-    first = [item.sentence for item in (verdict, in_force) if item is not None]
+    first = [item.sentence for item in (verdict, stands, in_force) if item is not None]
     report = page_of(_finding(result, checked, first), {FIGURE: figures[f"{FIGURE}.svg"]})
     files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **files})
@@ -75,14 +76,16 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
         "scenario": result.scenario.name,
         "status": plain(result.status),
         "oscillation": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+        "standstill": None if stands is None else {**plain(stands), "sentence": stands.sentence},
         "gains": plain(in_force),
         "metrics": metrics,
         **({} if error is None else {"error": plain(error)}),
         **({} if checked is None else {"check": checked.document()}),
         "folder": str(folder),
     }
-    # A loop that oscillates is a result that nobody should use, and says so where a check is asked for.
-    is_good = result.status.is_completed and (checked is None or (checked.is_determined and verdict is None))
+    # A loop that oscillates or stands still is a result that nobody should use: a check that is asked for says so.
+    has_loop = verdict is None and stands is None
+    is_good = result.status.is_completed and (checked is None or (checked.is_determined and has_loop))
     return Said(
         _text(result, error, checked, folder, first),
         document,

@@ -49,7 +49,7 @@ class Compiler(Protocol):
         """What a compiled program depends on beside its text: compiler, version, flags, processor."""
 
     def described(self) -> str:
-        """Its name and version, for people."""
+        """Name and version of the compiler, for people."""
 
     def compile_text(self, source: str, path: str, module: ModuleType) -> None:
         """Compile a text, and keep beside ``path`` what ``run_text`` needs."""

@@ -79,7 +79,7 @@ class LoopText:
         self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:
-        """Its statements."""
+        """Statements of the phase."""
         return self.block(self.reduction.definition.tree.body)
 
     def either(self, own: list[ast.stmt], other: list[ast.stmt]) -> list[ast.stmt]:

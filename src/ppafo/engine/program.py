@@ -62,7 +62,7 @@ class GasPhases(Protocol):
         """Pressures [Pa] to which it leads."""
 
     def first_flows(self, parts: "Program", lane: "Lane") -> tuple[float, float, float]:
-        """Its flows [kg/s]: from the supplies, and into both chambers."""
+        """Flows [kg/s] of the first stage: from the supplies, and into both chambers."""
 
     def change(self, parts: "Program", lane: "Lane", length: float) -> None:
         """The second stage, and what both change."""
@@ -71,7 +71,7 @@ class GasPhases(Protocol):
         """Error of the pressures over what is allowed [-], with volumes that ran to an angle [rad]."""
 
     def shift_error(self, parts: "Program", lane: "Lane", shift: float, ahead: float, length: float) -> float:
-        """The same of a valve whose opening moves by a share."""
+        """Error of the pressures over what is allowed [-], of a valve whose opening moves by a share."""
 
     def add(self, parts: "Program", lane: "Lane") -> None:
         """``lane.fed``, the state with the gas of the step, and ``lane.warmed``, the true masses if it has any."""
@@ -96,7 +96,7 @@ class FeedPhases(Protocol):
 
     @property
     def NEXT(self) -> Rows:  # noqa: N802
-        """Its states at the end of a part that may be refused."""
+        """States of the feed at the end of a part that may be refused."""
 
     def stage(self, parts: "Program") -> Rows:
         """What the first stage leaves for later phases, that of the gas among it."""
@@ -105,13 +105,13 @@ class FeedPhases(Protocol):
         """The plant at the pressures that feed it as a step begins."""
 
     def source_ahead(self, parts: "Program", lane: "Lane") -> PlantParameters:
-        """The same after the first stage."""
+        """The plant at the pressures that feed it after the first stage."""
 
     def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
         """The first stage, with that of the gas."""
 
     def end(self, parts: "Program", lane: "Lane", length: float) -> None:
-        """Its state at the end of a step or part."""
+        """State of the feed at the end of a step or part."""
 
     def error(self, parts: "Program", lane: "Lane") -> float:
         """What that misses, over what is allowed [-]."""
@@ -306,12 +306,12 @@ class Program:
 
     @property
     def stated_with_errors(self) -> dict[str, State]:
-        """Those of ``stated`` whose error may shorten a step."""
+        """States of effects whose error may shorten a step, by the names of the effects."""
         return {name: kind for name, kind in self.stated.items() if kind.tolerances}
 
     @property
     def stated_at_ports(self) -> dict[str, State]:
-        """Those of ``stated`` that laws take which act on flows and gas."""
+        """States of effects that laws take which act on flows and gas, by the names of the effects."""
         ports = (supply_path, exhaust_path, leakage_path, gas_density, ideal_density)
         laws = [(effect, effect.laws[port]) for effect in self.effects for port in ports if port in effect.laws]
         asked = {effect.name for effect, law in laws if effect.state_name in law.__code__.co_varnames}
@@ -367,7 +367,7 @@ class Program:
 
     @property
     def moving_meters(self) -> dict[str, MeterKind]:
-        """Those of ``meter_groups`` that change after the first sample: a locked vane never moves."""
+        """Groups of meters that change after the first sample: a locked vane never moves."""
         return {group: kind for group, kind in self.meter_groups.items() if not (self.is_locked and kind.of_motion)}
 
     @property

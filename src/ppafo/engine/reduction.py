@@ -57,7 +57,7 @@ class Effects:
 
     reads: dict[str, None] = field(default_factory=dict)
     takes: tuple[str, ...] = ()
-    """Those of its own parameters that it asks."""
+    """Parameters of its own that the function asks."""
     groups: dict[str, Fields] = field(default_factory=dict)
     slots: dict[str, Slot] = field(default_factory=dict)
 

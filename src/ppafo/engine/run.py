@@ -69,7 +69,7 @@ class Walk:
     failing: "tuple[PlantFaults, ShutOff] | None" = None
 
     def groups(self) -> LegGroups:
-        """Its scheme, and its groups of rows in the order of ``Program``."""
+        """Scheme of the program, and its groups of rows in the order of ``Program``."""
         from ppafo.engine.step import walk  # most devices walk on no leg
 
         parameters = [self.leg, self.share, self.gait, self.timing, self.sensors]

@@ -328,14 +328,14 @@ def check_moment_time(walk: MeanStride) -> None:
     if "ankle_moment" not in walk.curves:
         return
     moment = walk.curves["ankle_moment"]
-    peak, place = float(np.max(moment)), f"{walk.file['ankle_moment']}: ankle_moment"
+    peak, column = float(np.max(moment)), f"{walk.file['ankle_moment']}: ankle_moment"
     fraction, phase = walk.stance_share, np.linspace(0.0, 1.0, moment.size)
     at, swing = float(phase[np.argmax(moment)]), float(np.max(moment[phase > fraction + _AFTER_TOE_OFF]))
     if at < fraction and swing < max(_LEFT_IN_SWING * peak, _FOOT_ALONE):
         return
     where = "" if at >= fraction else f" and is {swing:.2g} N m/kg in swing"
     raise DataError(
-        f"{place} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
+        f"{column} peaks at {100.0 * at:.0f} % of the stride{where}, but the foot is off the ground "
         f"from {100.0 * fraction:.0f} % on; {_OTHER_TIME[walk.signs_from]}"
     )
 

@@ -19,10 +19,12 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
-from ppafo.identification.residuals import Block, Free, Residuals, Work
+from ppafo.identification.residuals import Block, Free, Indices, Residuals, Work
 from ppafo.identification.whitened import cost_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
+from ppafo.signals.faults import noise_of as white_noise_of
+from ppafo.signals.faults import off_neighbours, outlying_samples
 from ppafo.signals.recording import Floats
 
 
@@ -31,7 +33,8 @@ class Fit:
     """What recordings say of numbers, SI units, in the order of ``numbers``.
 
     ``low`` and ``high`` are intervals at the confidence, ``noise`` standard deviations and ``correlation`` orders of
-    the autoregression by channel, ``residuals`` measured less model. ``unidentified`` are combinations, as weights of
+    the autoregression by channel, ``residuals`` measured less model, ``outliers`` the rows
+    of them that were left out because each stands out by itself. ``unidentified`` are combinations, as weights of
     numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number the
     tolerances that widen its interval, largest first, as fractions of the variance. ``jacobian`` is whitened [1/SI].
     """
@@ -44,6 +47,7 @@ class Fit:
     noise: Mapping[str, float]
     correlation: Mapping[str, int]
     residuals: Floats
+    outliers: tuple[int, ...]
     conflict: Conflict | None
     unidentified: tuple[Mapping[str, float], ...]
     shares: Mapping[str, tuple[tuple[str, float], ...]]
@@ -60,7 +64,7 @@ class Fit:
 
 
 _LEFT_OUT = 0.01
-"""Largest fraction of the samples that are left out because an event, such as an impact, passes them."""
+"""Largest fraction of the samples that are left out as outliers, or because an event such as an impact passes them."""
 
 _LEVERAGE = 0.1
 """Share of a combination of numbers that one sample decides alone from which it is left out."""
@@ -134,7 +138,7 @@ def fit(
 def _search(work: Work, start: Floats) -> Floats:
     """Return about the least squares, weights and squares in turn until both stay."""
     point = np.clip(start, work.low, work.high)
-    left = work.one(point)
+    left, work.outliers = work.one(point), work.outliers[:0]
     if not np.isfinite(left).all():
         raise IdentificationError("no run succeeds at the start values; give others, or check the recordings")
     noise, _ = work.deviations(left[:, None])
@@ -142,6 +146,7 @@ def _search(work: Work, start: Floats) -> Floats:
     for number in range(_PASSES):
         work.report(Progress("fit", number, _PASSES, noun="passes", elapsed=time.monotonic() - begun))
         weight = 1.0 / noise
+        weight[work.outliers] = 0.0
 
         def weighted(x: Floats, weight: Floats = weight) -> Floats:
             return np.concatenate([work.one(x) * weight, (x - work.mean) * work.prior])
@@ -166,17 +171,40 @@ def _search(work: Work, start: Floats) -> Floats:
             max_nfev=_FEW_EVALUATIONS if number > 1 else _EVALUATIONS,
         )
         point = np.asarray(result.x)
-        before, (noise, _) = noise, work.deviations(work.one(point)[:, None])
+        left = work.one(point).copy()
+        if number == 0 and work.is_motion:
+            work.outliers = _outliers(work, left)
+        left[work.outliers] = 0.0
+        before, (noise, _) = noise, work.deviations(left[:, None])
         if number and result.status > 0 and float(np.abs(np.log(noise / before)).max()) < _SETTLED:
             break
     return point
 
 
+def _outliers(work: Work, left: Floats) -> Indices:
+    """Return samples that no sensor made: residuals of the robust pass far off those around them, at most one in 100.
+
+    One near a break-away would else decide a friction by itself. More are noise with heavy tails: the largest are left
+    out.
+    """
+    found, sizes = list[Indices](), list[Floats]()
+    for one in work.blocks:
+        own = left[one.rows]
+        noise = max(white_noise_of(own), float(np.min(one.floor)))
+        rows = np.flatnonzero(outlying_samples(own, noise))
+        found.append(rows + one.rows.start)
+        sizes.append(off_neighbours(own)[rows] / max(noise, 1.0e-300))
+    order = np.argsort(-np.concatenate(sizes), kind="stable")[: int(_LEFT_OUT * len(left))]
+    return np.sort(np.concatenate(found)[order])
+
+
 def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
     """Return the fit after whitening and Gauss-Newton steps from the least squares."""
     left = work.one(point)
-    (noise, _), is_checked = work.deviations(left[:, None]), False
-    work.left_out = work.left_out[:0]
+    work.left_out, is_checked = work.outliers, False
+    kept = left.copy()
+    kept[work.left_out] = 0.0
+    noise, _ = work.deviations(kept[:, None])
     for number in range(_LAST_STEPS):
         linear, step = linear_at(work, point, left, work.jacobian(point, 1.0 / noise))
         noise, cost = linear.noise, cost_of(work, left, point, linear)
@@ -195,7 +223,7 @@ def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
             # What a sample near an impact seems to say alone is narrow and false: its slope holds on one side only.
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
             highest = np.argsort(-leverage)[: int(_LEFT_OUT * len(leverage))]
-            work.left_out = highest[leverage[highest] > _LEVERAGE]
+            work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, left = reached, after
     rows = linear.rows
@@ -219,6 +247,7 @@ def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
         noise={channel: one.deviation for channel, one in known.items()},
         correlation={channel: len(one.reflection) + (one.gain > 0.0) for channel, one in known.items()},
         residuals=left,
+        outliers=tuple(work.outliers.tolist()),
         conflict=conflict_of(work, rows, point, ~touching, freedom) or too_smooth(known),
         unidentified=tuple(unidentified(covariance, names)),
         shares={

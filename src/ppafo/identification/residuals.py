@@ -12,6 +12,7 @@ from ppafo.progress import Report
 from ppafo.signals.recording import Floats
 
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 Residuals = Callable[[Floats], Floats]
 """Measured less model [SI] (rows, points) at points [SI] (numbers, points), as one batch; NaN where a run fails."""
 
@@ -82,7 +83,7 @@ class Work:
         self.evaluations = 0
         self.least: dict[str, float] = {}
         self.step = np.full(len(numbers), _STEPS[1])
-        self.left_out = np.zeros(0, dtype=np.intp)
+        self.outliers = self.left_out = np.zeros(0, dtype=np.intp)
         self._last: tuple[bytes, Floats] | None = None
 
     def at(self, points: Floats) -> Floats:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
 from ppafo.model.controlled import CONTROLLED, TORQUE, Controlled
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
 

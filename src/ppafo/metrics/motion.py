@@ -69,7 +69,7 @@ EXTREMES = MeterKind("extremes", Extremes, start_extremes, update_extremes, of_m
 
 
 def read_time_of_fraction(readings: Readings, fraction: float) -> Floats:
-    """As ``time_of_fraction`` [s], of traces (samples, runs): the first angle is judged by the last."""
+    """Time [s] (runs,) until a fraction of the way is done, of traces (samples, runs); nan where nothing moves."""
     travelled = readings.traces["angle"] - readings.traces["angle"][0]
     moves = np.abs(travelled[-1]) >= np.maximum(_STANDSTILL, _RETURNED * np.ptp(travelled, axis=0))
     done = travelled / np.where(moves, travelled[-1], np.nan)

@@ -7,6 +7,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 
@@ -24,7 +25,7 @@ class Totals(NamedTuple):
 
 
 class ThermalTotals(NamedTuple):
-    """The same of gas with an energy balance, with its true masses [kg], and its energies [J]."""
+    """Totals of gas with an energy balance since the start of a run: true masses [kg], and its energies [J]."""
 
     supplied_mass: float
     vented_mass: float
@@ -77,6 +78,30 @@ def thermal_totals(
         wall_heat=per_content * masses.heat_content,
         gas_work=masses.gas_work,
     )
+
+
+class TotalsKind(NamedTuple):
+    """How the totals of a program's gas are made: the row, the function, and the groups that it takes after the state.
+
+    ``states`` are groups of states that it is given, ``parameters`` groups of parameters after those.
+    """
+
+    row: type[Totals] | type[ThermalTotals]
+    function: PlainFunction
+    states: tuple[str, ...] = ()
+    parameters: tuple[str, ...] = ()
+
+
+def totals_kind(program: Program) -> TotalsKind:
+    """How the totals of the gas of a program are made."""
+    if program.is_thermal:
+        return TotalsKind(
+            row=ThermalTotals, function=thermal_totals, states=("masses",), parameters=("plant", "thermal")
+        )
+    # Totals of a gas that is not ideal count true masses.
+    if program.has_true_masses:
+        return TotalsKind(row=Totals, function=real_totals, states=("masses",))
+    return TotalsKind(row=Totals, function=totals)
 
 
 def has_channels(program: Program, kind: MetricKind) -> bool:

@@ -252,4 +252,4 @@ METRICS = (
         ReadAt(("meters.strides.safe_time",), time_if_any),
     ),
 )
-"""Those of ``walk_metrics`` that need neither a mean curve nor the healthy gait."""
+"""Metrics of a walk that need neither a mean curve nor the healthy gait."""

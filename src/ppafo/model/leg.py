@@ -174,7 +174,7 @@ def torque_of_shank_on(
     knee_forward: float,
     knee_up: float,
 ) -> float:
-    """The same [N m] for any body that turns with the foot. The ankle's row of equation (11).
+    """Torque [N m] that shank, knee and weight ask of a body that turns with the foot. Equation (11), ankle's row.
 
     ``mass_moment`` [kg m] is its mass times the distance along the foot, ``inertia`` [kg m^2] about the ankle.
     """
@@ -213,7 +213,7 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
 
 
 def torque_on_resting_foot(load: FootLoad, shank: float, angle: float) -> float:
-    """As ``torque_on_foot`` [N m], to the bit, of a shank that rests at an angle [rad]: the weight alone is left."""
+    """Torque [N m] of the weight on a foot whose shank rests at an angle [rad]; to the bit as ``torque_on_foot``."""
     _, cosine_alpha = sine_and_cosine_of_turns((shank - angle) * TURNS_OF_RADIAN + 0.25)
     # Grouped as torque_of_shank_on groups it, or the last bits would differ.
     return load.mass_moment * (cosine_alpha * load.gravity)

@@ -148,7 +148,7 @@ def orifice_flow(pressure_a: float, pressure_b: float, conductance: float, curve
 def check_valve_flow(
     pressure_a: float, pressure_b: float, conductance: float, is_relieving: float, curve: FlowCurve
 ) -> float:
-    """As ``orifice_flow`` [kg/s], with nothing back into a where ``is_relieving`` is 0, not 1. Equations (6) to (8)."""
+    """Mass flow from a to b [kg/s] past a check valve: none back into a where ``is_relieving`` is 0. Eqs (6) to (8)."""
     upstream = max(pressure_a, pressure_b)
     ratio = min(pressure_a, pressure_b) / upstream
     flow = conductance * upstream * fitted_flow_function(ratio, curve)

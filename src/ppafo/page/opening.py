@@ -112,7 +112,9 @@ def computed_opening(
         except ScenarioError:
             continue  # what an ensemble does not vary, such as a time that others divide, is not a first slider
         moved = [_share(outcomes.metrics[name] - value, abs(value)) for name, value in zip(claims, usual, strict=True)]
-        apart = np.sqrt(np.mean((outcomes.traces[lead] - course[:, None]) ** 2, axis=0))
+        # Runs that failed, or whose duration is another, have no course to compare.
+        varied = outcomes.traces[lead]
+        apart = np.sqrt(np.mean((varied - course[:, None]) ** 2, axis=0)) if len(varied) == len(course) else np.zeros(0)
         if max(all_changes := [*moved, _share(apart, span)]) > LEAST_CHANGE:
             changes[entry["key"]] = all_changes
     # As many points as a picture of some hundred pixels shows.

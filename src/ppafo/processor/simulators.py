@@ -41,7 +41,7 @@ class Machine(NamedTuple):
 
 
 NO_MACHINE = Machine("", 0.0)
-"""That of a target which QEMU does not simulate."""
+"""Simulator of a target which QEMU does not simulate."""
 
 
 class Decision(NamedTuple):

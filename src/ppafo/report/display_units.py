@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.metrics import Metric
-from ppafo.units import from_si
+from ppafo.units import from_si, without_exponent
 from ppafo.units.shown import shown_unit
 
 Floats = NDArray[np.float64]
@@ -114,7 +114,7 @@ def display_values(values: Floats, quantity: str) -> Floats:
 
 def quantity_text(value: float, quantity: str, form: str = ".3g", atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return a value in SI as text with the unit in which it is shown; gauge counts from ``atmosphere`` [Pa]."""
-    return f"{display_value(value, quantity, atmosphere):{form}} {display_unit(quantity)}".rstrip()
+    return f"{without_exponent(display_value(value, quantity, atmosphere), form)} {display_unit(quantity)}".rstrip()
 
 
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}

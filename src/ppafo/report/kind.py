@@ -19,6 +19,7 @@ from ppafo.report.display_units import (
 )
 from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
+from ppafo.units import without_exponent
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,7 +77,7 @@ class Kind:
 
     def number(self, value: float, form: str = "") -> str:
         """Return a value in SI as text in the unit in which it is shown, without that unit."""
-        return f"{display_value(value, self.quantity):{form or self.form}}"
+        return without_exponent(display_value(value, self.quantity), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
         """Return a value in SI as text with the unit in which it is shown."""
@@ -88,7 +89,7 @@ class Kind:
 
     def change_number(self, value: float, form: str = ".3g") -> str:
         """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
-        return f"{display_difference(value, self.quantity):{form}}"
+        return without_exponent(display_difference(value, self.quantity), form)
 
     def interval(self, interval: Interval, form: str = "") -> str:
         """Return an estimate and the ends of its interval as text without unit."""

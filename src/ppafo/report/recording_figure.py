@@ -191,12 +191,12 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
         return recording_figure(shown, recording.label, remark, atmosphere, valve)
 
 
-def stated_units(file: Path, document: Mapping[str, Any]) -> dict[str, str]:
-    """Return the units in which a file's document says that its numbers are shown, by unit in SI; else none.
+def stated_units(file: Path, document: Mapping[str, Any], *keys: str) -> dict[str, str]:
+    """Return the units in which a file's document says, at some keys, that numbers are shown, by unit in SI; else none.
 
     DataError names one that is no unit of that kind.
     """
-    stated = _under(file, document, "shown")
+    stated = _under(file, document, *keys, "shown")
     for si_unit, unit in stated.items():
         try:
             conversion(str(unit), si_unit)

@@ -478,6 +478,7 @@ def record(
         "parameter_set": device,
         "overrides": list(words),
         "device": plain(outcome.device),
+        "shown": dict(outcome.device.shown),
         "preset": {
             "name": preset.name,
             "title": preset.title,

@@ -164,8 +164,8 @@ def solve_stretch(
         if roots is not None and before is not None:
             now = roots(after, solver.y)
             # Strictly above 0 before: a vane that just came to rest has not done so again.
-            crossed = [place for place in (0, 1) if before[place] > 0.0 >= now[place]]
-            event = min((_root(roots, place, inside, float(solver.t_old), after) for place in crossed), default=None)
+            crossed = [number for number in (0, 1) if before[number] > 0.0 >= now[number]]
+            event = min((_root(roots, number, inside, float(solver.t_old), after) for number in crossed), default=None)
             before = now
         last = after if event is None else event
         while waiting and waiting[0] < last:
@@ -179,11 +179,11 @@ def solve_stretch(
     raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
 
 
-def _root(roots: Distances, place: int, inside: Callable[[float], Floats], start: float, end: float) -> float:
+def _root(roots: Distances, number: int, inside: Callable[[float], Floats], start: float, end: float) -> float:
     """Where a root falls to 0 within a step [s]."""
     from scipy.optimize import brentq
 
-    found: float = brentq(lambda t: roots(t, inside(t))[place], start, end, xtol=1.0e-15, rtol=_WITHIN)
+    found: float = brentq(lambda t: roots(t, inside(t))[number], start, end, xtol=1.0e-15, rtol=_WITHIN)
     return found
 
 

@@ -129,10 +129,30 @@ def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
     They are off the median of five by more than 6 times the noise, and more than 3 times what the four range over.
     """
+    others = np.ptp(_five_around(values)[:, [0, 1, 3, 4]], axis=1)
+    return np.asarray(outlying_samples(values, noise) & (off_neighbours(values) > 3.0 * others))
+
+
+def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
+    """Return which samples of what a model leaves stand out, though one beside them may: ``noise`` as above.
+
+    They are off the median of five by more than 6 times the noise, and more than 3 times what three of the four others
+    range over. An event that a model has at another time leaves a longer course, which is none of them.
+    """
+    others = np.sort(_five_around(values)[:, [0, 1, 3, 4]], axis=1)
+    spread = np.minimum(others[:, 2] - others[:, 0], others[:, 3] - others[:, 1])
+    away = off_neighbours(values)
+    return np.asarray((away > 6.0 * noise) & (away > 3.0 * spread))
+
+
+def off_neighbours(values: Floats) -> Floats:
+    """Return how far each value is off the median of the five around it, its own among them."""
+    return np.asarray(np.abs(values - np.median(_five_around(values), axis=1)))
+
+
+def _five_around(values: Floats) -> Floats:
     # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
-    away = np.abs(values - np.median(around, axis=1))
-    return np.asarray((away > 6.0 * noise) & (away > 3.0 * np.ptp(around[:, [0, 1, 3, 4]], axis=1)))
+    return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
 
 
 _ROUNDING = 1.0e-9

@@ -25,11 +25,11 @@ class Recorded(Protocol):
 
     @property
     def recording(self) -> Recording:
-        """Its channels."""
+        """Channels of the run."""
 
     @property
     def metrics(self) -> "Mapping[str, Metric]":
-        """Its metrics by name."""
+        """Metrics of the run by name."""
 
     def plot(self) -> "Figure":
         """Return its figure."""

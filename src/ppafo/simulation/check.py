@@ -207,11 +207,11 @@ class Ran(Protocol):
 
     @property
     def recording(self) -> Recording:
-        """Its channels."""
+        """Channels of the run."""
 
     @property
     def metrics(self) -> Mapping[str, Any]:
-        """Its metrics by name."""
+        """Metrics of the run by name."""
 
     @property
     def status(self) -> Any:

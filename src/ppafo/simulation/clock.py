@@ -82,7 +82,7 @@ def step_unless_given(duration: Number, period: Number) -> Number:
 
 
 def step_with_output(duration: Number, period: Number, output_interval: Number) -> Number:
-    """The same where the time between two recorded samples [s] is given."""
+    """The largest step [s] of a run whose file has an output interval [s] and no step: no longer than that either."""
     found: Number = smaller(step_unless_given(duration, period), output_interval)
     return found
 

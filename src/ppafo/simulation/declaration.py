@@ -15,6 +15,7 @@ from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS, FIXED_POINT, PROFILES
+from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import quote
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
@@ -129,9 +130,11 @@ def controlled_in(document: Mapping[str, Any]) -> str:
 
 def controller_settings(kind: str, controlled: str = TORQUE) -> tuple[Quantity, ...]:
     """Return the settings of a controller of the catalogue, in units of what it controls; none where it is unknown."""
-    if kind not in CONTROLLERS:
-        return ()
-    law = CONTROLLERS[kind]
+    return law_settings(CONTROLLERS[kind], controlled) if kind in CONTROLLERS else ()
+
+
+def law_settings(law: ControllerKind, controlled: str) -> tuple[Quantity, ...]:
+    """Return the settings of a controller, in units of what it controls."""
     # A law that knows no torque has its settings in units of its own.
     is_of_any = controlled in law.controls and TORQUE in law.controls
     return (

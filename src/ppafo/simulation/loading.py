@@ -70,7 +70,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
-from ppafo.simulation.torque_loop import LEG_PATHS, PERIOD_PATH, loop_terms
+from ppafo.simulation.torque_loop import LEG_PATHS, PERIOD_PATH, loop_terms, seen_in_scenario
 from ppafo.units import format_quantity, split_quantity
 
 _SECTION = "assumed"
@@ -239,9 +239,8 @@ def _control(
     if not any(quantity.follows for quantity in items):
         return Control(kind, reading.section("controller", items), period), {}
     rows = None if lines is None else lines.row(device.supply)
-    terms = nominal_terms(device, rows) | loop_terms(
-        device, CONTROLLERS[kind], walks=False, controlled=controlled, has_leg=leg is not None
-    )
+    seen = seen_in_scenario(controlled, leg is not None)
+    terms = nominal_terms(device, rows) | loop_terms(device, CONTROLLERS[kind], seen, controlled)
     of_sensors = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
     present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
     if leg is not None:

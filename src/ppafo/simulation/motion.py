@@ -32,9 +32,9 @@ from ppafo.simulation.declaration import (
     shank_settings,
     value_at,
 )
-from ppafo.simulation.motion_kind import Clock, Measured, MotionKind, MotionSection, ProfileTable
+from ppafo.simulation.motion_kind import Clock, Measured, MotionKind, MotionSection, ProfileTable, Seen
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.schema import profile_table, shank_table
 
 if TYPE_CHECKING:
@@ -89,6 +89,12 @@ def _clock(scenario: Scenario, times: Mapping[str, Any]) -> "tuple[Clock, tuple[
     return clock(scenario, times)
 
 
+def _sees(scenario: Scenario) -> "Seen":
+    from ppafo.simulation.torque_loop import seen_in_scenario
+
+    return seen_in_scenario(scenario.controlled, vane_motion(scenario).leg is not None)
+
+
 def _lacks(scenario: Scenario, kind: "MetricKind") -> str:
     from ppafo.simulation.ensemble.vane import lacks
 
@@ -130,6 +136,7 @@ FREE_MOTION = MotionKind(
     clock=_clock,
     switches=_switches,
     noise=_noise,
+    sees=_sees,
     lacks=_lacks,
     measured=_measured_free,
     section=MotionSection("the vane moves as the torques demand", FREE, _read_free),

@@ -6,10 +6,10 @@ A kind is loaded when a document or a scenario names it: a vane alone loads no w
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from ppafo.kinds import Kinds, declared_kinds
-from ppafo.model.declaration import Quantity
+from ppafo.model.declaration import PlainFunction, Quantity
 
 if TYPE_CHECKING:
     from ppafo.engine.lanes import Floats
@@ -33,6 +33,18 @@ class Clock:
     period: float
 
 
+class Seen(NamedTuple):
+    """How a law sees what it controls: the row of its signals, how late they are, and the paths that fill the row.
+
+    ``turning`` makes inertia and gravity torque of the row for a law of an angle; None for any other.
+    """
+
+    signals: type
+    late: PlainFunction
+    paths: tuple[str, ...]
+    turning: PlainFunction | None = None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionKind(Generic[ScenarioType]):
     """What a motion brings to the runs of its scenarios, as functions of the scenario.
@@ -41,10 +53,10 @@ class MotionKind(Generic[ScenarioType]):
     other. Any number may be an array (runs,) in both. ``quantities`` declares the numbers of the scenario beside those
     of its device, ``places`` says by path which attributes lead to those that are not where their path says.
     ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
-    ``noise`` is the sum of all levels of noise that its controller receives, ``switches`` are settings that are 0 for
-    all runs of a program or for none. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty
-    text where it has it. ``measured(scenario, run, times, rows)`` gives recording and metrics of rows (samples,) by
-    path, and how a run that was completed ended, in words.
+    ``switches`` are settings that are 0 for all runs of a program or for none, ``noise`` is the sum of all levels of
+    noise that its controller receives, and ``sees`` how that sees what it controls. ``lacks(scenario, metric)`` says
+    why it has not what a metric needs, an empty text where it has it. ``measured(scenario, run, times, rows)`` gives
+    recording and metrics of rows (samples,) by path, and how a run that was completed ended, in words.
 
     ``section`` is what the file of a vane alone has as ``[motion]``, None of a walk, whose file is laid out in another
     way.
@@ -58,6 +70,7 @@ class MotionKind(Generic[ScenarioType]):
     clock: "Callable[[ScenarioType, Mapping[str, Any]], tuple[Clock, tuple[Problem, ...]]]"
     switches: Callable[[ScenarioType], tuple[Any, ...]]
     noise: Callable[[ScenarioType], Any]
+    sees: Callable[[ScenarioType], Seen]
     lacks: "Callable[[ScenarioType, MetricKind], str]"
     measured: "Callable[[ScenarioType, Run, Floats, Mapping[str, Floats]], Measured]"
     section: "MotionSection | None" = None

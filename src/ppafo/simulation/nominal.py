@@ -117,7 +117,7 @@ def dead_volume_1(settings: Any, stops: Range, around: Surroundings) -> float:
 
 
 def dead_volume_2(settings: Any, stops: Range, around: Surroundings) -> float:
-    """The same of chamber 2."""
+    """Dead volume [m^3] of a vane whose chamber 2 is as large in the middle of the range."""
     mean = mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
 

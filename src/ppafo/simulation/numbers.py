@@ -78,13 +78,13 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     numbers of it must be there.
     """
     replaced = {chosen_path(path, scenario): number for path, number in numbers.items()}
-    moved = moving_together(scenario, replaced)
+    moved, changing = moving_together(scenario, replaced), _changing_form(scenario, replaced)
     # All links that are left are the scenario's own, for what is replaced follows nothing any more.
     if replaced:
         device = replace(scenario.device, links={})
-        links = left(in_other_forms(scenario.graph, _changing_form(scenario, replaced)), replaced)
+        links = left(in_other_forms(scenario.graph, changing), replaced)
         scenario = replace(scenario, device=device, links=links)
-    for section in _changing_form(scenario, moved):
+    for section in changing:
         form = other_form(scenario.device, section)
         in_form = {name: moved.pop(f"{section}.{name}") for name in form}
         kind = SonicOrifice if "sonic_conductance" in form else Orifice

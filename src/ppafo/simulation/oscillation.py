@@ -19,7 +19,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import Term
 from ppafo.report.display_units import metric_change
 from ppafo.signals import Recording
-from ppafo.simulation.declaration import controller_settings
+from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
@@ -134,12 +134,11 @@ class Oscillation:
 
 def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]:
     """Return the settings of a law of a scenario, in units of what it controls."""
-    return law.quantities if scenario.walks else controller_settings(scenario.controller.kind, scenario.controlled)
+    return law_settings(law, scenario.controlled)
 
 
 def _terms(scenario: Scenario, law: ControllerKind) -> dict[str, Term]:
-    has_leg = not scenario.walks and getattr(scenario.motion, "leg", None) is not None
-    return loop_terms(scenario.device, law, scenario.walks, scenario.controlled, has_leg)
+    return loop_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
 
 
 def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:

@@ -29,7 +29,7 @@ from ppafo.simulation.scenario import (
 COMMAND, SUPPLY, EXTERNAL_TORQUE = "command", "supply_pressure", "external_torque"
 DORSIFLEXION_SUPPLY = "dorsiflexion_pressure"
 ANGLE = "angle"
-"""As an input, the vane follows it, in straight lines from sample to sample."""
+"""An angle that is an input: the vane follows it, in straight lines from sample to sample."""
 
 LONGEST_STEP = 1.0e-3
 """Seconds over which a recorded pressure or torque is averaged, and the longest step of a replay."""

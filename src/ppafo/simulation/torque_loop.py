@@ -17,12 +17,12 @@ from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import Number
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import Number, PlainFunction
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
+from ppafo.simulation.motion_kind import Seen
 from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
 PERIOD_PATH = "controller.period"
@@ -337,8 +337,26 @@ class LoopFrames(NamedTuple):
     joint: dict[str, PlainFunction]
 
 
-def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: bool) -> LoopFrames:
-    """Return the loops of a device, in a walk or with what is controlled, on a joint with a leg's foot or without.
+_PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
+_ANGLE = (*_PRESSURES, "sensors.delay", "sensors.angle_bandwidth", *_OF_DEVICE)
+IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES)
+"""The torque in a walk."""
+IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"))
+"""A torque or a pressure of a vane alone."""
+
+
+def seen_in_scenario(controlled: str, has_leg: bool) -> Seen:
+    """Return how the law of a vane alone sees what is controlled, on a joint with a leg's foot or without."""
+    if controlled != ANGLE:
+        return IN_SCENARIO
+    if has_leg:
+        paths = (*_ANGLE, *LEG_PATHS)
+        return Seen(signals=OfLeg, late=time_with_angle, paths=paths, turning=turning_with_foot)
+    return Seen(signals=OfJoint, late=time_with_angle, paths=_ANGLE, turning=turning_alone)
+
+
+def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFrames:
+    """Return the loops of a device for a law that sees what is controlled in some way.
 
     With the valve's orifice as a sonic conductance or as an area.
     """
@@ -346,46 +364,38 @@ def _frames(device: Device, walks: bool, controlled: str, has_leg: bool, sonic: 
     chambers = chambers_of(device)
     names = {quantity.name for quantity in valve.quantities}
     timed = {"follow_time": valve.lag or valve.choose(valve_settings(device.valve)).command_delay}
-    is_joint = controlled == ANGLE
-    signals = (OfLeg if has_leg else OfJoint) if is_joint else (SignalsOfWalk if walks else Signals)
     components = {
         "mean_chambers": chambers.function,
         "valve_flow": sonic_flow if sonic else area_flow,
         "time_of_valve": time_of_pair
         if {"opening_delay", "closing_delay", "switching_interval"} <= names
         else bind(time_of_spool, "time_of_spool_valve", timed),
-        "time_of_signals": time_with_angle if is_joint else (time_in_walk if walks else time_in_scenario),
+        "time_of_signals": seen.late,
         **_PER_PRESSURE.get(controlled, {}),
     }
     loop = inner = bind(loop_of, "loop_of_device", components)
     joint: dict[str, PlainFunction] = {}
-    if is_joint:
-        parts = {"mean_chambers": chambers.function, "turning": turning_with_foot if has_leg else turning_alone}
+    if seen.turning is not None:
+        parts = {"mean_chambers": chambers.function, "turning": seen.turning}
         joint = {"joint_of": bind(joint_of, "joint_of_device", parts), "torque_loop_of": inner}
         loop = bind(slow_loop_of, "slow_loop_of_device", joint)
-    late = (PERIOD_PATH, "sensors.pressure_bandwidth", *(() if walks else ("sensors.delay",)))
-    of_joint = ("sensors.angle_bandwidth", *_OF_DEVICE) if is_joint else ()
     sources = (
         *chambers.sources,
         *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
         *(SONIC_PATHS if sonic else AREA_PATHS)[VALVE],
         *(f"valve.{quantity.name}" for quantity in valve.quantities),
-        *late,
-        *of_joint,
-        *(LEG_PATHS if is_joint and has_leg else ()),
+        *seen.paths,
     )
-    rows = (*chambers.rows, FlowNumbers, valve.settings, signals)
+    rows = (*chambers.rows, FlowNumbers, valve.settings, seen.signals)
     return LoopFrames(loop=loop, torque_loop=inner, rows=rows, sources=sources, joint=joint)
 
 
-def loop_terms(
-    device: Device, law: ControllerKind, walks: bool, controlled: str = TORQUE, has_leg: bool = False
-) -> dict[str, Term]:
+def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str = TORQUE) -> dict[str, Term]:
     """Return what the gains of a law follow on a device, by the names of ``control.torque_loop`` and ``angle_loop``.
 
-    ``controlled`` says what the law controls; with a leg the foot of it turns about the joint, too.
+    ``controlled`` says what the law controls, ``seen`` how it sees that.
     """
-    of_area, of_sonic = (_frames(device, walks, controlled, has_leg, sonic) for sonic in (False, True))
+    of_area, of_sonic = (_frames(device, seen, controlled, sonic) for sonic in (False, True))
     names = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
 
     def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> Term:

@@ -94,7 +94,7 @@ _GAPS = ("_FillValue", "missing_value")
 """Attributes of the NetCDF conventions by which the numbers of a file are not those that were recorded."""
 
 _LIMITS = {"valid_range": 2, "valid_min": 1, "valid_max": 1}
-"""Those by which a value outside is none, and how many numbers each has."""
+"""Attributes by which a value outside is none, and how many numbers each has."""
 
 
 def write_netcdf(path: str | Path, recording: Recording, scenario: Mapping[str, Any] | None = None) -> Path:

@@ -299,7 +299,9 @@ def read_trc(path: str | Path) -> MarkerTable:
             # Cells that are not there belong to markers that were not seen.
             cells = [*cells, *[""] * (wanted - len(cells))][:wanted]
             labelled = zip(cells[2:], labels, strict=True)
-            rows.append([_number(cells[1], number, TIME), *(_number(one, number, of, _UNSEEN) for one, of in labelled)])
+            rows.append(
+                [_number(cells[1], number, TIME), *(_number(cell, number, of, _UNSEEN) for cell, of in labelled)]
+            )
         if not rows:
             raise DataError("has no rows")
         values = np.array(rows)

@@ -75,7 +75,7 @@ def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | No
         with file, pq.ParquetFile(file, page_checksum_verification=True) as opened:
             # Counted before memory is taken: a column of one constant takes no room in the file.
             groups = (opened.metadata.row_group(number) for number in range(opened.metadata.num_row_groups))
-            values = sum(group.column(place).num_values for group in groups for place in range(group.num_columns))
+            values = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
             if values > _MAXIMUM_VALUES:
                 raise DataError(f"{name}: has {values:,} values, more than any table of a study")
             lost = [column for column in columns or () if column not in opened.schema_arrow.names]

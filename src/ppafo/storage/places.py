@@ -125,7 +125,7 @@ class DiskFolder:
 
     def free_bytes(self) -> int | None:
         """Return the free space of the disk."""
-        there = next(place for place in (self.folder, *self.folder.parents) if place.exists())
+        there = next(ancestor for ancestor in (self.folder, *self.folder.parents) if ancestor.exists())
         return shutil.disk_usage(there).free
 
     def tidy(self) -> None:

@@ -318,6 +318,8 @@ def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHE
         with refused_as(DataError, run_file, DataError):
             kind = recording_kind(str(described.get("kind", found.kind)))
         return replace(found, label=str(described.get("label", found.label)), kind=kind)
+    if not file.exists():
+        raise DataError(f"{path}: no such file or folder")
     raise DataError(
         f"{path}: is neither a .nc nor a {', '.join(TEXT_SUFFIXES)} file nor a result folder; a table of another "
         "suffix is read through a column map, --columns FILE.toml:NAME"

@@ -58,8 +58,8 @@ def chunk_count(study: Study) -> int:
 def chunk(study: Study, number: int) -> Chunk:
     """Return a chunk by its number."""
     size = chunk_size(study)
-    configuration, place = divmod(number, -(-study.runs_of_configuration // size))
-    first = place * size
+    configuration, index = divmod(number, -(-study.runs_of_configuration // size))
+    first = index * size
     return Chunk(number, configuration, first, min(size, study.runs_of_configuration - first))
 
 
@@ -68,8 +68,8 @@ def drawn_values(study: Study, runs: NDArray[np.int64]) -> dict[str, Floats]:
     point, draw = np.divmod(runs, study.sample.runs)
     columns: dict[str, Floats] = {}
     for axis in reversed(study.axes):
-        point, place = np.divmod(point, len(axis.values))
-        columns[axis.path] = np.asarray(axis.values)[place]
+        point, index = np.divmod(point, len(axis.values))
+        columns[axis.path] = np.asarray(axis.values)[index]
     if study.drawn:
         dimensions = len(study.drawn)
         # Of a small sample all numbers are made and these taken, of a large one only the stretches that are needed.

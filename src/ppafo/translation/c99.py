@@ -183,10 +183,10 @@ class CTerms:
         index = names[first.detail] if names and first.kind == "number" else self.term(first, least)
         if is_local:
             return f"{name}[{index}]{''.join(f'[{self.term(index)}]' for index in further)}"
-        for number, place in enumerate(further, 1):
+        for number, coordinate in enumerate(further, 1):
             # Arrays are one block of memory: the last index runs fastest, and extents are known only at run time.
             before = index if number == 1 else f"({index})"
-            index = f"{before} * {name}.extent[{number}] + {self.term(place, 9)}"
+            index = f"{before} * {name}.extent[{number}] + {self.term(coordinate, 9)}"
         return f"{name}.values[{index}]"
 
     def call(self, term: Term) -> str:
@@ -354,9 +354,9 @@ def c_source(
     # Now all structs have their names, which no local name may hide: what has one is written again.
     names_of_structs = {*writer.names.values(), *(f"make_{name}" for name in writer.names.values())}
     writer.outer |= names_of_structs
-    for place, function in enumerate(functions):
+    for number, function in enumerate(functions):
         if writer.locals[function.name] & names_of_structs:
-            bodies[place] = writer.function(function)
+            bodies[number] = writer.function(function)
     parts = [_PART] if any(f"{PART}(" in body for body in bodies) else []
     structs = [text for kind in writer.structs for text in writer.written_struct(kind)]
     if reading is not None:

@@ -100,11 +100,11 @@ def with_packed_entries(source: str, entries: Entries) -> str:
     for name, types in entries.items():
         arrays = [kind for kind in types if isinstance(kind, Array)]
         numbers = {
-            f"number_{place}": "double" if kind == FLOAT else "int64_t"
-            for place, kind in enumerate(types[len(arrays) :])
+            f"number_{number}": "double" if kind == FLOAT else "int64_t"
+            for number, kind in enumerate(types[len(arrays) :])
         }
         taken = ", ".join(["const ppafo_array *arrays", *(f"{kind} {number}" for number, kind in numbers.items())])
-        packed = ", ".join([*(f"arrays[{place}]" for place in range(len(arrays))), *numbers])
+        packed = ", ".join([*(f"arrays[{number}]" for number in range(len(arrays))), *numbers])
         texts.append(f"void {name}{_PACKED}({taken})\n{{\n    {name}({packed});\n}}\n")
     return "\n".join([*texts, _ROUNDING])
 
@@ -179,7 +179,7 @@ class CCompiler:
         return repr((_file_identity(self.command[0]), self.flags, described_processor(), translator_hash()))
 
     def described(self) -> str:
-        """Its name and version, as it says them."""
+        """Name and version of the compiler, as it says them."""
         from ppafo.translation.compiling import LONGEST_ANSWER, asked  # a run asks no compiler
 
         try:

@@ -150,7 +150,7 @@ def converted(term: Term, kind: Type) -> Term:
             return Term("number", kind, (), float(term.detail) if kind == FLOAT else int(term.detail))
         return Term("convert", kind, (term,))
     assert isinstance(kind, Items | Row)
-    parts = (converted(item_of(term, place), inner) for place, inner in enumerate(types_in(kind)))
+    parts = (converted(item_of(term, index), inner) for index, inner in enumerate(types_in(kind)))
     return Term("build", kind, tuple(parts))
 
 
@@ -159,13 +159,13 @@ def field_of(term: Term, name: str) -> Term:
     row = term.type.row if isinstance(term.type, Shared) else term.type
     assert isinstance(row, Row)
     # A field of a struct that is just made is the value it was made of: no struct need exist.
-    place = [own for own, _ in row.fields].index(name)
-    return term.parts[place] if term.kind == "build" else Term("field", row.fields[place][1], (term,), name)
+    index = [own for own, _ in row.fields].index(name)
+    return term.parts[index] if term.kind == "build" else Term("field", row.fields[index][1], (term,), name)
 
 
-def item_of(term: Term, place: int) -> Term:
+def item_of(term: Term, index: int) -> Term:
     """An item of a row or tuple by its place."""
     if isinstance(term.type, Row):
-        return field_of(term, term.type.fields[place][0])
+        return field_of(term, term.type.fields[index][0])
     assert isinstance(term.type, Items)
-    return term.parts[place] if term.kind == "build" else Term("item", term.type.types[place], (term,), place)
+    return term.parts[index] if term.kind == "build" else Term("item", term.type.types[index], (term,), index)

@@ -149,7 +149,7 @@ class Expressions:
             raise self.refused(node, f"'{ast.unparse(node.value)}' has no items")
         count = len(types_in(owner.type))
         if isinstance(node.slice, ast.Slice):
-            parts = tuple(typed.item_of(owner, place) for place in range(count)[self.part(node.slice)])
+            parts = tuple(typed.item_of(owner, number) for number in range(count)[self.part(node.slice)])
             return Term("build", Items(tuple(part.type for part in parts)), parts)
         index = self.whole(node.slice)
         number = _literal(index)
@@ -179,9 +179,9 @@ class Expressions:
         if len(places) != len(extents):
             raise self.refused(node, f"'{ast.unparse(node)}' does not have {len(extents)} places")
         given = []
-        for at, (place, extent) in enumerate(zip(places, extents, strict=True)):
+        for at, (coordinate, extent) in enumerate(zip(places, extents, strict=True)):
             count = Term("extent", INT, (owner,), at) if extent is None else Term("number", INT, (), extent)
-            given.append(self.from_start(self.whole(place), count))
+            given.append(self.from_start(self.whole(coordinate), count))
         return Term("element", FLOAT, (owner, *given))
 
     def from_start(self, index: Term, count: Term) -> Term:
@@ -652,7 +652,7 @@ class _FunctionWalk:
         self.note_type(counter, INT, node)
         element = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
         taken = self.assign(name, element, node)
-        start, stop = (Term("number", INT, (), place) for place in (places.start, places.stop))
+        start, stop = (Term("number", INT, (), bound) for bound in (places.start, places.stop))
         return self.loop(node, lambda: typed.Count(counter, start, stop, 1, (taken, *self.block(node.body))))
 
     def loop(self, node: ast.For | ast.While, make: Callable[[], Statement]) -> list[Statement]:
@@ -681,15 +681,15 @@ class _FunctionWalk:
     def do_assign(self, node: ast.Assign) -> list[Statement]:
         if len(node.targets) != 1:
             raise self.refused(node, "one value for several names")
-        target, given = node.targets[0], node.value
-        called = given.func if isinstance(given, ast.Call) else None
+        target, right = node.targets[0], node.value
+        called = right.func if isinstance(right, ast.Call) else None
         if isinstance(target, ast.Name) and isinstance(called, ast.Name) and called.id == "empty_rows":
             # A local array, whose shape is a literal.
-            assert isinstance(given, ast.Call)
-            kind = Array(2, tuple(map(ast.literal_eval, given.args)))
-            self.note_type(target.id, kind, given)
+            assert isinstance(right, ast.Call)
+            kind = Array(2, tuple(map(ast.literal_eval, right.args)))
+            self.note_type(target.id, kind, right)
             return [typed.Reserve(target.id, kind)]
-        value = self.values.term(given)
+        value = self.values.term(right)
         return (
             self.assign_items(target, value, node) if isinstance(target, ast.Tuple) else self.put(target, value, node)
         )

@@ -29,6 +29,7 @@ from ppafo.units.quantity import (
     split_number,
     split_quantity,
     to_si,
+    without_exponent,
 )
 from ppafo.units.reference import flow_of, is_volume_flow, with_condition
 from ppafo.units.spelling import split_pressure_kind
@@ -54,4 +55,5 @@ __all__ = [
     "to_si",
     "unit_by_pint",
     "with_condition",
+    "without_exponent",
 ]

@@ -85,6 +85,20 @@ def format_quantity(value: float, unit: str) -> str:
     return f"{repr(float(value)).removesuffix('.0')} {unit}".rstrip()
 
 
+_LARGEST_WITHOUT_EXPONENT = 1.0e6
+
+
+def without_exponent(value: float, form: str) -> str:
+    """Return a number formatted as ``form`` says, in plain digits where that would write thousands with an exponent.
+
+    >>> without_exponent(2641.3, ".3g"), without_exponent(2.0e7, ".3g"), without_exponent(0.12345, ".3g")
+    ('2640', '2e+07', '0.123')
+    """
+    text = f"{value:{form}}"
+    is_long = "e+0" in text and form[-1:] == "g" and abs(value) < _LARGEST_WITHOUT_EXPONENT
+    return f"{float(text):{form.partition('.')[0]}.0f}" if is_long else text
+
+
 def percentage(fraction: float, digits: int) -> str:
     """Return a fraction [-] as a percentage of so many digits, in which hundreds are no powers of ten: ``120 %``."""
     return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"

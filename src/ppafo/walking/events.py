@@ -17,7 +17,7 @@ from ppafo.model import contact as ground
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED, SWING
 from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import from_si
+from ppafo.units import from_si, without_exponent
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 
@@ -215,7 +215,7 @@ def _text(value: float, si_unit: str, atmosphere: float) -> str:
     """Return a value in SI as people write it, with three digits; gauge counts from ``atmosphere`` [Pa absolute]."""
     unit = written_unit(si_unit)
     value = value if abs(value) > _NOTHING else 0.0
-    return f"{from_si(value, unit, si_unit, atmosphere):.3g} {unit}".rstrip()
+    return f"{without_exponent(from_si(value, unit, si_unit, atmosphere), '.3g')} {unit}".rstrip()
 
 
 def event_lines(events: Sequence[SafetyEvent]) -> list[str]:

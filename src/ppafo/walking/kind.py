@@ -1,10 +1,17 @@
 """The walk along a prescribed gait as a kind of motion: shank and loaded foot are led, whatever the device does."""
 
-from ppafo.simulation.motion_kind import WALK, MotionKind
+from ppafo.simulation.motion_kind import WALK, MotionKind, Seen
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.torque_loop import IN_WALK
 from ppafo.walking.contradictions import rules
 from ppafo.walking.motion import PLACES, clock_with, numbers_of_scenario
 from ppafo.walking.planning import noise, plan_walks, switches
 from ppafo.walking.result import lacks, measured
+
+
+def _sees(_scenario: Scenario) -> Seen:
+    return IN_WALK
+
 
 WALK_KIND = MotionKind(
     name=WALK,
@@ -15,6 +22,7 @@ WALK_KIND = MotionKind(
     clock=clock_with,
     switches=switches,
     noise=noise,
+    sees=_sees,
     lacks=lacks,
     measured=measured,
 )

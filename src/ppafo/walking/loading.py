@@ -48,7 +48,7 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.simulation.torque_loop import PERIOD_PATH, loop_terms
+from ppafo.simulation.torque_loop import IN_WALK, PERIOD_PATH, loop_terms
 from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
@@ -96,7 +96,9 @@ def list_walks() -> tuple[str, ...]:
 
 def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None:
     """Raise ScenarioError for a duration that an override sets beside ``minutes``."""
-    if minutes is not None and any(split_override(one, ScenarioError)[0] == "run.duration" for one in overrides):
+    if minutes is not None and any(
+        split_override(override, ScenarioError)[0] == "run.duration" for override in overrides
+    ):
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
 
@@ -283,7 +285,7 @@ def _control(
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
     if rate is not None:
         seconds = 1.0 / reading.number("controller.rate", RATE)
-    terms = _terms(device.valve) | nominal_terms(device, lines) | loop_terms(device, law, walks=True)
+    terms = _terms(device.valve) | nominal_terms(device, lines) | loop_terms(device, law, IN_WALK)
     present = numbers_of_sensors(sensors) | numbers_of_lines(lines) | {PERIOD_PATH: seconds}
     sections = {"controller": law.quantities, "timing": timing.quantities}
     found, links = read_followers(reading, sections, terms, device, present)

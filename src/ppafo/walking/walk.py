@@ -186,7 +186,7 @@ def compare_walks(
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
-    """The same wearer and device with both chambers vented; no gas flows, so no bottle and no lines are needed."""
+    """A walk of this wearer and device with both chambers vented: no gas flows, no bottle and no lines are needed."""
     name = f"{configuration.name}-off"
     control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
@@ -206,7 +206,7 @@ _NO_CHAMBER = 1.0e-3
 
 
 def without_device(configuration: Scenario) -> Scenario:
-    """The same wearer without a device: no plate, torque or friction, and the ankle's own range of motion.
+    """A walk of this wearer without a device: no plate, torque or friction, the ankle's own range of motion.
 
     It is one walk for every device and valve; what fails of a device is gone with it.
     """

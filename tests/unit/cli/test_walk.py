@@ -173,7 +173,7 @@ def test_a_stop_is_told_with_its_sign_readings_settings_and_time(
     lines = capsys.readouterr().out.splitlines()
     told = next(line for line in lines if line.startswith("stopped"))
     assert told.startswith("stopped for good at 6.30 s: implausible foot force; heel ")
-    assert told.endswith(" N, toe 9e+03 N; lowest_force -40 N, largest_force 3e+03 N")
+    assert told.endswith(" N, toe 9000 N; lowest_force -40 N, largest_force 3000 N")
     assert "help in 5 of 7 strides" in lines
     assert "implausible foot force" in (tmp_path / "walk/report.html").read_text()
     document = json.loads((tmp_path / "walk" / "walk.json").read_text())

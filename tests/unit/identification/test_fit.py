@@ -234,3 +234,24 @@ def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_en
 
     assert found.high[0] == pytest.approx(2.0 * math.exp(1.96 * 0.8), rel=0.1)
     assert found.low[0] <= 2.0 * math.exp(-1.96 * 0.8)
+
+
+def test_samples_that_stand_out_are_left_out_of_a_motion_and_the_others_say_what_they_said() -> None:
+    generator = np.random.default_rng(4)
+    clean = _law(*(np.array([one]) for one in _TRUTH.values()))[:, 0]
+    measured = clean + 0.02 * generator.normal(size=clean.size)
+    wrong = np.array([20, 21, 700])
+    bad = measured.copy()
+    bad[wrong] += 0.02 * np.array([40.0, -50.0, 60.0])
+
+    right, found = (
+        fit(lambda points, own=own: own[:, None] - _law(*points), _NUMBERS, _BLOCKS, is_motion=True)
+        for own in (measured, bad)
+    )
+
+    assert right.outliers == ()
+    assert found.outliers == tuple(wrong.tolist())
+    for channel, size in right.noise.items():
+        assert found.noise[channel] == pytest.approx(size, rel=0.02)
+    errors = np.sqrt(np.diag(right.covariance))
+    assert np.all(np.abs(found.values - right.values) < 0.3 * errors)

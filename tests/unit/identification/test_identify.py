@@ -422,3 +422,15 @@ def test_a_set_states_the_half_width_for_its_own_confidence() -> None:
     # With three digits, as many as the value then has behind its point.
     assert entry.uncertainty == round(0.1 * entry.value * 1.959964 / 2.575829, 3)
     assert "99% interval" in entry.note
+
+
+def test_a_tolerance_that_is_anew_in_each_recording_but_common_in_a_procedure_is_said(
+    solved: Solve, bench: Path
+) -> None:
+    write_csv(bench / "again.csv", planted.flow(seed=5).recording)
+    two = FLOW.replace('["flow.csv"]', '["flow.csv", "again.csv"]')
+
+    remarks = solved(f"bench.each_recording = ['gain']\n{two}").results[0].remarks
+
+    assert any("bench.each_recording: 'gain' acts in a [trajectory]" in one for one in remarks)
+    assert solved(two).results[0].remarks == ()

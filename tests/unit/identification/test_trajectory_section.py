@@ -181,6 +181,7 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     assert smaller < error
     assert abs(fitted - stated) < 2.0 * error
     assert "g m^2" in text
+    assert re.search(r"\b\d+ other tolerances do not affect the intervals", text)
     assert "next experiment 1: slow: gain" in text
 
 

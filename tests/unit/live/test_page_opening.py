@@ -17,6 +17,8 @@ from ppafo.page.words import words
 from ppafo.page.workbench import DEFAULT, openings_of, workbench
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.report.style import PAGE_COLOURS
+from ppafo.simulation.loading import list_scenarios
+from ppafo.walking import list_walks
 from ppafo.walking.bottle import Schedule
 from scripts.live_page import missing, opened
 from scripts.page_tables import FLOWS
@@ -32,14 +34,16 @@ def _opening() -> dict[str, Any]:
     return found
 
 
-def test_what_the_package_keeps_of_a_scenario_is_what_its_program_gives() -> None:
+# Runs of the last fail at both ends of a setting.
+@pytest.mark.parametrize("name", ["torque-task-proportional", "swing-foot-angle"])
+def test_what_the_package_keeps_of_a_scenario_is_what_its_program_gives(name: str) -> None:
     """Else run ``python scripts/page_tables.py``."""
-    name = "torque-task-proportional"
     assert openings_of([name])[name] == _opening()[name]
 
 
 def test_what_the_package_keeps_is_of_the_files_that_it_has(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else pages of these compile and run a model first: run ``python scripts/page_tables.py``."""
+    assert list(_opening()) == [*list_scenarios(), *list_walks()]
     monkeypatch.setattr(workbench_module, "computed_opening", lambda _, *made_from: _key(*made_from))
     assert openings_of(_opening()) == {name: one["key"] for name, one in _opening().items()}
 

@@ -9,6 +9,7 @@ import pytest
 import ppafo
 from ppafo.analyses.stored_figures import draw_folder, names_in
 from ppafo.parameters.parameter_set import written_units
+from ppafo.rig.experiments import record, write_rig_recording
 
 PSI = 6894.757293168361
 TASK, SHORT = "torque-task-proportional", "run.duration=0.4 s"
@@ -100,7 +101,38 @@ def test_results_of_a_study_are_in_the_units_of_its_set_when_they_are_read_again
         ppafo.load_study_results(tmp_path / "study")
 
 
-def test_the_audit_has_the_pressures_of_the_set(in_bar: str) -> None:
-    text = str(ppafo.audit(in_bar))
-    assert "N m/bar" in text
+def test_the_audit_has_pressures_and_torques_as_the_set(in_bar: str) -> None:
+    text = "\n".join(f"{finding.title} {finding.paragraph}" for finding in ppafo.audit(in_bar))
+    assert "N cm/bar" in text
+    assert "the supply allows at most 550 N cm" in text
     assert "psi" not in text
+    assert not re.search(r"[0-9] N m\b(?! s)", text)
+
+
+def test_a_bottle_has_the_units_of_what_takes_its_gas_else_its_own(in_bar: str, tmp_path: Path) -> None:
+    run = ppafo.simulate(TASK, overrides=[f"device.set={in_bar}", SHORT]).save(tmp_path / "run")
+    assert re.search(r"pressure at the end +\d\.\d\d bar_g", str(ppafo.bottle(run)))
+    assert "pressure at the end              64.4 psi_g" in str(ppafo.bottle(gas_per_stride="0.3 g"))
+    assert any("(bar gauge)" in label for label in linear_axes(ppafo.bottle(run)))
+
+
+def test_recordings_of_the_simulated_bench_are_drawn_in_the_units_of_the_set(in_bar: str, tmp_path: Path) -> None:
+    write_rig_recording(tmp_path / "rig", record("static-torque", device=in_bar))
+    figure = draw_folder(tmp_path / "rig", names_in(tmp_path / "rig"))["static-torque"]
+    titles = [axes.get_title(loc="left") for axes in figure.axes]
+    assert titles == ["Pressure in chamber 1 less chamber 2 (bar)", "Actuator torque (N cm)"]
+
+
+def test_a_size_is_drawn_within_the_axes_whatever_the_unit(in_bar: str, tmp_path: Path) -> None:
+    file = tmp_path / "push.toml"
+    text = resources.files("ppafo.analyses.design.library").joinpath("push-off.toml").read_text(encoding="utf-8")
+    text = re.sub(r'scenario = "(.*?)".*', rf'scenario = "\1"\noverrides = ["device.set={in_bar}"]', text)
+    text = re.sub(r"valves = \[.*?\]", 'valves = ["enfield-ls-v05s"]', text, flags=re.DOTALL)
+    file.write_text(text, encoding="utf-8")
+    design = ppafo.design(file)
+    errors = design.plot("profile").axes[0]
+    drawn = [line.get_ydata() for line in errors.lines if len(line.get_ydata()) > 2]
+    assert drawn
+    assert min(errors.get_ylim()) <= min(drawn[0]) <= max(errors.get_ylim())
+    labels = [entry.get_text() for entry in design.plot("torque").axes[0].get_legend().get_texts()]
+    assert re.search(r"at \d\.\d+ bar gauge", " ".join(labels))

@@ -234,8 +234,10 @@ def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_pat
 
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
-    for place in (tmp_path / "a.xlsx", tmp_path / "nothing"):
-        with pytest.raises(DataError, match=r"is neither a \.nc nor a \.csv, .* file nor a result folder"):
-            read_recording(place)
+    (tmp_path / "a.xlsx").write_bytes(b"")
+    with pytest.raises(DataError, match=r"is neither a \.nc nor a \.csv, .* file nor a result folder"):
+        read_recording(tmp_path / "a.xlsx")
+    with pytest.raises(DataError, match=r"nothing: no such file or folder"):
+        read_recording(tmp_path / "nothing")
     with pytest.raises(DataError, match=r"contains no result of a walk or a simulation"):
         read_recording(tmp_path)

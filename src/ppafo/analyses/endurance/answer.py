@@ -1,7 +1,7 @@
 """How long a bottle lasts and why it ends, its values with their sources; several gas uses side by side."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from typing import Any
 
@@ -17,12 +17,13 @@ from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.units import format_quantity
+from ppafo.units import format_quantity, split_pressure_kind
+from ppafo.units.shown import in_units
 from ppafo.version import __version__
 from ppafo.walking.bottle import Schedule, minutes_text, strides_text
 
 _MASS, _FLOW = Kind("Left in the bottle", "kg", "gas mass", ".3g"), Kind("", "kg/s", "mass flow", ".3g")
-_DURATION, _PRESSURE = Kind("Time", "s", "duration"), Kind("Pressure in the bottle", "Pa_a", "pressure", ".0f")
+_DURATION, _PRESSURE = Kind("Time", "s", "duration"), Kind("Pressure in the bottle", "Pa_a", "pressure", ".3g")
 _WARMTH = Kind("Temperature of the bottle", "K", "temperature", ".1f")
 
 
@@ -32,7 +33,8 @@ class Endurance:
 
     ``discharge`` is the requested course. ``strides_when_warm`` is the number of strides that a bottle which stays at
     room temperature gives: what cooling costs. ``is_of_task_sequence`` is true where a stride is a task sequence,
-    ``is_of_recording`` where it is a whole recording, walked or not.
+    ``is_of_recording`` where it is a whole recording, walked or not. ``device_units`` are the units of the device that
+    takes the gas, by unit in SI, where it is known.
     """
 
     bottle: Bottle
@@ -42,6 +44,13 @@ class Endurance:
     strides_when_warm: float
     is_of_task_sequence: bool = False
     is_of_recording: bool = False
+    device_units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """Units in which this is said and drawn, by unit in SI: those of the device, else of the bottle's file."""
+        unit, kind = split_pressure_kind(self.bottle.entries["regulator.set_pressure"].unit)
+        return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d", **self.device_units}
 
     def json_document(self) -> dict[str, Any]:
         """Return the course, its ending and the bottle as plain data in SI."""
@@ -95,6 +104,7 @@ _LEFT_OUT = (
 _CAPTION = "Temperature, pressure and gas in the bottle from full to the end."
 
 
+@in_units(lambda endurance: endurance.shown)
 def finding_of(endurance: Endurance) -> Finding[Endurance]:
     """Return how long the bottle lasts for one gas use, in words, tables and panels."""
     values = [
@@ -133,6 +143,7 @@ def finding_of(endurance: Endurance) -> Finding[Endurance]:
     )
 
 
+@in_units(lambda several: next(iter(several.uses.values())).shown)
 def finding_of_several(several: Endurances) -> Finding[Endurances]:
     """Return how long the bottle lasts for several gas uses, side by side."""
     are_strides = all(_counted(use) == "stride" for use in several.uses.values())

@@ -67,8 +67,9 @@ def bottle(
     from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
+    from ppafo.report.recording_figure import stated_units
     from ppafo.signals import Recording
-    from ppafo.storage.result_folder import read_recording
+    from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
     from ppafo.walking import WalkResult
     from ppafo.walking.bottle import Schedule
 
@@ -100,8 +101,10 @@ def bottle(
             full = load_bottle(named, changed)
             recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
             life = follow_bottle(full, draw_of_recording(recording, stride_time), schedule)
+            run = Path(str(use)) / RUN_FILE
+            units = stated_units(run, read_json(run)) if not isinstance(use, Recording) and run.is_file() else {}
             # Whoever says how long a stride takes recorded strides; else the recording is what repeats.
-            found[name] = replace(life, is_of_recording=stride_time is None)
+            found[name] = replace(life, is_of_recording=stride_time is None, device_units=units)
             continue
         if stride_time is not None:
             stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"

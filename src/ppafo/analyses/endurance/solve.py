@@ -72,6 +72,7 @@ def endurance_of_walk_gas(
         discharge=discharge_of_life(life, taken),
         strides_when_warm=usable / taken.mass_per_stride,
         is_of_task_sequence=bool(gas.task_sequence),
+        device_units=gas.scenario.device.shown,
     )
 
 

@@ -185,5 +185,12 @@ def _panel(outcome: Outcome) -> Panel:
         for row, ends in enumerate(outcome.stretches)
     ]
     if outcome.value is not None:
-        marks.append(Mark("at", outcome.value, label=f"found: {kind.text(outcome.value, '.4g')}", colour=VERMILION))
+        marks.append(
+            Mark(
+                "at",
+                outcome.value,
+                label=f"found: {kind.number(outcome.value, '.4g')} {kind.axis_unit}".rstrip(),
+                colour=VERMILION,
+            )
+        )
     return Panel(kind, of_metric(outcome.condition.metric), tuple(marks))

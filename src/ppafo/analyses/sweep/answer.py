@@ -217,7 +217,9 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
 
 def _figure(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:
     """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
-    metrics = list(results.document["metrics"])[:MOST_METRICS]
+    # A metric that no run has would be a hole in the figure, unless no metric has a value.
+    wanted = list(results.document["metrics"])
+    metrics = ([metric for metric in wanted if _has_values(results, metric)] or wanted)[:MOST_METRICS]
     bands = list(results.document["study"]["outputs"].get("bands", ()))
     # As many configurations as colours that can be told apart; a seed is no axis, since its size says nothing.
     names = results.configurations[:MOST_CONFIGURATIONS]
@@ -254,7 +256,9 @@ def _grid(results: StudyResults) -> list[str]:
 
 def _panels(results: StudyResults) -> list[Panel]:
     """Return a panel for each metric, of each configuration where it is a map, and one for each band."""
-    metrics = list(results.document["metrics"])[:MOST_METRICS]
+    # A metric that no run has would be a hole in the figure, unless no metric has a value.
+    wanted = list(results.document["metrics"])
+    metrics = ([metric for metric in wanted if _has_values(results, metric)] or wanted)[:MOST_METRICS]
     bands = list(results.document["study"]["outputs"].get("bands", ()))
     names = results.configurations[:MOST_CONFIGURATIONS]
     device, grid = [path for path in results.varied if path != NOISE], _grid(results)
@@ -271,6 +275,10 @@ def _panels(results: StudyResults) -> list[Panel]:
     # The first panel with curves names the configurations for all.
     named = next((panel for panel in drawn if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
     return [replace(panel, legend="inside" if panel is named else "") for panel in drawn]
+
+
+def _has_values(results: StudyResults, metric: str) -> bool:
+    return any(bool(np.isfinite(values).any()) for values in results.thin(metric, MAXIMUM_DRAWN).values())
 
 
 def _kind(results: StudyResults, path: str) -> Kind:

@@ -76,7 +76,7 @@ class LearntStride(NamedTuple):
 
 
 class Window(NamedTuple):
-    """The same readings at the last knots, the latest one last, and how far estimates had moved the clock [turns]."""
+    """Angle and forces at the last knots, the latest one last, and how far estimates had moved the clock [turns]."""
 
     angle: Annotated[tuple[float, ...], WINDOW]
     heel_force: Annotated[tuple[float, ...], WINDOW]

@@ -63,8 +63,8 @@ def _compile_and_keep(kept: Path, wanted: Wanted) -> ModuleType:
             module = wanted.compile(path)
         (aside / SECONDS_FILE).write_text(f"{time.perf_counter() - start:.2f}", encoding="ascii")
         (aside / CHECKSUMS).write_text(json.dumps(_checksums(aside), indent=2), encoding="utf-8")
-        for place in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
-            place.chmod(0o700 if place.is_dir() else 0o600)
+        for entry in aside.rglob("*"):  # compilers let a group write where the user's habits (umask) do
+            entry.chmod(0o700 if entry.is_dir() else 0o600)
         with contextlib.suppress(OSError):  # another process was quicker, with the same program
             aside.rename(kept)
         evict(kept.parent)

@@ -123,7 +123,7 @@ NEARLY_EQUAL = 1.0e-4
 def steeper_transport(
     thermal: ThermalParameters, flow: float, turns: float, root_from: float, root_to: float
 ) -> Transport:
-    """As ``transport``; where a flow [kg/s] is below the one at which it may turn, of the side that carries more.
+    """What a flow [kg/s] carries; of the side that carries more, where it is below the one at which it may turn.
 
     Cold gas that leaves a settled chamber would turn into warm gas that enters, more of it than the matrix knows: a
     matrix that is too steep damps that, one that is too flat makes it grow from step to step.

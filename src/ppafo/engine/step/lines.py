@@ -30,7 +30,7 @@ def source(parts: Program, lane: Lane) -> PlantParameters:
 
 
 def source_ahead(parts: Program, lane: Lane) -> PlantParameters:
-    """The same after the first stage."""
+    """The plant at the pressures of its lines after the first stage."""
     return supply_lines.plant_at_line_pressures(lane.plant, lane.lines, after_first(parts, lane))
 
 

@@ -60,7 +60,7 @@ FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resoluti
 
 def following_text(settings: Sequence[Setting], links: Graph, collector: SourceCollector, boundary: Boundary) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
-    places = {setting.path: place for place, setting in enumerate(settings)}
+    places = {setting.path: index for index, setting in enumerate(settings)}
 
     def cell(array: str, path: str) -> str:
         return boundary.cell(array, places[path], c_identifier(path))

@@ -23,10 +23,9 @@ from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
 from ppafo.metrics.metric import ReadAt, Readings
-from ppafo.metrics.readable import ThermalTotals, Totals, real_totals, thermal_totals, totals
+from ppafo.metrics.readable import totals_kind
 from ppafo.model.columns import over_runs
 from ppafo.model.one_run import FOR_ONE_RUN
-from ppafo.model.plain_function import PlainFunction
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
 
 
@@ -257,7 +256,7 @@ def _enumeration(said: str, names: Sequence[str], first: int = 0) -> str:
 def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str]) -> str:
     if not isinstance(read, ReadAt):
         return f"{add(read)}(readings)"
-    numbers = ", ".join(f"readings.{place}" for place in read.places)
+    numbers = ", ".join(f"readings.{path}" for path in read.places)
     return numbers if read.function is None else f"{add(read.function)}({numbers})"
 
 
@@ -265,31 +264,26 @@ def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundar
     """The metrics of a run, from its first and its last states."""
     program, groups = exported.program, exported.program.state_rows()
     names = [kind.name for kind in program.meters]
-    kind: Any = ThermalTotals if program.is_thermal else Totals
-    make: PlainFunction = thermal_totals if program.is_thermal else totals
-    if program.has_true_masses and not program.is_thermal:
-        # Totals of a gas that is not ideal count true masses.
-        make = real_totals
-    further = ", plant, thermal" if program.is_thermal else ""
+    kind = totals_kind(program)
     parameters = program.parameter_rows()
     groups_taken = ("plant", *program.gas.PARAMETERS, *(effect.name for effect in program.effects))
     lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in groups_taken]
     lines += [f"{name} = {boundary.taken('states', name, groups, collector.add)}" for name in program.effect_states]
     add = collector.add
     for array in ("first", "states"):
-        state = boundary.taken(array, "state", groups, collector.add)
-        masses = f", {boundary.taken(array, 'masses', groups, collector.add)}" if program.has_true_masses else ""
+        states = [boundary.taken(array, group, groups, add) for group in ("state", *kind.states)]
         # Before and after: metrics are what a run added to its totals.
-        lines.append(f"{array}_total = {add(make)}({state}{masses}{further})")
+        lines.append(f"{array}_total = {add(kind.function)}({', '.join((*states, *kind.parameters))})")
     # What a run gained: metrics need differences, since a state may begin with gas in it.
-    gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind._fields)
+    gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind.row._fields)
     meters = ", ".join(
         f"{name}={boundary.taken('states', group, groups, collector.add)}"
         for name, group in zip(names, program.meter_groups, strict=True)
     )
     course = boundary.taken("states", "course", groups, collector.add)
     lines += [
-        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, gains={add(kind)}({gains}))",
+        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, "
+        f"gains={add(kind.row)}({gains}))",
         *(
             f"{boundary.cell('found', index, metric.name)} = {_read_expression(metric.read, add)}"
             for index, metric in enumerate(exported.metrics)

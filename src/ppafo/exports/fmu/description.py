@@ -95,18 +95,18 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
     return (
         *variables,
         *(
-            Variable(name, len(library.settings) + place, *OUTPUTS[name], "output", variability_of(name))
-            for place, name in enumerate(library.program.outputs)
+            Variable(name, len(library.settings) + index, *OUTPUTS[name], "output", variability_of(name))
+            for index, name in enumerate(library.program.outputs)
             if name in interface.outputs
         ),
         *(
-            Variable(f"metrics.{kind.name}", first_metric + place, kind.unit, kind.summary, "local", "continuous")
-            for place, kind in enumerate(library.program.metrics if interface.shows_metrics else ())
+            Variable(f"metrics.{kind.name}", first_metric + index, kind.unit, kind.summary, "local", "continuous")
+            for index, kind in enumerate(library.program.metrics if interface.shows_metrics else ())
         ),
         *(
             Variable(
                 variable.name,
-                first_input + place,
+                first_input + index,
                 variable.unit,
                 variable.summary,
                 "input",
@@ -115,7 +115,7 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
                 variable.minimum,
                 variable.maximum,
             )
-            for place, variable in enumerate(interface.inputs)
+            for index, variable in enumerate(interface.inputs)
         ),
     )
 
@@ -165,7 +165,7 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
     _add_units_and_experiment(root, interface, variables)
     table = Xml.SubElement(root, "ModelVariables")
     # FMI 2 counts variables by their place in the list, from 1.
-    places = {variable.number: place for place, variable in enumerate(variables, start=1)}
+    places = {variable.number: index for index, variable in enumerate(variables, start=1)}
     for variable in variables:
         of_variable, of_number = _attributes(variable)
         Xml.SubElement(Xml.SubElement(table, "ScalarVariable", of_variable), "Real", of_number)
@@ -174,8 +174,8 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
     # Outputs of a step depend on no input of that instant.
     for name, known in (("Outputs", {"dependencies": ""}), ("InitialUnknowns", {})):
         section = Xml.SubElement(structure, name) if outputs else structure
-        for place in outputs:
-            Xml.SubElement(section, "Unknown", {"index": str(place), **known})
+        for index in outputs:
+            Xml.SubElement(section, "Unknown", {"index": str(index), **known})
     return _text(root)
 
 

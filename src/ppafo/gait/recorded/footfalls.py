@@ -137,7 +137,7 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
                 "is no toe-off to be found in it; give a vertical force, or correct the sign of the shank angle"
             )
         off = middle + int(np.argmin(rate[middle:lowest]))
-        strides.append(Stride(*(float(smooth.time[place]) for place in (first, off, last))))
+        strides.append(Stride(*(float(smooth.time[sample]) for sample in (first, off, last))))
     return strides
 
 
@@ -252,18 +252,18 @@ def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: b
     """
     start, end = span
     count = max(2, round(period * signal.rate))
-    one = start + period * np.arange(count) / count
-    values, later = (np.interp(one + shift, signal.time, signal.values) for shift in (0.0, period))
+    instants = start + period * np.arange(count) / count
+    values, later = (np.interp(instants + shift, signal.time, signal.values) for shift in (0.0, period))
     overlap = min(end, float(signal.time[-1])) - start - period
-    inside = one <= start + max(overlap, 0.0)
+    inside = instants <= start + max(overlap, 0.0)
     # A position goes on by the distance walked in a cycle.
     way = float(np.mean((later - values)[inside])) if signal.is_position else 0.0
-    weight = np.clip((one - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
+    weight = np.clip((instants - start) / overlap, 0.0, 1.0) if overlap > 0.0 else np.ones(count)
     blend = weight * values + (1.0 - weight) * (later - way)
     if is_load:
         blend = np.where(np.abs(later) > np.abs(values), later, values)
     turns = np.arange(3)
-    time = (turns[:, None] * period + one[None, :]).ravel()
+    time = (turns[:, None] * period + instants[None, :]).ravel()
     whole = (turns[:, None] * way + np.where(inside, blend, values)[None, :]).ravel()
     return replace(signal, time=time, values=np.asarray(whole, dtype=np.float64), columns=(), absent=None)
 

@@ -43,9 +43,9 @@ def _parts(name: str) -> tuple[str, str]:
 def _words(name: str) -> tuple[list[str], str]:
     """Return the words of a name without its side, and r or l where it says one."""
     words: list[str] = re.findall(r"[a-z]+|\d+", name.lower())
-    for place, word in enumerate(words):
+    for index, word in enumerate(words):
         if word in ("r", "right", "l", "left"):
-            return [*words[:place], *words[place + 1 :]], word[0]
+            return [*words[:index], *words[index + 1 :]], word[0]
     if _PLUG_IN.fullmatch(name):
         return [words[0][1:], *words[1:]], words[0][0]
     return words, ""

@@ -1,7 +1,7 @@
 """The trajectory fit: runs as residuals of the one estimator, and what comes of it as values of the device."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as estimate
+from ppafo.identification.residuals import Block
 from ppafo.identification.trajectory.problem import (
     ZERO_OF,
     Number,
@@ -83,7 +84,7 @@ class TrajectoryFit:
     ``covariance`` [SI] and ``correlation`` are in the order of ``estimates``. ``models`` are the fitted runs at the
     times of the samples, ``measurements`` the samples, both by experiment over the time of the run. ``conflict`` says
     which recordings or channels alone give other values than all together, empty where they agree; ``remarks`` are
-    sentences about the fit as a whole.
+    sentences about the fit as a whole, ``outliers`` about samples that were left out.
     """
 
     problem: TrajectoryProblem
@@ -99,6 +100,7 @@ class TrajectoryFit:
     scenarios: tuple[Scenario, ...]
     conflict: str
     remarks: tuple[str, ...]
+    outliers: tuple[str, ...] = ()
 
     def estimate(self, name: str) -> Estimate:
         """Return the estimate of a number by its path; ``valve.area`` means the valve of the first experiment.
@@ -135,10 +137,11 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         for experiment in problem.experiments
     )
     report(Progress(f"trajectory fit: {len(free)} numbers, {len(prepared)} recordings"))
+    blocks = blocks_of(prepared, numbers, start)
     fitted = estimate(
         lambda points: residuals_of(prepared, numbers, points),
         free,
-        blocks_of(prepared, numbers, start),
+        blocks,
         problem.confidence,
         report,
         is_motion=True,
@@ -185,7 +188,18 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         scenarios=scenarios,
         conflict=conflict,
         remarks=tuple(remarks),
+        outliers=tuple(_left_out(fitted, blocks, {one.label: one.time for one in prepared})),
     )
+
+
+def _left_out(fitted: Fit, blocks: Sequence[Block], times: Mapping[str, Floats]) -> Iterator[str]:
+    """Return what is said of the outliers of each channel of each recording; ``times`` [s] are those of the samples."""
+    for one in blocks:
+        own = [row - one.rows.start for row in fitted.outliers if one.rows.start <= row < one.rows.stop]
+        if own:
+            count, first = ("1 sample" if len(own) == 1 else f"{len(own)} samples"), times[one.recording][own[0]]
+            verb = "stands out by itself and was" if len(own) == 1 else "stand out by themselves and were"
+            yield f"experiment '{one.recording}': {count} of {one.channel}, at {first:.6g} s first, {verb} left out"
 
 
 def _start_of(item: Estimate) -> str:

@@ -370,7 +370,7 @@ def solve_section(section: TrajectorySection, setting: Setting, report: Report) 
             raise
         raise type(error)(f"{setting.file}: {error}") from error
     sources = tuple(Source(item.recording, item.source) for item in problem.experiments)
-    remarks = [*told_of_readings(sources), *found.remarks]
+    remarks = [*told_of_readings(sources), *found.outliers, *found.remarks]
     for fitted in found.estimates:
         other = setting.bench.get(fitted.path)
         if other is None or not (other.is_usable and fitted.is_usable):

@@ -140,7 +140,7 @@ def rates(valve: RecyclingSolenoid, state: RecyclingState, command: float) -> Re
 
 
 class RecyclingSettings(NamedTuple):
-    """Those of the pair, and for how long the chambers are joined and chamber 2 keeps its gas."""
+    """Delays of the pair, and for how long the chambers are joined and chamber 2 keeps its gas."""
 
     opening_delay: solenoid.OpeningDelay
     closing_delay: solenoid.ClosingDelay

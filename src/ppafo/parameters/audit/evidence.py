@@ -134,6 +134,13 @@ class Evidence:
             return f"{converted:.4g} {entry.unit if entry else ''}".rstrip()
         return f"{value:.4g} {quantity.unit.removesuffix('_a')}".rstrip()
 
+    def torque(self, value: float, form: str = ".3g") -> str:
+        """Return a torque [N m] as text in the unit in which the set writes torques, for example ``550 N cm``."""
+        unit = self.parameter_set.shown.get("N m", "N m")
+        number = f"{from_si(value, unit, 'N m'):{form}}"
+        # A form that keeps zeros makes "550." of 550.
+        return f"{number.removesuffix('.')} {unit}"
+
     def values_of(self, *paths: str) -> tuple[NamedValue, ...]:
         """Return the values at those paths that the set has, as they were given."""
         numbers, texts = self.parameter_set.numbers, self.parameter_set.texts

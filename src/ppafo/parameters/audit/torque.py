@@ -132,18 +132,18 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
     # Torque constants are quoted per psi in the field, or per bar where the set has bar.
     unit = evidence.parameter_set.shown.get("Pa_d", "psi_d")
-    per_unit = constant * to_si(1.0, unit, "Pa_d")
+    per_unit = evidence.torque(constant * to_si(1.0, unit, "Pa_d"), "#.3g")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
-    held = (f"{ceilings[path]:#.3g} N m at {pressures[path]} ({path})" for path in supplies)
+    held = (f"{evidence.torque(ceilings[path], '#.3g')} at {pressures[path]} ({path})" for path in supplies)
     yield Finding(
         id="torque-ceiling",
         severity=severity,
-        title=f"the supply allows at most {max(ceilings.values()):#.3g} N m",
+        title=f"the supply allows at most {evidence.torque(max(ceilings.values()), '#.3g')}",
         values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
         sides=tuple(Side(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
         paragraph=(
-            f"The torque constant is {per_unit:#.3g} N m/{unit.removesuffix('_d')}. With one chamber at supply "
-            f"and the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
+            f"The torque constant is {per_unit}/{unit.removesuffix('_d')}. With one chamber at supply and "
+            f"the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
         ),
     )
 
@@ -153,12 +153,12 @@ def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Sever
     unit = evidence.parameter_set.shown.get("Pa_d", "kPa_d")
     if static is not None and static >= ceiling:
         needed = f"{from_si(static / constant, unit, 'Pa_d'):.4g} {unit}"
-        return "error", f" Static friction of {static:.3g} N m is more: the vane cannot move below {needed}."
+        return "error", f" Static friction of {evidence.torque(static)} is more: the vane cannot move below {needed}."
     if demand is not None and demand > ceiling:
         needed = f"{from_si(demand / constant, unit, 'Pa_d'):.4g} {unit.removesuffix('_d')}_g"
         return "warning", (
-            f" The requested {demand:.3g} N m lie above it, so that every valve and controller keeps an error of "
-            f"{demand - ceiling:.3g} N m; it would take {needed} of supply, or a smaller request."
+            f" The requested {evidence.torque(demand)} lie above it, so that every valve and controller keeps an "
+            f"error of {evidence.torque(demand - ceiling)}; it would take {needed} of supply, or a smaller request."
         )
     return "note", " A reference above that cannot be followed by any valve or controller."
 
@@ -197,8 +197,9 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
             values=evidence.values_of(_TORQUE_CONSTANT, *paths),
             sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
             paragraph=(
-                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {held:.3g} N m, published "
-                f"are {torque:.3g} N m. This speaks of the torque constant alone: a vane at rest has any volume. {note}"
+                f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(held)}, published "
+                f"are {evidence.torque(torque)}. This speaks of the torque constant alone: "
+                f"a vane at rest has any volume. {note}"
             ).rstrip(),
         )
         if name == "walking":
@@ -227,7 +228,7 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
             sides=(Side("time to fill", time, "s"), Side("time of push-off", _PUSH_OFF, "s")),
             paragraph=(
                 f"At toe-off chamber 1 has {1e6 * volume:.3g} cm^3. Through the open valve '{valve}' "
-                f"{100.0 * _REACHED:.0f} % of the {torque:.3g} N m that were published of walking take "
+                f"{100.0 * _REACHED:.0f} % of the {evidence.torque(torque)} that were published of walking take "
                 f"{1e3 * time:.0f} ms; push-off lasts about {1e3 * _PUSH_OFF:.0f} ms. The valves of that publication "
                 "may have been others."
             ),

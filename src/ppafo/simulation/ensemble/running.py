@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -20,9 +20,7 @@ from ppafo.metrics.readable import (
     ThermalTotals,
     Totals,
     has_channels,
-    real_totals,
-    thermal_totals,
-    totals,
+    totals_kind,
 )
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
@@ -163,16 +161,10 @@ class _MeteredBatch:
 
 def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, Floats]:
     """Gas in the chambers and totals of each run, by channel."""
-    groups = program.state_rows()
-    state = group_of("state", groups, states)
-    if not program.has_true_masses:
-        return totals(state)._asdict()
-    masses = group_of("masses", groups, states)
-    if not program.is_thermal:
-        return real_totals(state, masses)._asdict()
-    groups = program.parameter_rows()
-    plant, thermal = (group_of(name, groups, parameters) for name in ("plant", "thermal"))
-    return thermal_totals(state, masses, plant, thermal)._asdict()
+    kind, groups, own = totals_kind(program), program.state_rows(), program.parameter_rows()
+    rows = [group_of(name, groups, states) for name in ("state", *kind.states)]
+    counted: Any = kind.function(*rows, *(group_of(name, own, parameters) for name in kind.parameters))
+    return dict(counted._asdict())
 
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:

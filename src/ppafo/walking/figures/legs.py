@@ -406,7 +406,7 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
     least = display_value(atmosphere + 10.0 * PASCALS_PER_PSI, "pressure", atmosphere)
     traces.set_ylim(top=max(least, traces.get_ylim()[1]))
     traces.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
-    traces.set_ylabel(axis_unit("pressure"), fontsize=8.5)
+    traces.set_ylabel(f"pressure\n({axis_unit('pressure')})", fontsize=8.5)
     traces.tick_params(labelsize=8)
     traces.locator_params(axis="y", nbins=3)
     traces.legend(
@@ -456,7 +456,7 @@ def _gif(images: "list[Image]", stride_time: float) -> bytes:
     triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
     # What is nearly white is white, for averages with its edges would tint the background; a small red foot is kept.
     kept = [[255] * 3 if min(triple) > _NEARLY_WHITE else triple for triple in triples[:_COLOURS]]
-    kept.append([int(DRAGS[place : place + 2], 16) for place in (1, 3, 5)])
+    kept.append([int(DRAGS[digit : digit + 2], 16) for digit in (1, 3, 5)])
     palette.putpalette([tone for triple in kept for tone in triple])
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     buffer = io.BytesIO()

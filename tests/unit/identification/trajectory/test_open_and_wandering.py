@@ -76,3 +76,17 @@ def test_noise_that_wanders_by_less_than_the_zero_of_its_sensor_may_be_off_is_th
 
     assert found.conflict == ""
     assert found.estimates[0].is_identified
+
+
+def test_samples_that_stand_out_are_left_out_and_said(experiment: Experiment) -> None:
+    recording = experiment.recording
+    values = recording["pressure_2"].copy()
+    values[[40, 200]] += np.array([4.0e4, -4.0e4])
+    spoilt = dataclasses.replace(experiment, recording=recording.with_channel("pressure_2", values, "Pa"), noise={})
+
+    found = fitted(spoilt, FreeParameter("foot_plate.inertia"))
+
+    said = "experiment 'step': 2 samples of pressure_2, at 0.04 s first, stand out by themselves and were left out"
+    assert found.outliers == (said,)
+    assert found.remarks == ()
+    assert found.estimates[0].is_identified

@@ -129,8 +129,8 @@ class Sizing:
     @property
     def doubtful(self) -> tuple[tuple[Part, str], ...]:
         """Figures that are quoted or assumed, of the parts that the result rests on."""
-        parts = [valve.valve for valve in self.valves] + [
-            valve.bottle for valve in self.valves if valve.bottle is not None
+        parts = [sized.valve for sized in self.valves] + [
+            sized.bottle for sized in self.valves if sized.bottle is not None
         ]
         once = {(part.group, part.name): part for part in (*parts, *self.problem.carried)}.values()
         return tuple((part, name) for part in once for name in part.doubtful)
@@ -162,22 +162,22 @@ class Sizing:
             "summary": suggestion_sentence(self),
             "valves": [
                 {
-                    "valve": valve.valve.name,
-                    "works": valve.works,
-                    "pressure": valve.pressure,
-                    "lowest_pressure": valve.lowest_pressure,
-                    "gains": dict(valve.gains),
-                    "error": valve.error,
-                    "gas_per_repetition": valve.gas,
-                    "gas_in_all": valve.gas_in_all,
-                    "bottle": None if valve.bottle is None else valve.bottle.name,
-                    "mass": valve.mass,
-                    "margins": None if valve.margins is None else asdict(valve.margins),
-                    "limited_by": valve.limit,
-                    "limit": LIMITS[valve.limit],
-                    "remark": valve.remark,
+                    "valve": sized.valve.name,
+                    "works": sized.works,
+                    "pressure": sized.pressure,
+                    "lowest_pressure": sized.lowest_pressure,
+                    "gains": dict(sized.gains),
+                    "error": sized.error,
+                    "gas_per_repetition": sized.gas,
+                    "gas_in_all": sized.gas_in_all,
+                    "bottle": None if sized.bottle is None else sized.bottle.name,
+                    "mass": sized.mass,
+                    "margins": None if sized.margins is None else asdict(sized.margins),
+                    "limited_by": sized.limit,
+                    "limit": LIMITS[sized.limit],
+                    "remark": sized.remark,
                 }
-                for valve in self.valves
+                for sized in self.valves
             ],
             "noise_streams": self.streams,
             "runs": self.runs,
@@ -203,7 +203,7 @@ def torque_panel(sizing: Sizing) -> Panel:
     marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
     recording, choice = sizing.recording, sizing.choice
     if recording is not None and choice is not None:
-        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.1f')} psig"
+        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
         colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
     return Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))
@@ -213,29 +213,32 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
     limit = sizing.problem.largest_error
     errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
-    for number, valve in enumerate(sizing.valves):
-        pressure, error, gas = valve.curve
+    for number, sized in enumerate(sizing.valves):
+        pressure, error, gas = sized.curve
         keeps, colour = error <= limit, COLOURS[number % len(COLOURS)]
-        errors.append(Mark("line", pressure, error, (), valve.valve.title, colour, _DOTTED))
+        errors.append(Mark("line", pressure, error, (), sized.valve.title, colour, _DOTTED))
         gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=_DOTTED))
-        if valve.works:
-            errors.append(Mark("line", [valve.pressure], [valve.error], colour=colour, style=RING))
-            gases.append(Mark("line", [valve.pressure], [valve.gas], colour=colour, style=RING))
+        if sized.works:
+            errors.append(Mark("line", [sized.pressure], [sized.error], colour=colour, style=RING))
+            gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=RING))
+
+    torque_kind = replace(_TORQUE, words="RMS error")
+    highest = float(torque_kind.values(_MAXIMUM_OF_LIMIT * limit))
 
     def set_gas(axes: "Axes") -> None:
         # Valves differ by some per cent: an axis from 0 would lay their curves on each other.
         axes.margins(y=0.15)
-        if not any(valve.works for valve in sizing.valves):
+        if not any(sized.works for sized in sizing.valves):
             axes.text(0.5, 0.5, "no valve keeps the limit", transform=axes.transAxes, ha="center", color=GREY)
 
     return [
         Panel(
             _PRESSURE,
-            replace(_TORQUE, words="RMS error"),
+            torque_kind,
             errors,
             "RMS error, limit dashed",
             legend="inside",
-            then=lambda axes: axes.set_ylim(0.0, _MAXIMUM_OF_LIMIT * limit),
+            then=lambda axes: axes.set_ylim(0.0, highest),
         ),
         Panel(_PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
     ]
@@ -308,7 +311,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             finding.Part(
                 remarks=(
                     suggestion_sentence(sizing),
-                    *(f"{valve.valve.name}: {valve.remark}" for valve in sizing.valves if valve.remark),
+                    *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
                     *([noisy] if sizing.streams else []),
                     f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
                 )
@@ -332,7 +335,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
             ),
             *parts_to_check(sizing.doubtful),
             finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
-            part_titles([valve.valve for valve in sizing.valves]),
+            part_titles([sized.valve for sized in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
@@ -351,21 +354,21 @@ def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
     marked = []
     quantities = CONTROLLERS[sizing.problem.scenario.controller.kind].quantities
     units = {f"controller.{quantity.name}": quantity.unit for quantity in quantities}
-    for valve in sizing.valves:
-        name = valve.valve.name
-        if not valve.works:
-            rows.append((name, None, None, f"{_TORQUE.number(valve.error)} at best", *(None,) * 4, valve.limit))
+    for sized in sizing.valves:
+        name = sized.valve.name
+        if not sized.works:
+            rows.append((name, None, None, f"{_TORQUE.number(sized.error)} at best", *(None,) * 4, sized.limit))
             continue
-        bottle, lowest = "none" if valve.bottle is None else valve.bottle.name, valve.lowest_pressure or valve.pressure
-        gas = (valve.gas, valve.gas_in_all)
-        rows.append((name, valve.pressure, lowest, valve.error, *gas, bottle, valve.mass, valve.limit))
+        bottle, lowest = "none" if sized.bottle is None else sized.bottle.name, sized.lowest_pressure or sized.pressure
+        gas = (sized.gas, sized.gas_in_all)
+        rows.append((name, sized.pressure, lowest, sized.error, *gas, bottle, sized.mass, sized.limit))
         gains = (
             f"{path.rpartition('.')[2].replace('_', ' ')} {value:.3g} {units[path]}"
-            for path, value in valve.gains.items()
+            for path, value in sized.gains.items()
         )
-        if valve is sizing.choice:
+        if sized is sizing.choice:
             marked.append(len(margins))
-        of_each = [None if valve.margins is None else getattr(valve.margins, margin) for margin in _MARGINS]
+        of_each = [None if sized.margins is None else getattr(sized.margins, margin) for margin in _MARGINS]
         margins.append((name, *of_each, ", ".join(gains) or "none to choose"))
     fraction = Kind(quantity="fraction", form=".0f")
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
@@ -380,7 +383,7 @@ def suggestion_sentence(sizing: Sizing) -> str:
     """Return the suggestion with the reason, or why there is none."""
     choice = sizing.choice
     if choice is None:
-        if any(valve.works for valve in sizing.valves):
+        if any(sized.works for sized in sizing.valves):
             return "no suggestion: valves keep the limit, but no bottle is large enough for the use"
         return "no suggestion: no valve keeps the error limit at any of the pressures"
     bottle = "" if choice.bottle is None else f" and {choice.bottle.name}"

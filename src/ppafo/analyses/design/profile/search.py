@@ -22,7 +22,7 @@ from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.torque_loop import loop_terms
+from ppafo.simulation.torque_loop import IN_SCENARIO, loop_terms
 from ppafo.studies.draws import seeds_of_noise
 
 Limit = Literal["torque", "flow", "control", "pressure"]
@@ -162,7 +162,7 @@ class Trials:
     def right_gain(self, columns: Mapping[str, Floats]) -> Any:
         """Return the proportional gain [1/(N m)] that the rules ask for, with some numbers in place of the device's."""
         scenario = self.problem.scenario
-        term = loop_terms(scenario.device, CONTROLLERS[scenario.controller.kind], False)[PROPORTIONAL_GAIN]
+        term = loop_terms(scenario.device, CONTROLLERS[scenario.controller.kind], IN_SCENARIO)[PROPORTIONAL_GAIN]
         return term.number(lambda path: columns[path] if path in columns else number_at(scenario, path))
 
 

@@ -1,0 +1,71 @@
+"""A loop that does not move at all says so, and with what it would."""
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from ppafo.cli.main import main
+from ppafo.loading import load_scenario
+from ppafo.running import simulate, standstill
+from ppafo.simulation.scenario import Scenario
+
+SERVO = ("cylinder-servo", ("run.duration=1 s",))
+STUCK = ("friction.static_torque=2 N m", "friction.dynamic_torque=1 N m")
+
+
+def servo(*overrides: str) -> Scenario:
+    return load_scenario(SERVO[0], (*SERVO[1], *overrides))
+
+
+def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -> None:
+    weak = ("controller.angle_stiffness=4 N m/rad", "controller.friction_torque=0 N m")
+    verdict = standstill(simulate(servo(*STUCK, *weak)))
+    assert verdict is not None
+    assert verdict.moved == 0.0
+    assert verdict.sentence.startswith("the angle loop does not move: 0 of 10 deg wanted; static friction holds")
+    assert "with 2 N m, and the law asks for" in verdict.sentence
+    (stiffness,) = re.findall(r"angle_stiffness = (\S+) N m/rad", verdict.remedy)
+    assert standstill(simulate(servo(*STUCK, weak[1], f"controller.angle_stiffness={stiffness} N m/rad"))) is None
+    assert standstill(simulate(servo(*STUCK, *weak, "controller.angle_integral=200 N m/(rad s)"))) is None
+
+
+def test_loops_that_move_and_those_that_want_nothing_are_left_alone() -> None:
+    assert standstill(simulate(servo())) is None
+    still = servo("reference.amplitude=0 deg", "reference.level=70 deg", "motion.angle=70 deg")
+    assert standstill(simulate(still)) is None
+    assert standstill(simulate("step-response")) is None
+    assert standstill(simulate("torque-task-proportional")) is None
+
+
+@pytest.mark.parametrize(
+    ("overrides", "said"),
+    [
+        (("controller.proportional_gain=0 1/Pa", "controller.integral_gain=0 1/(Pa s)"), "asks for nothing"),
+        (
+            (
+                "controller.proportional_gain=1e-8 1/Pa",
+                "controller.integral_gain=0 1/(Pa s)",
+                "valve.dead_band=0.05",
+            ),
+            "within `valve.dead_band = 0.05`: give a larger gain",
+        ),
+    ],
+    ids=["no gain", "dead band"],
+)
+def test_a_pressure_that_stays_where_it_is_is_named_with_what_keeps_it(overrides: tuple[str, ...], said: str) -> None:
+    verdict = standstill(simulate(load_scenario("pressure-loop", (*overrides, "actuator.leak.area=0 mm^2"))))
+    assert verdict is not None
+    assert said in verdict.sentence
+
+
+def test_simulate_says_it_before_the_gains_and_a_check_ends_with_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [word for text in (*STUCK, "controller.angle_stiffness=4 N m/rad") for word in ("--set", text)]
+    folder = ["--set", "run.duration=0.5 s", "--out", str(tmp_path / "out")]
+    assert main(["simulate", "cylinder-servo", *given, *folder, "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)["standstill"]["sentence"]
+    assert main(["simulate", "cylinder-servo", *given, *folder, "--check"]) == 1
+    assert capsys.readouterr().out.splitlines()[1] == said
