@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 
 
 class Frame(NamedTuple):

@@ -19,7 +19,7 @@ from ppafo.engine.source_text import (
     is_step_function,
 )
 from ppafo.errors import ProgramError
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 
 
 @dataclass(slots=True)

@@ -19,7 +19,7 @@ import numpy as np
 from ppafo.engine.entries import entry_types
 from ppafo.engine.going_on import MATH, power, quotient, whole_part
 from ppafo.engine.plain_python import parse_module, place_in, refusal
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 
 
 @lru_cache(maxsize=64)

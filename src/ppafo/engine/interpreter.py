@@ -26,7 +26,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuild
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 
 Floats = NDArray[np.float64]
 OWN = "ppafo."

@@ -13,8 +13,8 @@ from ppafo.engine.scheme.actuators import links_of
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
-from ppafo.model.plain_function import PlainFunction
 
 
 class Linked(Protocol):

@@ -18,7 +18,7 @@ from ppafo.engine.plain_python import parse_module
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.source_text import COMPILED_BUILTINS, SourceCollector
 from ppafo.errors import ProgramError
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 
 
 def over_samples(function: PlainFunction, *arguments: Any) -> Any:

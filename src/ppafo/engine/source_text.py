@@ -27,7 +27,7 @@ from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError, nearest_name, one_line
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 
 COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt
 from ppafo.model.columns import Number, choose
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
 

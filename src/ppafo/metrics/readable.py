@@ -7,8 +7,8 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import row_numbers
 from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
 
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})

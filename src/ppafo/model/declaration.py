@@ -1,4 +1,4 @@
-"""How a component declares its parameters: name, unit, range and meaning. Data only, no physics.
+"""How a component declares its parameters: name, unit, range and meaning; what its functions are. No physics.
 
 A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
 ``area: Annotated[float, Number("m^2", "area of the opening")]``.
@@ -8,6 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from types import CodeType
 from typing import Annotated, Any, ClassVar, Protocol, get_args, get_origin, get_type_hints
 
 VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
@@ -126,3 +127,25 @@ def held(section: Holding, name: str) -> Any:
 def range_rule(quantity: Quantity, limits: str) -> str:
     """Return what a value out of range must be, such as "must be at least 0 m^2 (open area)"."""
     return f"must be {limits}" + (f" ({quantity.summary})" if quantity.summary else "")
+
+
+class PlainFunction(Protocol):
+    """A function as ``def`` makes it, of whatever parameters: its source, its code and the names that it sees are read.
+
+    A partial function, a method or an object that can be called is none.
+    """
+
+    __name__: str
+    __qualname__: str
+    __module__: str
+    __code__: CodeType
+
+    @property
+    def __globals__(self) -> Mapping[str, Any]:
+        """Names of its module."""
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Call it as Python does."""
+
+    def __hash__(self) -> int:
+        """Every function is itself alone: what was made of it is kept by it."""

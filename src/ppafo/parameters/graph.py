@@ -12,8 +12,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.columns import over_runs
-from ppafo.model.declaration import quantities_of
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.units import to_si
 
 ATMOSPHERE_PATH = "supply.atmospheric_pressure"

@@ -17,8 +17,7 @@ from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import Number
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import Number, PlainFunction
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, WarmChambers, thermal_flows
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.orifice import orifice_flow
-from ppafo.model.plain_function import PlainFunction
 from ppafo.model.plant import (
     Openings,
     PlantParameters,

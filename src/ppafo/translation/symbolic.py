@@ -17,8 +17,8 @@ from ppafo.engine.linking import link_effects
 from ppafo.engine.rows import is_number, is_row, members
 from ppafo.engine.source_text import SourceCollector, emitted_name
 from ppafo.errors import ProgramError, SimulationError
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect
-from ppafo.model.plain_function import PlainFunction
 from ppafo.translation import typed
 from ppafo.translation.typed import Function, Statement, Term
 from ppafo.translation.value_types import FLOAT, INT, Handed, Items, Row, Type, is_empty

@@ -116,7 +116,10 @@ def scaled(leg: Wearer | LegParameters, mass: Any, stature: Any) -> dict[str, An
     """Return the numbers of a leg [SI] at multiples [-] of body mass and stature, each of which may be an array."""
     # A product has the same bits for one person as for a column of them, which a power need not have.
     masses, statures = (1.0, mass), (1.0, stature, stature * stature)
-    return {name: getattr(leg, name) * masses[one] * statures[other] for name, (one, other) in SCALING.items()}
+    return {
+        name: getattr(leg, name) * masses[of_mass] * statures[of_stature]
+        for name, (of_mass, of_stature) in SCALING.items()
+    }
 
 
 def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
@@ -162,10 +165,10 @@ def draw_builds(count: int, generator: np.random.Generator) -> Build:
     stature = normal[0]
     # Two normal numbers with this correlation, from two that have none.
     mass = CORRELATION * normal[0] + np.sqrt(1.0 - CORRELATION**2) * normal[1]
-    scaled = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
-    for values in scaled:
+    multiples = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
+    for values in multiples:
         values[0] = 1.0
-    return Build(*scaled)
+    return Build(*multiples)
 
 
 def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:

@@ -23,7 +23,7 @@ from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.actuators.vane import chambers
 from ppafo.model.columns import over_runs
-from ppafo.model.plain_function import PlainFunction
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.plant import (
     PlantParameters,
     PlantState,

@@ -10,9 +10,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 from ppafo.errors import ProgramError
-from ppafo.model.declaration import Quantity, quantities_of
+from ppafo.model.declaration import PlainFunction, Quantity, quantities_of
 from ppafo.model.gas import SPECIES
-from ppafo.model.plain_function import PlainFunction
 
 SECTION = "effects"
 """Section of a parameter set, and begin of the paths, that hold the settings of effects."""
