@@ -7,17 +7,19 @@ from ppafo.metrics import Metric
 from ppafo.metrics import evaluate as of_recording
 from ppafo.signals import Recording
 from ppafo.storage import read_recording
+from ppafo.storage.result_folder import ColumnsLike
 
 
 @checked()
-def evaluate(recording: Recording | str | Path) -> dict[str, Metric]:
+def evaluate(recording: Recording | str | Path, *, columns: ColumnsLike | None = None) -> dict[str, Metric]:
     """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
 
-    A file or a result folder stands for its recording. DataError for one that cannot be used.
+    A file or a result folder stands for its recording; ``columns`` is the column map of a file with other columns.
+    DataError for one that cannot be used.
 
     >>> import ppafo
     >>> recording = ppafo.simulate("torque-task-proportional").recording
     >>> print(f"{ppafo.evaluate(recording)['peak_torque'].value:.3f} N m")
     5.000 N m
     """
-    return of_recording(recording if isinstance(recording, Recording) else read_recording(recording))
+    return of_recording(recording if isinstance(recording, Recording) else read_recording(recording, columns=columns))

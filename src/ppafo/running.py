@@ -10,13 +10,12 @@ from ppafo.loading import scenario_or_load
 from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Result
 
 if TYPE_CHECKING:
     from ppafo.control.kind import ControllerKind
-    from ppafo.simulation.oscillation import Gains, Oscillation
-    from ppafo.simulation.standstill import Standstill
+    from ppafo.simulation.oscillation import Gains
 
 
 @checked()
@@ -48,27 +47,6 @@ def gains(scenario: Scenario) -> "Gains | None":
     return None if law is None else gains_of(scenario, law)
 
 
-def oscillation(result: Result) -> "Oscillation | None":
-    """Return the verdict on a run whose torque loop oscillates; None where it does not."""
-    from ppafo.simulation.oscillation import oscillation_of
-
-    law, metrics = _law(result.scenario), {name: metric.value for name, metric in result.metrics.items()}
-    if law is None:
-        return None
-    time = result.recording.time
-    strides = metrics.get("strides", 0.0) if result.scenario.walks else 0.0
-    stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
-    return oscillation_of(result.scenario, law, result.recording, metrics, stride_time)
-
-
-def standstill(result: Result) -> "Standstill | None":
-    """Return the verdict on a run whose loop does not move at all; None where it does."""
-    from ppafo.simulation.standstill import standstill_of
-
-    law = _law(result.scenario)
-    return None if law is None else standstill_of(result.scenario, law, result.recording)
-
-
 def most_reversals(scenario: Scenario) -> float:
     """Return the ``command_reversals`` of a run above which its loop oscillates; infinite for a law that may turn."""
     from ppafo.simulation import oscillation as rules
@@ -86,17 +64,8 @@ def most_reversals(scenario: Scenario) -> float:
 
 def _law(scenario: Scenario) -> "ControllerKind | None":
     """Return the controller of a scenario; None for a Python object."""
-    from ppafo.simulation.scenario import PYTHON_CONTROLLER
-
-    if scenario.controller.kind == PYTHON_CONTROLLER:
-        return None
-    if scenario.walks:
-        from ppafo.walking.planning import law_of
-
-        return law_of(scenario)
-    from ppafo.control.catalog import CONTROLLERS
-
-    return CONTROLLERS[scenario.controller.kind]
+    is_custom = scenario.controller.kind == PYTHON_CONTROLLER
+    return None if is_custom else scenario.motion.motion_kind.law(scenario)
 
 
 @checked("scenarios", "threads")

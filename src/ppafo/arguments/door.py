@@ -57,8 +57,9 @@ def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
         # A module that was named is where other errors lie, and says itself where it is not there.
         asked = {name: value for name, value in values.items() if name != "plugins"}
         quoted = [(text, name) for name, value in asked.items() for text in _texts(value) if text in message]
-        # A text in quotation marks before one that stands among others, and of two within each other the longer one.
-        rank = {name: (f"'{text}'" in message, len(text)) for text, name in quoted}
+        # A text in quotation marks before one that stands among others; the first, for an example may follow; and of
+        # two within each other the longer one.
+        rank = {name: (f"'{text}'" in message, -message.index(text), len(text)) for text, name in quoted}
         name = max(rank, key=lambda each: rank[each], default="")
         # A message that begins with the path that was given, or with a file below that folder, says where it lies.
         begins = any(re.match(rf"{re.escape(text)}[:/,]", message) for text, _ in quoted if text)
@@ -117,8 +118,15 @@ def _values(
     parameters, places = signature
     if len(positional) > len(places):
         order = [*places, *formerly[len(places) :], *(name for name in parameters if name not in formerly)]
-        pairs = zip([renamed.get(name, name) for name in order], positional, strict=False)
-        now = ", ".join([*map(shown, positional[:1]), *(f"{name}={shown(value)}" for name, value in [*pairs][1:])])
+        # A dictionary is overrides wherever it stands.
+        pairs = [
+            (
+                "overrides" if isinstance(value, Mapping) and "overrides" in parameters else renamed.get(name, name),
+                value,
+            )
+            for name, value in zip(order, positional, strict=False)
+        ]
+        now = ", ".join([*map(shown, positional[:1]), *(f"{name}={shown(value)}" for name, value in pairs[1:])])
         count = {1: "one argument"}.get(len(places), f"{len(places)} arguments")
         raise ArgumentError(f"{function}() takes {count} by position: write {function}({now})")
     given = dict(zip(places, positional, strict=False))

@@ -15,6 +15,7 @@ from ppafo.arguments.words import Word, taken_flag, taken_number, taken_text, ta
 from ppafo.errors import ArgumentError, one_line
 
 _LONGEST = 60
+_SEVERAL = ", or several"
 
 
 class NotLoaded:
@@ -115,7 +116,7 @@ def _one(what: str, take: Callable[[Any], Any]) -> Taken:
         except ArgumentError as error:
             raise ArgumentError(f"{name}: {error}") from None
         except (ValueError, TypeError, OverflowError):
-            raise ArgumentError(f"{name}={shown(value)}: must be {what}") from None
+            raise ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}") from None
 
     return Taken(what, named)
 
@@ -124,11 +125,12 @@ def _several(element: Taken) -> Taken:
     """Return what takes one or several: one alone stands for a list of one, an iterator is gone through once."""
 
     def take(name: str, value: Any) -> Any:
-        if isinstance(value, str | bytes | os.PathLike | Mapping) or not isinstance(value, Iterable):
+        # A table of pandas or xarray has keys as a dictionary has: it would be gone through by names of columns.
+        if isinstance(value, str | bytes | os.PathLike) or hasattr(value, "keys") or not isinstance(value, Iterable):
             return (element.take(name, value),)
         return tuple(element.take(f"{name}[{index}]", each) for index, each in enumerate(value))
 
-    return Taken(f"{element.what}, or several", take)
+    return Taken(f"{element.what}{_SEVERAL}", take)
 
 
 def _mapping(element: Taken) -> Taken:
@@ -146,11 +148,11 @@ def _either(kinds: list[Taken], allows_none: bool) -> Taken:
     """Return what takes the first of several kinds that fits."""
     if len(kinds) == 1:
         return kinds[0]._replace(allows_none=allows_none)
-    what = ", ".join(dict.fromkeys(kind.what for kind in kinds))
-    head, comma, last = what.rpartition(", ")
-    what = f"{head} or {last}" if comma else last
-    # A text and a path are one way to name something.
-    what = what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")
+    alone = _in_words([kind.what for kind in kinds if not kind.what.endswith(_SEVERAL)])
+    several = _in_words([kind.what.removesuffix(_SEVERAL) for kind in kinds if kind.what.endswith(_SEVERAL)])
+    what = f"{alone}, or several: {several}" if alone and several else f"{several}{_SEVERAL}" if several else alone
+    if alone == several:
+        what = f"{alone}{_SEVERAL}"
 
     def take(name: str, value: Any) -> Any:
         refused: list[ArgumentError] = []
@@ -161,9 +163,23 @@ def _either(kinds: list[Taken], allows_none: bool) -> Taken:
                 refused.append(error)
         # What is wrong inside one of several is said of that one.
         inside = [error for error in refused if str(error).startswith(f"{name}[")]
-        raise inside[-1] if inside else ArgumentError(f"{name}={shown(value)}: must be {what}")
+        raise inside[-1] if inside else ArgumentError(f"{name}={shown(value)}: must be {what}{_at_hand(what, value)}")
 
     return Taken(what, take, allows_none)
+
+
+def _at_hand(what: str, value: Any) -> str:
+    """Return which attribute of a value, such as a result, is what a parameter takes; an empty text where none is."""
+    names = [name for name in ("recording", "scenario") if f"a {name.capitalize()}" in what and hasattr(value, name)]
+    return f"; its '.{names[0]}' is one" if names else ""
+
+
+def _in_words(kinds: list[str]) -> str:
+    """Return names of kinds of values as one of them: ``a name, a path or a Recording``; an empty text without any."""
+    *others, last = dict.fromkeys(kinds) or [""]
+    what = f"{', '.join(others)} or {last}" if others else last
+    # A text and a path are one way to name something.
+    return what.replace("a text, a path", "a name, a path").replace("a text or a path", "a name or a path")
 
 
 def _among(allowed: tuple[Any, ...], value: Any) -> Any:

@@ -273,8 +273,11 @@ def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
         elif isinstance(single, str) and single.strip():
             yield f"{path}={single}"
         else:
+            # A number and its unit apart are one text.
+            is_pair = isinstance(single, list | tuple) and len(single) == 2 and isinstance(single[1], str)
+            example = f"'{single[0]} {single[1]}'" if is_pair else "'12.6 mm^2'"
             raise ArgumentError(
-                f"{path} = {single!r}: must be a finite number in SI units, a flag or a text such as '12.6 mm^2'"
+                f"{path} = {single!r}: must be a finite number in SI units, a flag or a text such as {example}"
             )
 
 

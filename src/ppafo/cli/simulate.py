@@ -45,12 +45,11 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
 @in_units(lambda scenario, *_: scenario.device.shown)
 def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
-    from ppafo.running import gains, oscillation, standstill
+    from ppafo.running import gains
     from ppafo.simulation.simulate import simulate
 
     result = simulate(chosen)
-    in_force, verdict = gains(chosen), oscillation(result)
-    stands = standstill(result) if result.status.is_completed else None
+    in_force, verdict, stands = gains(chosen), result.oscillation, result.standstill
     # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None
     error = None if checked is None else checked.error
@@ -142,4 +141,6 @@ def _text(
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
     beside = [] if not result.scenario.walks else [walked]
     head, *rest = str(result).split("\n")
+    # The gains in force stand with the warnings.
+    rest = rest[len(result.warnings) :]
     return "\n".join([head, *first, *rest, "", *checked, *beside, f"written: {folder} ({written})"])

@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
 from ppafo.model.controlled import CONTROLLED, TORQUE, Controlled
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
+from ppafo.units import from_si
 
 Floats = NDArray[np.float64]
 
@@ -38,6 +40,13 @@ class Metric:
     def __float__(self) -> float:
         """Return the value in SI, as arithmetic asks for it."""
         return float(self.value)
+
+    def in_unit(self, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
+        """Return the value in a unit, such as ``g`` or ``psi_g``; gauge counts from ``atmosphere`` [Pa absolute].
+
+        UnitError for a unit that does not fit.
+        """
+        return from_si(self.value, unit, "Pa_a" if self.unit == "Pa" else self.unit, atmosphere)
 
 
 class Metrics(dict[str, Metric]):

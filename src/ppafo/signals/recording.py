@@ -185,6 +185,9 @@ class Recording:
         if not self.label or not self.label.isprintable():
             raise DataError(f"the label of a recording is one line of text, not {self.label!r}")
         recording_kind(self.kind)
+        for name, channel in self.channels.items():
+            if not isinstance(channel, Channel):
+                raise DataError(f"{self.label}: '{name}' must be a Channel, such as Channel(values, 'N m')")
         if self.time.size == 0:
             raise DataError(f"{self.label}: has no samples")
         _check_finite(self, "time", self.time)

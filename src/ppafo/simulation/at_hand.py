@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Protocol
 
 from ppafo.engine.lanes import Floats
+from ppafo.errors import ArgumentError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.units.shown import in_units
@@ -38,8 +39,11 @@ class Recorded(Protocol):
 def channel_values(self: Recorded, channel: str | tuple[str, str]) -> Floats:
     """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
 
-    DataError for a channel that is not there, UnitError for a unit that does not fit it.
+    ``result["time"]`` are the times of the samples [s]. DataError for a channel that is not there, UnitError for a unit
+    that does not fit it.
     """
+    if channel == "time":
+        return self.recording.time
     if isinstance(channel, str):
         return self.recording[channel]
     name, unit = channel
@@ -47,8 +51,8 @@ def channel_values(self: Recorded, channel: str | tuple[str, str]) -> Floats:
 
 
 def channel_names(self: Recorded) -> list[str]:
-    """Return the channels, which a notebook completes between brackets."""
-    return list(self.recording.names)
+    """Return the time and the channels, which a notebook completes between brackets."""
+    return ["time", *self.recording.names]
 
 
 @in_units(lambda result: result.scenario.device.shown)
@@ -66,6 +70,8 @@ def dataset(self: Recorded, units: Mapping[str, str] | None = None) -> "xarray.D
     """
     from ppafo.storage import dataset_of
 
+    if not isinstance(units, Mapping | None):
+        raise ArgumentError(f"units={units!r}: must be units by channel, such as {{'pressure_1': 'psi_g'}}")
     atmosphere = self.scenario.device.supply.atmospheric_pressure
     return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
 

@@ -10,8 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ppafo.control.catalog import PROFILES
-from ppafo.control.kind import OPEN_LOOP
+from ppafo.control.catalog import CONTROLLERS, PROFILES
+from ppafo.control.kind import OPEN_LOOP, ControllerKind
 from ppafo.errors import DataError, ScenarioError, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
@@ -89,6 +89,10 @@ def _clock(scenario: Scenario, times: Mapping[str, Any]) -> "tuple[Clock, tuple[
     return clock(scenario, times)
 
 
+def _law(scenario: Scenario) -> ControllerKind:
+    return CONTROLLERS[scenario.controller.kind]
+
+
 def _sees(scenario: Scenario) -> "Seen":
     from ppafo.simulation.torque_loop import seen_in_scenario
 
@@ -136,6 +140,7 @@ FREE_MOTION = MotionKind(
     clock=_clock,
     switches=_switches,
     noise=_noise,
+    law=_law,
     sees=_sees,
     lacks=_lacks,
     measured=_measured_free,

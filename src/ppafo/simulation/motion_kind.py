@@ -12,6 +12,7 @@ from ppafo.kinds import Kinds, declared_kinds
 from ppafo.model.declaration import PlainFunction, Quantity
 
 if TYPE_CHECKING:
+    from ppafo.control.kind import ControllerKind
     from ppafo.engine.lanes import Floats
     from ppafo.engine.run import Run
     from ppafo.metrics.metric import Metric, MetricKind
@@ -54,8 +55,9 @@ class MotionKind(Generic[ScenarioType]):
     of its device, ``places`` says by path which attributes lead to those that are not where their path says.
     ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
     ``switches`` are settings that are 0 for all runs of a program or for none, ``noise`` is the sum of all levels of
-    noise that its controller receives, and ``sees`` how that sees what it controls. ``lacks(scenario, metric)`` says
-    why it has not what a metric needs, an empty text where it has it. ``measured(scenario, run, times, rows)`` gives
+    noise that its controller receives, ``law`` that controller with what the motion adds to it, and ``sees`` how it
+    sees what it controls. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty text where it
+    has it. ``measured(scenario, run, times, rows)`` gives
     recording and metrics of rows (samples,) by path, and how a run that was completed ended, in words.
 
     ``section`` is what the file of a vane alone has as ``[motion]``, None of a walk, whose file is laid out in another
@@ -70,6 +72,7 @@ class MotionKind(Generic[ScenarioType]):
     clock: "Callable[[ScenarioType, Mapping[str, Any]], tuple[Clock, tuple[Problem, ...]]]"
     switches: Callable[[ScenarioType], tuple[Any, ...]]
     noise: Callable[[ScenarioType], Any]
+    law: "Callable[[ScenarioType], ControllerKind]"
     sees: Callable[[ScenarioType], Seen]
     lacks: "Callable[[ScenarioType, MetricKind], str]"
     measured: "Callable[[ScenarioType, Run, Floats, Mapping[str, Floats]], Measured]"

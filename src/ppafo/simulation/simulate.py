@@ -16,7 +16,7 @@ from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation import at_hand
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import Scenario, scenario_document
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
     from ppafo.metrics.metric import Metric
     from ppafo.simulation.check import Check, ErrorEstimate
+    from ppafo.simulation.oscillation import Oscillation
+    from ppafo.simulation.standstill import Standstill
 
 REMEDY = (
     "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
@@ -82,7 +84,7 @@ class Measuring:
         return Measuring, (self(),)
 
 
-def _units_of(result: "Result") -> Mapping[str, str]:
+def _units_of(result: "Result", *_: object, **__: object) -> Mapping[str, str]:
     return result.scenario.device.shown
 
 
@@ -106,6 +108,34 @@ class Result:
         """The metrics by name, in SI."""
         return self.measured().metrics
 
+    @property
+    def oscillation(self) -> "Oscillation | None":
+        """The verdict where the loop oscillates; None where it does not, or has a controller of yours."""
+        from ppafo.simulation.oscillation import oscillation_of
+
+        scenario = self.scenario
+        if scenario.controller.kind == PYTHON_CONTROLLER:
+            return None
+        metrics, time = {name: metric.value for name, metric in self.metrics.items()}, self.recording.time
+        strides = metrics.get("strides", 0.0) if scenario.walks else 0.0
+        stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
+        return oscillation_of(scenario, scenario.motion.motion_kind.law(scenario), self.recording, metrics, stride_time)
+
+    @property
+    def standstill(self) -> "Standstill | None":
+        """The verdict where the loop does not move at all; None where it does, or has a controller of yours."""
+        from ppafo.simulation.standstill import standstill_of
+
+        scenario = self.scenario
+        if scenario.controller.kind == PYTHON_CONTROLLER or not self.status.is_completed:
+            return None
+        return standstill_of(scenario, scenario.motion.motion_kind.law(scenario), self.recording)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the run useless for its purpose, a sentence each: a loop that oscillates or does not move."""
+        return tuple(verdict.sentence for verdict in (self.oscillation, self.standstill) if verdict is not None)
+
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""
         scenario, status = self.scenario, self.status
@@ -117,11 +147,11 @@ class Result:
 
     @in_units(_units_of)
     def __str__(self) -> str:
-        """Return what ``ppafo simulate`` prints: status and metrics in the units that people are shown."""
+        """Return what ``ppafo simulate`` prints: status, warnings and metrics in the units that people are shown."""
         from ppafo.report.display_units import metrics_lines
 
-        head = f"{self.scenario.name}: {self.status.kind}"
-        return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
+        lines = metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)
+        return "\n".join([f"{self.scenario.name}: {self.status.kind}", *self.warnings, "", *lines])
 
     @in_units(_units_of)
     def plot(self) -> "Figure":

@@ -184,6 +184,12 @@ class _Table(NamedTuple):
     kind: RecordingKind
 
 
+def named_column_map(text: str) -> ColumnMap:
+    """Return the map that is named as a file, and by name where the file has several: ``logger.toml:bench``."""
+    path, separator, name = text.rpartition(".toml:")
+    return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text)
+
+
 def read_foreign(
     path: str | Path,
     columns: ColumnMap,

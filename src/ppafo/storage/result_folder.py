@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Pressure, checked
+from ppafo.arguments import Pressure, Word, checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_document, json_text
 from ppafo.documents.regular_file import read_regular_file
@@ -24,6 +24,9 @@ from ppafo.storage.comma_separated import csv_bytes, read_csv
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
 from ppafo.storage.netcdf import netcdf_bytes, read_netcdf
 from ppafo.storage.trial_reading import check_can_be_read
+
+if TYPE_CHECKING:
+    from ppafo.storage.foreign import ColumnMap
 
 _MAXIMUM_BYTES_WRITTEN = 16_000_000
 """No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
@@ -272,6 +275,9 @@ def read_document(folder: str | Path) -> dict[str, Any]:
 _RESULT = FolderKind("ppafo result", RUN_FILE, read_document)
 
 
+ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
+"""A column map, or the name of one: a file, and the name in it where it has several."""
+
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
 """Of tables of text."""
 
@@ -280,10 +286,14 @@ WALK_RECORDING = "recording.nc"
 
 
 @checked("path", "atmosphere")
-def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHERE) -> Recording:
+def read_recording(
+    path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHERE, columns: ColumnsLike | None = None
+) -> Recording:
     """Return the recording in a ``.nc`` file or a table of text such as ``.csv``, or in a result folder, of a walk too.
 
-    Gauge pressure in a CSV file counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
+    Gauge pressure in a table counts from ``atmosphere`` [Pa absolute]. ``columns`` is a column map, or the name of one,
+    ``logger.toml:bench``, for a table with other columns, signs or separators and for a ``.mat`` file. DataError for a
+    file that is not usable.
 
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("step")
@@ -291,6 +301,8 @@ def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHE
     ('angle', 'angular_velocity', 'pressure_1')
     """
     file = Path(path)
+    if columns is not None:
+        return _read_mapped(file, columns, atmosphere)
     if file.is_dir() and (file / RUN_FILE).exists():
         return read_result(file).recording
     if file.is_dir():
@@ -324,3 +336,12 @@ def read_recording(path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHE
         f"{path}: is neither a .nc nor a {', '.join(TEXT_SUFFIXES)} file nor a result folder; a table of another "
         "suffix is read through a column map, --columns FILE.toml:NAME"
     )
+
+
+def _read_mapped(file: Path, columns: "ColumnMap | str | Path", atmosphere: float) -> Recording:
+    """Return the recording in a table through a column map or the name of one."""
+    from ppafo.storage.foreign import ColumnMap, named_column_map, read_foreign
+
+    if isinstance(columns, ColumnMap):
+        return read_foreign(file, columns, atmosphere=atmosphere)
+    return read_foreign(file, named_column_map(str(columns)), atmosphere=atmosphere, map_name=str(columns))

@@ -5,7 +5,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import IN_WALK
 from ppafo.walking.contradictions import rules
 from ppafo.walking.motion import PLACES, clock_with, numbers_of_scenario
-from ppafo.walking.planning import noise, plan_walks, switches
+from ppafo.walking.planning import law_of, noise, plan_walks, switches
 from ppafo.walking.result import lacks, measured
 
 
@@ -22,6 +22,7 @@ WALK_KIND = MotionKind(
     clock=clock_with,
     switches=switches,
     noise=noise,
+    law=law_of,
     sees=_sees,
     lacks=lacks,
     measured=measured,

@@ -110,3 +110,35 @@ def test_an_error_about_the_content_of_an_argument_begins_with_its_name_and_keep
         ppafo.simulate(Path("nowhere.toml"))
     with pytest.raises(ppafo.ParameterError, match=r"^there is no parameter set 'nowhere'"):
         ppafo.audit("nowhere")
+
+
+def test_of_two_arguments_in_a_message_the_one_at_fault_is_named() -> None:
+    # The example in the message is the other argument, word by word.
+    with pytest.raises(StudyError, match=r"^vary: 'rms_error <= 0\.3 N m' is not of the form"):
+        ppafo.find(TASK, vary="rms_error <= 0.3 N m", such_that="supply.pressure=20..90 psi_g")
+
+
+def test_overrides_in_another_place_are_answered_with_a_call_that_works() -> None:
+    with pytest.raises(ArgumentError, match=r"write walk\('solenoid', overrides=\{'supply\.pressure': '4 bar_g'\}\)"):
+        ppafo.walk("solenoid", {"supply.pressure": "4 bar_g"})  # type: ignore[call-arg]
+
+
+def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it() -> None:
+    run = ppafo.simulate("step-response")
+    with pytest.raises(ArgumentError) as refused:
+        ppafo.bottle(run)  # type: ignore[arg-type]
+    assert str(refused.value) == (
+        "recordings=<Result>: must be a name, a path, a Recording or a WalkResult, or several; its '.recording' is one"
+    )
+    with pytest.raises(ArgumentError, match=r"; its '\.recording' is one$"):
+        ppafo.evaluate(run)  # type: ignore[arg-type]
+
+
+def test_a_table_of_pandas_is_no_list_of_the_names_of_its_columns() -> None:
+    with pytest.raises(ArgumentError, match=r"^recordings=<DataFrame>: must be a Recording"):
+        ppafo.validate("ppafo2011", ppafo.simulate("step-response").to_dataframe())
+
+
+def test_a_number_apart_from_its_unit_is_answered_with_both_in_one_text() -> None:
+    with pytest.raises(ArgumentError, match=r"reference\.level = \(3, 'N m'\): .* such as '3 N m'$"):
+        ppafo.simulate(TASK, {"reference.level": (3, "N m")})

@@ -9,7 +9,7 @@ import pytest
 import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import gains, most_reversals, oscillation, simulate
+from ppafo.running import gains, most_reversals, simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.walking import load_walk, walk
 
@@ -31,7 +31,7 @@ def test_given_gains_and_computed_ones_are_told_apart() -> None:
 
 def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
     result = simulate(TASK, FAST)
-    verdict = oscillation(result)
+    verdict = result.oscillation
     assert verdict is not None
     assert verdict.reversals > 10.0
     assert verdict.sentence.startswith("the torque loop oscillates: ")
@@ -39,7 +39,7 @@ def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
     mended = float(verdict.remedy.partition(" = ")[2].partition(" ")[0])
     given = [f"controller.proportional_gain={mended}", "controller.derivative_gain=0", FAST[-1]]
     again = simulate(TASK, given)
-    assert oscillation(again) is None
+    assert again.oscillation is None
     assert again.metrics["rms_error"].value < result.metrics["rms_error"].value
 
 
@@ -47,13 +47,13 @@ def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
 def test_the_scenarios_of_the_package_do_not_oscillate_and_a_pair_that_only_switches_gives_no_alarm(
     scenario: str,
 ) -> None:
-    assert oscillation(simulate(scenario)) is None
+    assert simulate(scenario).oscillation is None
 
 
 def test_a_law_that_only_switches_may_turn_as_often_as_it_likes() -> None:
     result = simulate(TASK, ["controller.kind=on_off"])
     assert result.metrics["command_reversals"].value > 100.0
-    assert oscillation(result) is None
+    assert result.oscillation is None
     assert most_reversals(result.scenario) == float("inf")
 
 

@@ -11,7 +11,7 @@ from ppafo.analyses.linearise.point import equilibrium
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.run import plant_of
 from ppafo.processor.firmware import firmware
-from ppafo.running import oscillation, simulate
+from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, REFUSED, run_ensemble
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
 from ppafo.simulation.numbers import with_numbers
@@ -142,11 +142,11 @@ def test_a_pressure_as_high_as_the_supply_and_as_low_as_the_atmosphere_may_be_as
 
 def test_a_loop_within_a_cascade_that_is_too_fast_is_the_one_that_is_named() -> None:
     given = ["controller.torque_gain=80 1/(N m)"]
-    quick = oscillation(simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), given)))
+    quick = simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), given)).oscillation
     assert quick is not None
     assert quick.remedy == "for this device `torque_gain = 4.2 1/(N m)`"
     pressed = [*given, "motion.external_torque=8 N m"]
-    on_stop = oscillation(simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), pressed)))
+    on_stop = simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), pressed)).oscillation
     assert on_stop is not None
     assert on_stop.remedy == quick.remedy
 

@@ -120,3 +120,25 @@ def test_a_metric_that_is_not_there_is_answered_with_the_nearest(name: str, near
         metrics[name]
     assert metrics.get(name) is None
     assert name not in metrics
+
+
+def test_a_run_that_is_useless_says_so_where_it_is_printed() -> None:
+    good = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5})
+    assert good.warnings == ()
+    wild = ppafo.simulate("torque-task-proportional", {"run.duration": 0.5, "controller.proportional_gain": 40.0})
+    (warning,) = wild.warnings
+    assert "the torque loop oscillates" in warning
+    assert str(wild).splitlines()[:3] == ["torque-task-proportional: completed", warning, ""]
+
+
+def test_times_and_units_are_at_hand(result: Result) -> None:
+    assert result["time"].tolist() == [0.0, 0.1]
+    assert result._ipython_key_completions_()[0] == "time"
+    assert Metric(4.2e-4, "kg", "gas").in_unit("g") == pytest.approx(0.42)
+    assert Metric(301325.0, "Pa", "pressure").in_unit("bar_g") == pytest.approx(2.0)
+    with pytest.raises(ppafo.ArgumentError, match=r"units='psi_g': must be units by channel"):
+        result.to_dataframe("psi_g")  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"plot\(\) got an unexpected keyword argument 'ax'"):
+        result.plot(ax=None)  # type: ignore[call-arg]
+    with pytest.raises(DataError, match=r"log: 'torque' must be a Channel, such as Channel\(values, 'N m'\)"):
+        Recording("log", np.array([0.0, 1.0]), {"torque": [1.0, 2.0]})  # type: ignore[dict-item]

@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import simulate, standstill
+from ppafo.running import simulate
 from ppafo.simulation.scenario import Scenario
 
 SERVO = ("cylinder-servo", ("run.duration=1 s",))
@@ -21,22 +21,22 @@ def servo(*overrides: str) -> Scenario:
 
 def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -> None:
     weak = ("controller.angle_stiffness=4 N m/rad", "controller.friction_torque=0 N m")
-    verdict = standstill(simulate(servo(*STUCK, *weak)))
+    verdict = simulate(servo(*STUCK, *weak)).standstill
     assert verdict is not None
     assert verdict.moved == 0.0
     assert verdict.sentence.startswith("the angle loop does not move: 0 of 10 deg wanted; static friction holds")
     assert "with 2 N m, and the law asks for" in verdict.sentence
     (stiffness,) = re.findall(r"angle_stiffness = (\S+) N m/rad", verdict.remedy)
-    assert standstill(simulate(servo(*STUCK, weak[1], f"controller.angle_stiffness={stiffness} N m/rad"))) is None
-    assert standstill(simulate(servo(*STUCK, *weak, "controller.angle_integral=200 N m/(rad s)"))) is None
+    assert simulate(servo(*STUCK, weak[1], f"controller.angle_stiffness={stiffness} N m/rad")).standstill is None
+    assert simulate(servo(*STUCK, *weak, "controller.angle_integral=200 N m/(rad s)")).standstill is None
 
 
 def test_loops_that_move_and_those_that_want_nothing_are_left_alone() -> None:
-    assert standstill(simulate(servo())) is None
+    assert simulate(servo()).standstill is None
     still = servo("reference.amplitude=0 deg", "reference.level=70 deg", "motion.angle=70 deg")
-    assert standstill(simulate(still)) is None
-    assert standstill(simulate("step-response")) is None
-    assert standstill(simulate("torque-task-proportional")) is None
+    assert simulate(still).standstill is None
+    assert simulate("step-response").standstill is None
+    assert simulate("torque-task-proportional").standstill is None
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_loops_that_move_and_those_that_want_nothing_are_left_alone() -> None:
     ids=["no gain", "dead band"],
 )
 def test_a_pressure_that_stays_where_it_is_is_named_with_what_keeps_it(overrides: tuple[str, ...], said: str) -> None:
-    verdict = standstill(simulate(load_scenario("pressure-loop", (*overrides, "actuator.leak.area=0 mm^2"))))
+    verdict = simulate(load_scenario("pressure-loop", (*overrides, "actuator.leak.area=0 mm^2"))).standstill
     assert verdict is not None
     assert said in verdict.sentence
 

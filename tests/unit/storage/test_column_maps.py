@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import ppafo
 from ppafo.errors import DataError
 from ppafo.storage.foreign import ColumnMap, json_schema, load_column_map, read_foreign
 from tests.repeatable import TOO_SLOW
@@ -338,3 +339,15 @@ def test_a_foreign_file_that_is_empty_or_absent_is_named_once(tmp_path: Path, co
     with pytest.raises(DataError) as refused:
         read_foreign(path, columns)
     assert str(refused.value).count(path.name) == 1
+
+
+def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path) -> None:
+    log, maps = tmp_path / "log.csv", tmp_path / "logger.toml"
+    log.write_text("t_ms;M_Ncm\n0;0,0\n500;120,5\n1000;250,0\n", encoding="utf-8")
+    maps.write_text(
+        '[columns.bench]\ndelimiter = "semicolon"\ndecimal = "comma"\n[columns.bench.channels]\n'
+        'time = { column = "t_ms", unit = "ms" }\ntorque = { column = "M_Ncm", unit = "N cm" }\n',
+        encoding="utf-8",
+    )
+    assert ppafo.evaluate(log, columns=f"{maps}:bench")["peak_torque"].value == pytest.approx(2.5)
+    assert ppafo.read_recording(log, columns=load_column_map(maps))["torque"].tolist() == pytest.approx([0, 1.205, 2.5])

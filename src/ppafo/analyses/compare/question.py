@@ -70,7 +70,6 @@ def compare(
     from ppafo.analyses.compare.solve import DEFAULT_SEED, drawn_runs, on_task, overrides_by_task
     from ppafo.arguments.words import taken_tasks
     from ppafo.errors import StudyError, nearest_name
-    from ppafo.running import oscillation
     from ppafo.simulation.simulate import simulate_many
     from ppafo.studies.draws import (
         CONFIDENCE,
@@ -118,7 +117,7 @@ def compare(
                 configuration=name,
                 status=result.status,
                 metrics={name: metric for name, metric in result.metrics.items() if name in COMPARED},
-                oscillation=oscillation(result) if result.status.is_completed else None,
+                oscillation=result.oscillation if result.status.is_completed else None,
                 failed_draws=0 if rows_of_case is None else failures_of(rows_of_case),
                 reason=reason,
                 scenario=scenario,

@@ -17,11 +17,11 @@ if TYPE_CHECKING:
     from ppafo.storage.foreign import ColumnMap
 
 SetLike = Annotated[str | Path, Word("PARAMETERS")]
+ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 Recorded = Annotated["Recording | str | Path", Word("RECORDING")]
 Motion = Annotated[str, Word("free|measured|locked|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
-ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 
 
 @checked("parameter_set", "recordings", "valve", "overrides")
@@ -70,10 +70,10 @@ def validate(
     ppafo2011 agrees with 1 recording: every RMS error is within its limit; nothing but noise is left
     """
     name_plugins(plugins)
-    from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of, named_column_map
+    from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of
     from ppafo.errors import DataError, nearest_name, one_line
     from ppafo.parameters import load_device
-    from ppafo.storage.foreign import ColumnMap
+    from ppafo.storage.foreign import ColumnMap, named_column_map
     from ppafo.validation.agreement import ReplaySettings, compare_recording
     from ppafo.validation.causes import causes_of
     from ppafo.validation.measured import Measured, parse_thresholds, read_measured

@@ -18,7 +18,6 @@ from ppafo.report.panels import Panel
 from ppafo.report.residuals import Course, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.storage.foreign import ColumnMap, load_column_map
 from ppafo.units.shown import in_units
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import (
@@ -89,12 +88,6 @@ class Validation:
             "recordings": [_recording_data(agreement) for agreement in self.recordings],
             "versions": {"ppafo": __version__},
         }
-
-
-def named_column_map(text: str) -> ColumnMap:
-    """Return the map that is named as a file, and by name where the file has several."""
-    path, separator, name = text.rpartition(".toml:")
-    return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text)
 
 
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}

@@ -402,8 +402,8 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
         shortened = f"step / {add(smaller)}(1.0, tolerance)"
         within = f"{add(smaller)}({add(larger)}({level}, plant.angle_min), plant.angle_max)"
         room = "plant.atmospheric_pressure"
-        yield f"held = {add(program.actuator.chambers)}(plant, {within}, {room}, {room})"
-        yield f"needs_parts = not {add(is_slow)}(plant, {shortened}, held.volume_1, held.volume_2, {stiffness})"
+        yield f"smallest = {add(program.actuator.chambers)}(plant, {within}, {room}, {room})"
+        yield f"needs_parts = not {add(is_slow)}(plant, {shortened}, smallest.volume_1, smallest.volume_2, {stiffness})"
 
     # Controller, reference, prescribed angle and gas.
     if program.controller is not None:

@@ -271,8 +271,11 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int,
         # So far from where it was linearised the interval of a straight line means nothing.
         low, high = min(low, free.low), max(high, free.high)
         others = [other for other in combination if other != name]
-        text = f"trades off against {' and '.join(others)}" if others else "the recordings are hardly sensitive to it"
-        text += "; fix it, give a prior, or make another recording"
+        remedy = "fix it, give a prior, or make another recording"
+        text = f"trades off against {' and '.join(others)}; {remedy}"
+        if not others:
+            # Where the model lacks something, that may be what moves a number so far from its start.
+            text = conflict or f"the recordings are hardly sensitive to it; {remedy}"
     elif bound is not None:
         end, unit = in_shown_unit(bound, number.unit)
         verdict, text = "at its bound", f"the recordings want a value at or beyond {end:.6g} {unit}".rstrip(" -")

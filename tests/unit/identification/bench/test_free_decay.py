@@ -92,6 +92,11 @@ def test_gravity_holds_for_this_model_only() -> None:
     assert "another torque acts" in free_decay((swing,), start=0.0, rise=0.0).conflict
 
 
+def test_too_few_samples_between_start_and_end_are_refused() -> None:
+    with pytest.raises(IdentificationError, match="at least 20 samples between start and end, there are 2"):
+        free_decay((planted.decay(),), start=7.99)
+
+
 def with_velocity(factor: float = 1.0) -> Source:
     """A decay whose angular velocity was recorded too, times a factor."""
     source = planted.decay()
