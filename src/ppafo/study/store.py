@@ -193,7 +193,7 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
     columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
     columns["reason"] = TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics")
     columns[OSCILLATES] = TableColumn(
-        _flags(configuration, result), _PLAIN, "1 where the torque loop oscillates, empty where that is not known"
+        _flags(configuration, result), _PLAIN, "1 where the loop oscillates, empty where that is not known"
     )
     for metric in study.outputs.metrics:
         computed = result.metrics.get(metric, np.full(part.runs, np.nan))

@@ -245,9 +245,10 @@ def remarks_of(comparison: Compared) -> list[str]:
         # Compared by what they follow and not by file: two configurations may name one task differently.
         others = [name for name, what in asked.items() if what != asked[comparison.baseline]]
         if others:
+            follow, run = ("follows", "runs") if len(others) == 1 else ("follow", "run")
             said.append(
-                f"task '{task.task}': {', '.join(others)} follow a different reference, or run for a different time, "
-                f"than {comparison.baseline}: the differences come partly from the task"
+                f"task '{task.task}': {', '.join(others)} {follow} a different reference, or {run} for a different "
+                f"time, than {comparison.baseline}: the differences come partly from the task"
             )
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"

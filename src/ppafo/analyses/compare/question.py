@@ -53,7 +53,7 @@ def compare(
         written
     baseline: configuration that all others are compared with; default: the first
     draws: draws of the uncertain values; default 4096
-    check: end with exit code 1 where the torque loop of a nominal run oscillates
+    check: end with exit code 1 where the loop of a nominal run oscillates
     plugins: modules of your own, files or names, whose objects files may name
 
     >>> import ppafo

@@ -163,7 +163,7 @@ def _remarks(outcome: Outcome) -> Iterator[str]:
             "that: their rms_error_hold was taken in its place"
         )
     if outcome.oscillating:
-        yield f"in {outcome.oscillating} of {outcome.runs} runs the torque loop oscillates: they count as not met"
+        yield f"in {outcome.oscillating} of {outcome.runs} runs the loop oscillates: they count as not met"
     if outcome.failed:
         yield (
             f"{outcome.failed} of {outcome.runs} runs failed and count as not met; the first: {outcome.first_failure}"

@@ -171,7 +171,7 @@ def outermost(
     if not np.isfinite(search.metrics).any():
         if search.oscillating:
             raise StudyError(
-                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the torque loop "
+                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the loop "
                 "oscillates: leave its gains out, so that they follow the device"
             )
         raise StudyError(

@@ -61,7 +61,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         for failure in first
     ]
     remarks += [
-        f"{name}: in {count:,} runs the torque loop oscillates (column 'oscillates')"
+        f"{name}: in {count:,} runs the loop oscillates (column 'oscillates')"
         for name, count in summary.get("oscillating", {}).items()
         if count
     ]

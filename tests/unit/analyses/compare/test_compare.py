@@ -189,7 +189,7 @@ def test_configurations_that_do_another_thing_are_said_to() -> None:
     wider = ppafo.load_scenario("torque-task-proportional", ["valve.area=12 mm^2"])
     remarks = compare({"base": base, "lower": lower, "wider": wider}).found.remarks
     assert len(remarks) == 1
-    assert "lower follow a different reference" in remarks[0]
+    assert "lower follows a different reference" in remarks[0]
     assert compare({"base": base, "wider": wider}).found.remarks == []
 
 

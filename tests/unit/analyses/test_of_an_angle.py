@@ -1,0 +1,75 @@
+"""Find, compare, sweep, tune and linear models take a loop of an angle or a pressure as they take one of a torque."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import ppafo
+from ppafo.units import from_si
+
+SERVO, SHORT = "cylinder-servo", ["run.duration=0.5 s"]
+
+
+@pytest.mark.parametrize(
+    ("scenario", "vary", "such_that", "low", "high"),
+    [
+        ("swing-foot-angle", "supply.pressure=20..60 psi_g", "rms_angle_error <= 2 deg", 30.0, 55.0),
+        ("pressure-loop", "supply.pressure=35..70 psi_g", "final_pressure_1_error <= 0.5 psi_d", 35.0, 50.0),
+    ],
+)
+def test_the_lowest_supply_that_holds_an_angle_or_a_pressure(
+    scenario: str, vary: str, such_that: str, low: float, high: float
+) -> None:
+    outcome = ppafo.find(scenario, vary=vary, such_that=such_that, grid=8)
+    assert low <= from_si(outcome.found.value, "psi_g", "Pa_a") <= high
+    assert "torque" not in str(outcome)
+
+
+def test_servos_are_compared_by_the_error_of_their_angle() -> None:
+    stiffness = ppafo.load_scenario(SERVO).controller.settings["angle_stiffness"]
+    servos = {
+        name: ppafo.load_scenario(SERVO, {"controller.angle_stiffness": factor * stiffness, "run.duration": 0.5})
+        for name, factor in (("soft", 0.5), ("as it is", 1.0))
+    }
+    text = str(ppafo.compare(servos))
+    assert "RMS angle error (deg)" in text
+    assert "RMS error" not in text
+
+
+def test_a_stiffness_is_tuned_for_the_error_of_an_angle() -> None:
+    tuning: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "servo",
+        "scenario": SERVO,
+        "overrides": SHORT,
+        "search": [{"path": "controller.angle_stiffness", "minimum": "5 N m/rad", "maximum": "60 N m/rad"}],
+        "objective": [{"metric": "rms_angle_error"}],
+        "effort": {"starts": 1, "generations": 3, "candidates_per_gain": 4, "seed": 1},
+    }
+    tuned = ppafo.tune(tuning).found
+    before, after = (case.result.metrics["rms_angle_error"].value for case in (tuned.before, tuned.after))
+    assert after <= before
+    assert tuned.after.result.oscillation is None
+
+
+def test_a_study_has_the_error_of_an_angle_in_its_rows(tmp_path: Path) -> None:
+    study: dict[str, Any] = {
+        "schema_version": 1,
+        "name": "servos",
+        "configurations": [{"name": "servo", "scenario": SERVO, "overrides": SHORT}],
+        "vary": [{"path": "supply.pressure", "kind": "uniform", "minimum": "4 bar_g", "maximum": "6 bar_g"}],
+        "sample": {"method": "random", "runs": 4},
+        "outputs": {"metrics": ["rms_angle_error"], "bands": ["reference_angle"], "every": "50 ms"},
+    }
+    results = ppafo.sweep(study, out=tmp_path / "servos")
+    assert "rms_angle_error" in str(results)
+    assert len(results.plot().axes) >= 2
+
+
+@pytest.mark.parametrize("scenario", [SERVO, "pressure-loop"])
+def test_a_plant_is_linear_near_a_moment_of_a_run_of_an_angle_or_a_pressure(scenario: str) -> None:
+    with pytest.raises(ppafo.ScenarioError, match="take --at with a time"):
+        ppafo.linearise(scenario)
+    model = ppafo.linearise(scenario, at="0.2 s").found
+    assert model.a.shape[0] == len(model.states)
