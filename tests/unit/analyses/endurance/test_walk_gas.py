@@ -199,7 +199,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    words = ["--bottle", PAPER_BOTTLE, "--minutes", "0.2"]
+    words = ["--bottle", PAPER_BOTTLE]
     assert main(["walk", "solenoid-regulators", *words, "--out", "on-bottle"]) == 0
     said = re.search(rf"bottle {PAPER_BOTTLE}: lasts (.*?): (.*)", capsys.readouterr().out)
     assert said is not None
