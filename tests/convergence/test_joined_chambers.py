@@ -20,12 +20,19 @@ from ppafo.engine.scheme.pneumatics import (
     still_change,
 )
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.plant import Openings, ThermalParameters, chamber_pressures, single_port_flow, single_port_flow_slopes
+from ppafo.model.plant import (
+    Openings,
+    ThermalParameters,
+    chamber_pressures,
+    chamber_volumes,
+    single_port_flow,
+    single_port_flow_slopes,
+)
 from ppafo.model.valves import solenoid_recycling
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters, valve_settings
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.plan import plan_run, state_at_start
+from ppafo.simulation.plan import plan_run, state_with_volumes
 from ppafo.simulation.scenario import ProfileChoice
 from tests.reference.reference_slopes import joined_thermal_rates, thermal_gas_rates
 from tests.reference.reference_solver import compare_with_reference
@@ -61,7 +68,8 @@ def stepped(*overrides: str) -> Course:
     )
     plant = plant_parameters(device)
     valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.RecyclingState()
-    state = state_at_start(plant, math.radians(75.0), 0.0, ROOM, ROOM)
+    angle = math.radians(75.0)
+    state = state_with_volumes(plant, angle, 0.0, *chamber_volumes(plant, angle), ROOM, ROOM)
     held = held_chambers(plant, state.angle)
     rows = []
     for number in range(round(0.6 / STEP) + 1):

@@ -35,7 +35,7 @@ from ppafo.model.plant import (
 from ppafo.model.regulator import LineState, SupplyLines, line_pressures
 from ppafo.parameters import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.simulation.plan import state_at_start
+from ppafo.simulation.plan import state_with_volumes
 from ppafo.simulation.scenario import RegulatedLine, SupplyLine
 from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.walking import load_walk
@@ -82,7 +82,9 @@ def end_of(plant: PlantParameters, begun: MovingGas, ports: tuple[SinglePort, Si
 def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     """Both chambers filled at once from full lines, the vane held."""
     state, gas = (
-        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+        state_with_volumes(
+            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
+        ),
         lines_at_start(plant, lines),
     )
     for _ in range(round(DURATION / step)):
@@ -121,7 +123,9 @@ def solved(dorsiflexion: float, lines: SupplyLines) -> tuple[float, ...]:
         return [fed_1 - leak, fed_2 + leak, bottle - second - fed_1, second - fed_2, bottle]
 
     begin, gas = (
-        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+        state_with_volumes(
+            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
+        ),
         lines_at_start(plant, lines),
     )
     start = [begin.mass_1, begin.mass_2, gas.mass_1, gas.mass_2, 0.0]
@@ -163,7 +167,9 @@ def test_what_came_through_is_in_lines_and_chambers(step: float) -> None:
     made, full, begin = (
         filled(plant, LINES, step),
         lines_at_start(plant, LINES),
-        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+        state_with_volumes(
+            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
+        ),
     )
     gained = made.state.mass_1 - begin.mass_1 + made.state.mass_2 - begin.mass_2
     gained += made.lines.mass_1 - full.mass_1 + made.lines.mass_2 - full.mass_2
@@ -175,7 +181,9 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
     plant, step = device(), 2.5e-4
     ports, state = (
         open_ports(plant),
-        state_at_start(plant, ANGLE, 0.0, plant.atmospheric_pressure, plant.atmospheric_pressure),
+        state_with_volumes(
+            plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), plant.atmospheric_pressure, plant.atmospheric_pressure
+        ),
     )
     for _ in range(round(DURATION / step)):
         held, flowing = held_chambers(plant, ANGLE), flowing_now(plant, state, ports)
