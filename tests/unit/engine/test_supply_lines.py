@@ -48,6 +48,12 @@ RELIEVING = ("supply.relieving=true",)
 LINES = SupplyLines(3.0e6, 10.0e-3, 10.0e-6, 30.0e6, 0.8e-3, 4.0e-6, 0.0)
 
 
+def at_rest(plant: PlantParameters) -> PlantState:
+    """Return the vane at rest, both chambers at the pressure of the atmosphere."""
+    room = plant.atmospheric_pressure
+    return state_with_volumes(plant, ANGLE, 0.0, *chamber_volumes(plant, ANGLE), room, room)
+
+
 def device(dorsiflexion: float = 0.7) -> PlantParameters:
     """The paper's device; dorsiflexion has its own, lower pressure."""
     plant = plant_parameters(load_device("ppafo2011"))
