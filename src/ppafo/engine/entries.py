@@ -7,6 +7,7 @@ what the entries call. Every compiler reads them there; Python itself runs the t
 import ast
 import inspect
 import textwrap
+import threading
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import pairwise
@@ -14,6 +15,11 @@ from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_
 
 import numpy as np
 from numpy.typing import NDArray
+
+PARSING = threading.RLock()
+"""Held by whoever makes a syntax tree: programs are compiled in threads, and Python 3.11 keeps one depth for the trees
+of all threads; it ends with a SystemError where the garbage collector lets a second one parse before the first is done
+(CPython issue 106905)."""
 
 FLOAT, INT = "float64", "int64"
 ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
@@ -67,14 +73,21 @@ def indent(lines: Iterable[str]) -> list[str]:
     return [f"    {line}" for line in lines]
 
 
+def parse_expression(text: str) -> ast.expr:
+    """Return the syntax tree of an expression, one thread at a time."""
+    with PARSING:
+        return ast.parse(text, mode="eval").body
+
+
 def entry_types(source: str) -> dict[str, list[str]]:
     """Types of the parameters of all entries of a text, in order, by the name of the entry."""
     types = {}
     for mark, head in pairwise(source.split("\n")):
         if mark.startswith(_MARK):
             # The mark holds a signature, which reads as a call: void(float64[:, ::1], int64).
-            signature = ast.literal_eval(mark.removeprefix(_MARK).removesuffix(")"))
-            call = ast.parse(signature, mode="eval").body
+            with PARSING:
+                signature = ast.literal_eval(mark.removeprefix(_MARK).removesuffix(")"))
+            call = parse_expression(signature)
             assert isinstance(call, ast.Call)
             types[head.removeprefix("def ").partition("(")[0]] = [ast.unparse(kind) for kind in call.args]
     return types
@@ -95,7 +108,8 @@ def array_module(functions: Iterable[Callable[..., None]]) -> str:
     for function in functions:
         hints = get_type_hints(function, include_extras=True)
         types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
-        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+        with PARSING:
+            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
         assert isinstance(tree, ast.FunctionDef)
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         lines = [line for item in body for line in ast.unparse(item).split("\n")]

@@ -10,7 +10,7 @@ from copy import deepcopy
 from types import FunctionType
 from typing import NamedTuple, Protocol
 
-from ppafo.engine.entries import HEADER, indent
+from ppafo.engine.entries import HEADER, indent, parse_expression
 from ppafo.engine.generator import Composed, StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED, VECTOR, lanes_of
 from ppafo.engine.plain_python import parse_module
@@ -40,7 +40,7 @@ class Call(NamedTuple):
 
     def places(self, slot: Slot) -> list[str]:
         """Where in its history the phase sets a number, but for the lane."""
-        arguments = {name: ast.parse(text, mode="eval").body for name, text in self.given.items()}
+        arguments = {name: parse_expression(text) for name, text in self.given.items()}
         return [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
 
 
@@ -229,7 +229,7 @@ class _Cells(ast.NodeTransformer):
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         path = ast.unparse(node).removeprefix("lane.")
-        return ast.parse(self.cells[path], mode="eval").body if path in self.cells else node
+        return parse_expression(self.cells[path]) if path in self.cells else node
 
 
 class _OfRun(ast.NodeTransformer):

@@ -6,16 +6,14 @@ the walk through the whole (``translation/walk.py``), as a line of the file that
 
 import ast
 import re
-import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from ppafo.engine.entries import ORIGIN
+from ppafo.engine.entries import ORIGIN, PARSING
 from ppafo.errors import ProgramError, one_line
 
-_PARSING = threading.RLock()
 _PLAIN = {
     *(ast.Return, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.For, ast.While, ast.If, ast.Break, ast.Continue),
     *(ast.Pass, ast.Expr, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.IfExp, ast.Compare, ast.Call, ast.keyword),
@@ -68,12 +66,8 @@ def place(file: str, line: int) -> str:
 
 
 def parse_module(text: str, path: str = "<unknown>") -> ast.Module:
-    """Return the syntax tree of a text, one thread at a time; SyntaxError as Python says it.
-
-    Python 3.11 keeps one depth for the trees of all threads, and ends with a SystemError where the garbage collector
-    lets a second thread parse before the first is done (CPython issue 106905).
-    """
-    with _PARSING:
+    """Return the syntax tree of a text, one thread at a time; SyntaxError as Python says it."""
+    with PARSING:
         return ast.parse(text, path)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from ppafo.engine.cache.programs import load_generated
-from ppafo.engine.entries import INLINE
+from ppafo.engine.entries import FLOAT, INLINE, entry_text, entry_types
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.source_text import SourceCollector, without_origins
 from ppafo.errors import PpafoError, ProgramError
@@ -500,3 +500,8 @@ def test_threads_parse_although_python_counts_the_depth_of_all_trees_in_one_plac
     with ThreadPoolExecutor(4) as pool:
         trees = list(pool.map(parse_module, [flat, deep] * 10))
     assert [len(tree.body) for tree in trees] == [200, 20] * 10
+    # What a compiler reads of a text beside that: the types of its entries.
+    text = entry_text("run", {f"number_{place}": FLOAT for place in range(200)}, ["pass"])
+    with ThreadPoolExecutor(4) as pool:
+        read = [pool.submit(parse_module, deep) if place % 2 else pool.submit(entry_types, text) for place in range(40)]
+    assert all(len(types.result()["run"]) == 200 for types in read[::2])
