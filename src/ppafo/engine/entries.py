@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 PARSING = threading.RLock()
-"""Held by whoever makes a syntax tree: programs are compiled in threads, and Python 3.11 keeps one depth for the trees
-of all threads; it ends with a SystemError where the garbage collector lets a second one parse before the first is done
-(CPython issue 106905)."""
+"""Held by whoever makes a syntax tree: Python 3.11 keeps one depth for the trees of all threads, and ends with a
+SystemError where the garbage collector lets a second one parse before the first is done (CPython issue 106905)."""
 
 FLOAT, INT = "float64", "int64"
 ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
@@ -85,8 +84,7 @@ def entry_types(source: str) -> dict[str, list[str]]:
     for mark, head in pairwise(source.split("\n")):
         if mark.startswith(_MARK):
             # The mark holds a signature, which reads as a call: void(float64[:, ::1], int64).
-            with PARSING:
-                signature = ast.literal_eval(mark.removeprefix(_MARK).removesuffix(")"))
+            signature = ast.literal_eval(parse_expression(mark.removeprefix(_MARK).removesuffix(")")))
             call = parse_expression(signature)
             assert isinstance(call, ast.Call)
             types[head.removeprefix("def ").partition("(")[0]] = [ast.unparse(kind) for kind in call.args]
