@@ -10,11 +10,10 @@ from ppafo.loading import scenario_or_load
 from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 
 if TYPE_CHECKING:
-    from ppafo.control.kind import ControllerKind
     from ppafo.simulation.oscillation import Gains
 
 
@@ -43,7 +42,7 @@ def gains(scenario: Scenario) -> "Gains | None":
     """Return the gains in force of a scenario's torque law; None for a law that has none."""
     from ppafo.simulation.oscillation import gains_of
 
-    law = _law(scenario)
+    law = scenario.law
     return None if law is None else gains_of(scenario, law)
 
 
@@ -51,7 +50,7 @@ def most_reversals(scenario: Scenario) -> float:
     """Return the ``command_reversals`` of a run above which its loop oscillates; infinite for a law that may turn."""
     from ppafo.simulation import oscillation as rules
 
-    law = _law(scenario)
+    law = scenario.law
     if law is None:
         return math.inf
     stride_time = 0.0
@@ -60,12 +59,6 @@ def most_reversals(scenario: Scenario) -> float:
 
         stride_time = float(walk_of(scenario).gait.stride_time)
     return rules.most_reversals(scenario, law, first(scenario.run.duration), stride_time)
-
-
-def _law(scenario: Scenario) -> "ControllerKind | None":
-    """Return the controller of a scenario; None for a Python object."""
-    is_custom = scenario.controller.kind == PYTHON_CONTROLLER
-    return None if is_custom else scenario.motion.motion_kind.law(scenario)
 
 
 @checked("scenarios", "threads")

@@ -82,11 +82,11 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
         **({} if checked is None else {"check": checked.document()}),
         "folder": str(folder),
     }
-    # A loop that oscillates or stands still is a result that nobody should use: a check that is asked for says so.
-    has_loop = verdict is None and stands is None
-    is_good = result.status.is_completed and (checked is None or (checked.is_determined and has_loop))
+    # A loop that oscillates or stands still makes the result useless, and a check fails.
+    is_useful = verdict is None and stands is None
+    is_good = result.status.is_completed and (checked is None or (checked.is_determined and is_useful))
     return Said(
-        _text(result, error, checked, folder, first),
+        _text(result, error, checked, folder, "" if in_force is None else f"{in_force.sentence}\n"),
         document,
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
         aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
@@ -132,15 +132,13 @@ def list_descriptions() -> list[dict[str, Any]]:
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
 
 
-def _text(
-    result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path, first: Sequence[str]
-) -> str:
+def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path, in_force: str) -> str:
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
     beside = [] if not result.scenario.walks else [walked]
-    head, *rest = str(result).split("\n")
-    # The gains in force stand with the warnings.
-    rest = rest[len(result.warnings) :]
-    return "\n".join([head, *first, *rest, "", *checked, *beside, f"written: {folder} ({written})"])
+    # The gains in force stand below the warnings.
+    head, gap, metrics = str(result).partition("\n\n")
+    run = f"{head}\n{in_force}{gap[1:]}{metrics}"
+    return "\n".join([run, "", *checked, *beside, f"written: {folder} ({written})"])

@@ -36,7 +36,7 @@ _UNKNOWN = 0.5
 def interval_ends(work: Work, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
     """Return the lower and upper ends of all numbers, scaled: ``times`` the standard errors, or more where laws bend.
 
-    Only ends of numbers that are sought are moved, and none inwards. One beyond which nothing tells is its bound.
+    Only intervals of sought numbers change, and only outwards. An end that the samples do not fix is the bound.
     """
     covariance = linear.root @ linear.root.T
     wide = times * np.sqrt(np.diag(covariance))

@@ -63,8 +63,8 @@ def opening_like(module: WasmModule) -> dict[str, Any]:
 
 def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]) -> str:
     """What names a scenario as its file and overrides have it, with what a page changes of it."""
-    told = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
-    return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()[:32]
+    content = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 
 
 @cache

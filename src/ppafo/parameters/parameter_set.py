@@ -30,7 +30,8 @@ from ppafo.parameters.graph import (
 )
 from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
-from ppafo.units import SI, base_value, format_quantity, from_si, split_number, split_pressure_kind, to_si
+from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
+from ppafo.units.shown import pressure_units
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -166,8 +167,7 @@ def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
         if _is_of(unit, si_unit)
     }
     if "Pa_a" in units:
-        unit, kind = split_pressure_kind(units["Pa_a"])
-        units |= {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
+        units |= pressure_units(units["Pa_a"])
     if "rad" in units:
         units["rad/s"] = f"{units['rad']}/s"
     return units

@@ -164,9 +164,9 @@ class Check:
             ),
             (("how it ends",) if self.failed else (), f"the run with {' and that with '.join(self.failed)} diverged."),
         ]
-        told = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
+        sentences = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
         parting = [] if self.parts_at is None else [f"The runs part at t = {self.parts_at:.4g} s."]
-        return " ".join([f"Numerically sensitive: {' Also: '.join(told)}", self.error.sentence, *parting])
+        return " ".join([f"Numerically sensitive: {' Also: '.join(sentences)}", self.error.sentence, *parting])
 
     @in_units(_units_of)
     def __repr__(self) -> str:

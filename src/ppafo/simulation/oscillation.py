@@ -7,6 +7,7 @@ walk above 12 times a stride, else above 10 times a second. A law that only swit
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
 from ppafo.units.shown import in_units, units_in_force
+
+if TYPE_CHECKING:
+    from ppafo.simulation.at_hand import Recorded
 
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Reversals of the command above which a loop oscillates."""
@@ -178,6 +182,17 @@ def most_reversals(scenario: Scenario, law: ControllerKind, duration: float, str
     if not asks_gradually(scenario, law):
         return math.inf
     return duration * (MOST_PER_STRIDE / stride_time if stride_time > 0.0 else MOST_PER_SECOND)
+
+
+def oscillation_in(result: "Recorded") -> Oscillation | None:
+    """Return the verdict on a result, of a walk per stride; None where its loop does not oscillate, or is of yours."""
+    scenario, law = result.scenario, result.scenario.law
+    if law is None:
+        return None
+    metrics, time = {name: metric.value for name, metric in result.metrics.items()}, result.recording.time
+    strides = metrics.get("strides", 0.0) if scenario.walks else 0.0
+    stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
+    return oscillation_of(scenario, law, result.recording, metrics, stride_time)
 
 
 @in_units(lambda scenario, *_, **__: scenario.device.shown)

@@ -20,6 +20,7 @@ from ppafo.parameters.graph import Graph
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
 
 if TYPE_CHECKING:
+    from ppafo.control.kind import ControllerKind
     from ppafo.model.regulator import SupplyLines
 
 PYTHON_CONTROLLER = "python"
@@ -348,6 +349,11 @@ class Scenario:
     def walks(self) -> bool:
         """True where a leg walks with the device, false for a vane alone."""
         return self.motion.motion_kind.section is None
+
+    @property
+    def law(self) -> "ControllerKind | None":
+        """The controller with what the motion adds to it; None for a Python object."""
+        return None if self.controller.kind == PYTHON_CONTROLLER else self.motion.motion_kind.law(self)
 
     @property
     def graph(self) -> Graph:

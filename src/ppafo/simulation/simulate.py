@@ -16,7 +16,7 @@ from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation import at_hand
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, scenario_document
+from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.units.shown import in_units
 from ppafo.version import __version__
 
@@ -111,25 +111,17 @@ class Result:
     @property
     def oscillation(self) -> "Oscillation | None":
         """The verdict where the loop oscillates; None where it does not, or has a controller of yours."""
-        from ppafo.simulation.oscillation import oscillation_of
+        from ppafo.simulation.oscillation import oscillation_in
 
-        scenario = self.scenario
-        if scenario.controller.kind == PYTHON_CONTROLLER:
-            return None
-        metrics, time = {name: metric.value for name, metric in self.metrics.items()}, self.recording.time
-        strides = metrics.get("strides", 0.0) if scenario.walks else 0.0
-        stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
-        return oscillation_of(scenario, scenario.motion.motion_kind.law(scenario), self.recording, metrics, stride_time)
+        return oscillation_in(self)
 
     @property
     def standstill(self) -> "Standstill | None":
         """The verdict where the loop does not move at all; None where it does, or has a controller of yours."""
         from ppafo.simulation.standstill import standstill_of
 
-        scenario = self.scenario
-        if scenario.controller.kind == PYTHON_CONTROLLER or not self.status.is_completed:
-            return None
-        return standstill_of(scenario, scenario.motion.motion_kind.law(scenario), self.recording)
+        law = self.scenario.law
+        return standstill_of(self.scenario, law, self.recording) if law and self.status.is_completed else None
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -184,10 +184,13 @@ class _Table(NamedTuple):
     kind: RecordingKind
 
 
-def named_column_map(text: str) -> ColumnMap:
-    """Return the map that is named as a file, and by name where the file has several: ``logger.toml:bench``."""
+def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:
+    """Return a map, or the one that is named as a file, ``logger.toml:bench``, and its name, empty for a map."""
+    if isinstance(columns, ColumnMap):
+        return columns, ""
+    text = str(columns)
     path, separator, name = text.rpartition(".toml:")
-    return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text)
+    return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text), text
 
 
 def read_foreign(

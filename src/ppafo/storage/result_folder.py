@@ -302,7 +302,10 @@ def read_recording(
     """
     file = Path(path)
     if columns is not None:
-        return _read_mapped(file, columns, atmosphere)
+        from ppafo.storage.foreign import column_map_of, read_foreign
+
+        column_map, map_name = column_map_of(columns)
+        return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
     if file.is_dir() and (file / RUN_FILE).exists():
         return read_result(file).recording
     if file.is_dir():
@@ -336,12 +339,3 @@ def read_recording(
         f"{path}: is neither a .nc nor a {', '.join(TEXT_SUFFIXES)} file nor a result folder; a table of another "
         "suffix is read through a column map, --columns FILE.toml:NAME"
     )
-
-
-def _read_mapped(file: Path, columns: "ColumnMap | str | Path", atmosphere: float) -> Recording:
-    """Return the recording in a table through a column map or the name of one."""
-    from ppafo.storage.foreign import ColumnMap, named_column_map, read_foreign
-
-    if isinstance(columns, ColumnMap):
-        return read_foreign(file, columns, atmosphere=atmosphere)
-    return read_foreign(file, named_column_map(str(columns)), atmosphere=atmosphere, map_name=str(columns))

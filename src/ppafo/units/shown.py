@@ -10,6 +10,8 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import ParamSpec, TypeVar
 
+from ppafo.units.spelling import split_pressure_kind
+
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -38,6 +40,12 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
         return inside
 
     return decorate
+
+
+def pressure_units(level: str) -> dict[str, str]:
+    """Return the units of levels and differences of pressure, by unit in SI, of who writes levels as ``bar_g``."""
+    unit, kind = split_pressure_kind(level)
+    return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
 
 def units_in_force() -> dict[str, str]:

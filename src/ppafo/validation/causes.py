@@ -209,7 +209,7 @@ def causes_of(
             first = max(named, key=lambda one: one.gain)
             # What has no size of its own to fit, a swap or a sign, cannot pass for two other changes.
             is_fitted = len(first.candidate.sizes) > 1 and not first.candidate.name.startswith(_SAMPLES)
-            # One Jacobian, where the first explains, tells what a second would add and what would do in its place.
+            # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
             slopes = search.slopes(first.candidate.at(first.size), first.left, sized) if is_fitted else []
             if search.needs_another(first, slopes):
                 return Causes(None, _cause_of([first], search.penalty), len(tried))

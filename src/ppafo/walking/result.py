@@ -18,7 +18,7 @@ from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, p
 from ppafo.signals import Channel, Recording
 from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
-from ppafo.simulation.oscillation import Oscillation, oscillation_of
+from ppafo.simulation.oscillation import Oscillation, oscillation_in
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
@@ -206,12 +206,8 @@ class WalkResult:
     @property
     def oscillation(self) -> Oscillation | None:
         """The verdict where the torque loop oscillates, None where it does not."""
-        metrics = {name: metric.value for name, metric in self.metrics.items()}
-        strides, time = metrics.get("strides", 0.0), self.recording.time
-        if strides == 0.0 or self.scenario.controller.kind == PYTHON_CONTROLLER:
-            return None
-        of_stride = float(time[-1] - time[0]) / strides
-        return oscillation_of(self.scenario, law_of(self.scenario), self.recording, metrics, of_stride)
+        strides = self.metrics.get("strides")
+        return None if strides is None or strides.value == 0.0 else oscillation_in(self)
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""

@@ -17,8 +17,8 @@ from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.units import format_quantity, split_pressure_kind
-from ppafo.units.shown import in_units
+from ppafo.units import format_quantity
+from ppafo.units.shown import in_units, pressure_units
 from ppafo.version import __version__
 from ppafo.walking.bottle import Schedule, minutes_text, strides_text
 
@@ -49,8 +49,7 @@ class Endurance:
     @property
     def shown(self) -> dict[str, str]:
         """Units in which this is said and drawn, by unit in SI: those of the device, else of the bottle's file."""
-        unit, kind = split_pressure_kind(self.bottle.entries["regulator.set_pressure"].unit)
-        return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d", **self.device_units}
+        return pressure_units(self.bottle.entries["regulator.set_pressure"].unit) | dict(self.device_units)
 
     def json_document(self) -> dict[str, Any]:
         """Return the course, its ending and the bottle as plain data in SI."""

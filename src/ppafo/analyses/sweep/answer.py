@@ -278,7 +278,7 @@ def _panels(results: StudyResults) -> list[Panel]:
 
 
 def _has_values(results: StudyResults, metric: str) -> bool:
-    return any(bool(np.isfinite(values).any()) for values in results.thin(metric, MAXIMUM_DRAWN).values())
+    return any(own[metric]["count"] for own in results.metrics.values())
 
 
 def _kind(results: StudyResults, path: str) -> Kind:

@@ -73,7 +73,7 @@ def validate(
     from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of
     from ppafo.errors import DataError, nearest_name, one_line
     from ppafo.parameters import load_device
-    from ppafo.storage.foreign import ColumnMap, named_column_map
+    from ppafo.storage.foreign import column_map_of
     from ppafo.validation.agreement import ReplaySettings, compare_recording
     from ppafo.validation.causes import causes_of
     from ppafo.validation.measured import Measured, parse_thresholds, read_measured
@@ -98,8 +98,7 @@ def validate(
     )
     if not recordings:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
-    column_map = columns if columns is None or isinstance(columns, ColumnMap) else named_column_map(str(columns))
-    map_name = "" if columns is column_map else str(columns)
+    column_map, map_name = (None, "") if columns is None else column_map_of(columns)
     read: list[Measured] = []
     for path in recordings:
         measured = read_measured(path, device, column_map, map_name)

@@ -58,7 +58,7 @@ def open_valve_flow(
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     upstream, downstream, flow, labels = open_readings(sources, gas)
-    # Beside a laminar gap the ratio tells whether the opening is an orifice.
+    # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
     known_ratio = critical_ratio if law == "both" else None
     opening = Opening(gas, law, area or 1.0, known_ratio)
     size, ratio, largest = _size(opening, area, path), downstream / upstream, float(flow.max())
@@ -78,7 +78,7 @@ def open_valve_flow(
         # Either part may be zero, which is an answer.
         reported = [replace(size, size=alone.size), replace(_BESIDE, size=alone.beside)]
     choked = critical_pressure_ratio(gas.heat_capacity_ratio)
-    # The noise of the pressures tells the more in the flow the nearer they are to each other.
+    # The noise of the pressures shows the more in the flow the nearer they are to each other.
     levels = [_LEVELS[place] for place in np.digitize(ratio, (choked, _NEARLY_EQUAL)).tolist()]
     found, model = solve_flow(
         opening,
