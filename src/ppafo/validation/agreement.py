@@ -18,7 +18,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval, start_of, with_fixed_volume
 from ppafo.simulation.scenario import Leg
 from ppafo.units import from_si
-from ppafo.validation.measured import (
+from ppafo.validation.compared import (
     ACCEPTABLE_FRACTION,
     ANGLE,
     COMPARED,
@@ -27,11 +27,10 @@ from ppafo.validation.measured import (
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
     Limit,
-    Measured,
     Thresholds,
     parse_thresholds,
-    supply_gauge,
 )
+from ppafo.validation.measured import Measured, supply_gauge
 from ppafo.validation.replay import INITIAL_REMEDIES, Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02
