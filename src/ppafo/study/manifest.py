@@ -155,7 +155,7 @@ class _StoredScenario(_Part):
 
 
 class _Stored(_Part):
-    """What every reader of the document relies on; ``check_same_study`` compares it with the study that is asked for."""
+    """What every reader of the document relies on; ``check_same_study`` compares it with the study asked for."""
 
     study: _StoredStudy
     scenarios: dict[str, _StoredScenario]
