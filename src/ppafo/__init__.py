@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.find.question import find as find
     from ppafo.analyses.identify.answer import Identification as Identification
     from ppafo.analyses.identify.question import identify as identify
-    from ppafo.analyses.linearise.answer import LinearModel as LinearModel
+    from ppafo.analyses.linearise.model import LinearModel as LinearModel
     from ppafo.analyses.linearise.question import linearise as linearise
     from ppafo.analyses.parts.solve import Parts as Parts
     from ppafo.analyses.parts.solve import parts as parts
@@ -134,7 +134,7 @@ _HOMES = {
     "ppafo.analyses.endurance.question": ("bottle",),
     "ppafo.analyses.endurance.solve": ("endurance_of_walk",),
     "ppafo.analyses.identify.answer": ("Identification",),
-    "ppafo.analyses.linearise.answer": ("LinearModel",),
+    "ppafo.analyses.linearise.model": ("LinearModel",),
     "ppafo.analyses.parts.solve": ("Parts", "parts"),
     "ppafo.analyses.reproduce.answer": ("Reproduction",),
     "ppafo.analyses.sweep.answer": ("load_study_results",),
