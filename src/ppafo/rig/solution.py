@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.continuous_time import SAME_TIME, Roots, after_stop, mode_at_rest, roots_at_rest, roots_sliding
 from ppafo.engine.led_leg import torque_of_leg
-from ppafo.engine.rows import numbers, rebuild
+from ppafo.engine.rows import numbers, rebuilt
 from ppafo.engine.run import Run
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import Openings, PlantParameters, actuator_torque
@@ -115,7 +115,7 @@ class _Equations:
     def valve_state(self, unknowns: Floats) -> Any:
         """The NamedTuple of the valve's state, from the last of the unknowns."""
         state, values = self.run.program.valve.state, unknowns[UNKNOWNS:].tolist()
-        return state(*values) if self._has_flat_valve else rebuild(state, values)
+        return state(*values) if self._has_flat_valve else rebuilt(state, values)
 
     def openings(self, unknowns: Floats, command: float) -> Openings:
         """Openings of the valve [-] at a command [-]."""

@@ -9,10 +9,10 @@ import numpy as np
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.model.catalog import VALVES, device_effects, find_effects
-from ppafo.model.declaration import Quantity, held_in
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
-from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.parameters.plant import all_settings

@@ -7,8 +7,8 @@ from typing import Any, final
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.entries import indent
-from ppafo.engine.lanes import RECORDED_ANGLE, Segment
 from ppafo.engine.program import Program
+from ppafo.engine.replay import RECORDED_ANGLE, Segment
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
