@@ -15,7 +15,7 @@ from ppafo.errors import DataError, UnitError, nearest_name, one_line
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import lasting_change
-from ppafo.simulation.recorded import (
+from ppafo.simulation.recorded.channels import (
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
@@ -23,8 +23,8 @@ from ppafo.simulation.recorded import (
     check_absolute,
     check_command,
     check_gaps,
-    usual_interval,
 )
+from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.storage import read_recording
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import ColumnMap, read_foreign
