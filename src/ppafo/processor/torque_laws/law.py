@@ -17,9 +17,10 @@ class FixedLaw:
     """The integer form of a controller of the catalogue.
 
     ``kind`` runs it in the lanes: its update reads the converter, calls ``sample``, which is the law itself, and gives
-    the command back as a number from -1 to 1. ``numbers`` is the NamedTuple class of what ``sample`` is given beside state and readings;
-    ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and ``state_ranges`` has lowest and
-    highest of every number of it, by its own name; its ``sound`` is what a processor reports.
+    the command back as a number from -1 to 1. ``numbers`` is the NamedTuple class of what ``sample`` is given beside
+    state and readings; ``number_quantities`` declare the numbers, in order. The state ``begins`` so, and
+    ``state_ranges`` has lowest and highest of every number of it, by its own name; its ``sound`` is what a processor
+    reports.
     """
 
     kind: ControllerKind
