@@ -21,7 +21,7 @@ from ppafo.simulation.recorded.replay import with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.scenario import Leg
 from ppafo.units import from_si
-from ppafo.validation.measured import (
+from ppafo.validation.compared import (
     ACCEPTABLE_FRACTION,
     ANGLE,
     COMPARED,
@@ -30,11 +30,10 @@ from ppafo.validation.measured import (
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
     Limit,
-    Measured,
     Thresholds,
     parse_thresholds,
-    supply_gauge,
 )
+from ppafo.validation.measured import Measured, supply_gauge
 from ppafo.validation.replay import INITIAL_REMEDIES, Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02

@@ -37,7 +37,8 @@ from ppafo.validation.agreement import (
     replay_of,
 )
 from ppafo.validation.candidates import SENSORS, Candidate, Change, Sensor, effects, exchanges, joined, numbers, sizes
-from ppafo.validation.measured import ANGLE, EXPLAINED_FRACTION, PRESSURE_1, PRESSURE_2, Measured
+from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION, PRESSURE_1, PRESSURE_2
+from ppafo.validation.measured import Measured
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
 Flags = NDArray[np.bool_]

@@ -22,7 +22,8 @@ from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import Start
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
-from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
+from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
+from ppafo.validation.measured import Measured
 
 Motion = Literal["free", "measured", "locked", "leg"]
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")

@@ -14,7 +14,7 @@ from ppafo.analyses.design.wearer.wish import (
     WearerSizing,
     Wish,
 )
-from ppafo.analyses.parts.solve import part_titles, parts_to_check
+from ppafo.analyses.parts.sections import part_titles, parts_to_check
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind

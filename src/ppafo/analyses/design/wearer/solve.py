@@ -16,14 +16,13 @@ import numpy as np
 from ppafo.analyses.design.wearer.electrical import electrical_of
 from ppafo.analyses.design.wearer.wish import TOES, WALKS, Device, Offer, Tried, WearerSizing, Wish
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant_faults import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
-from ppafo.parameters.parts import Part, load_catalogue
+from ppafo.parameters.parts import Part, load_catalogue, rated_pressure
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.progress import Progress, Report
 from ppafo.walking.bottle import WALKED

@@ -7,7 +7,7 @@ from typing import Any
 
 from ppafo.analyses.design.wearer.electrical import Electrical
 from ppafo.analyses.endurance.answer import Endurance
-from ppafo.analyses.parts.solve import doubts_data
+from ppafo.analyses.parts.sections import doubts_data
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.parameters.parts import Part
 from ppafo.report.kind import Kind
