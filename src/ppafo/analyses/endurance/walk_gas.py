@@ -99,7 +99,7 @@ class _WalkFile:
 
     def table(self, name: str) -> Mapping[str, Any]:
         """Return a table, {} where there is none; DataError where there is something else."""
-        node: Any = self.content
+        node = self.content
         for part in name.split("."):
             node = node.get(part, {})
             if not isinstance(node, Mapping):
