@@ -76,7 +76,8 @@ def validate(
     from ppafo.storage.foreign import column_map_of
     from ppafo.validation.agreement import ReplaySettings, compare_recording
     from ppafo.validation.causes import causes_of
-    from ppafo.validation.measured import Measured, parse_thresholds, read_measured
+    from ppafo.validation.compared import parse_thresholds
+    from ppafo.validation.measured import Measured, read_measured
     from ppafo.validation.replay import MOTIONS, parse_initial
 
     report = progress or report_nothing
