@@ -13,9 +13,10 @@ from ppafo.exports import filled, in_markdown, template
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
-from ppafo.processor.catalog import target_of
+from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
-from ppafo.processor.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
+from ppafo.processor.torque_laws.catalog import FIXED_LAWS
+from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario

@@ -204,6 +204,13 @@ class WalkResult:
         return 2 * int(self.helped.sum()) >= self.helped.size
 
     @property
+    def peak_torques(self) -> Floats:
+        """The largest torque [N m] of each whole stride (strides,)."""
+        if self.starts.size < 2:
+            return np.zeros(0)
+        return np.maximum.reduceat(self.recording["torque"], self.starts)[:-1]
+
+    @property
     def oscillation(self) -> Oscillation | None:
         """The verdict where the torque loop oscillates, None where it does not."""
         strides = self.metrics.get("strides")

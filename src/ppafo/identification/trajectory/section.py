@@ -41,15 +41,10 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.recorded import (
-    ANGLE,
-    COMMAND,
-    LONGEST_STEP,
-    locked_vane,
-    replay_scenario,
-    start_of,
-    with_fixed_volume,
-)
+from ppafo.simulation.recorded.channels import ANGLE, COMMAND
+from ppafo.simulation.recorded.clock import LONGEST_STEP
+from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
+from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.scenario import Scenario
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
