@@ -55,7 +55,7 @@ REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.st
 
 
 def led_leg(run: Run) -> Walk:
-    """The leg of a run that walks."""
+    """Return the leg of a planned walk."""
     assert run.walk is not None, "a walk has a leg"
     return run.walk
 

@@ -73,7 +73,7 @@ def endurance_of_walk_gas(
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule) -> Endurance:
-    """Return how long a full bottle lasts."""
+    """Return how long a full bottle lasts at a draw, by the schedule of its use."""
     usable = bottle.mass - smallest_mass_when_warm(bottle, draw)
     return Endurance(
         bottle=bottle,

@@ -41,7 +41,7 @@ class WalkGas:
 
 
 def walk_gas(result: WalkResult) -> WalkGas:
-    """Return the gas of a walk."""
+    """Return the gas that a walk takes in a stride, or in its task sequence, with the recording of it."""
     configuration, sequence = result.scenario, walk_of(result.scenario).task_sequence
     gas = result.metrics.get("gas" if sequence is None else "task_sequence_gas")
     time = None if sequence is None else result.metrics.get("task_sequence_time")
