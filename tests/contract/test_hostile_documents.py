@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ppafo.analyses.design.loading import read_design_file
-from ppafo.analyses.endurance.draw import read_walk_gas
+from ppafo.analyses.endurance.walk_gas import read_walk_gas
 from ppafo.analyses.reproduce.publication import load_publication
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.analyses.tune.problem import load_tuning

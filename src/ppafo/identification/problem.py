@@ -307,7 +307,7 @@ def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float
 
 
 class ProblemFile(StrictTable):
-    """A problem file, as it is written."""
+    """Layout of a problem file: the set, the recordings, the procedures and the fit."""
 
     schema_version: Literal[1] = Field(description="version of this layout")
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")

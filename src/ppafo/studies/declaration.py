@@ -77,7 +77,7 @@ class LogUniform(StrictTable):
 
 
 class Normal(StrictTable):
-    """A normal distribution."""
+    """Entry of a study file: a number drawn from a normal distribution."""
 
     path: _Path
     kind: Literal["normal"]
@@ -172,7 +172,7 @@ class Sample(StrictTable):
 
 
 class Outputs(StrictTable):
-    """What is kept of every run."""
+    """Section of a study file: which metrics, traces and bands are kept of every run."""
 
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
     trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
@@ -205,7 +205,7 @@ VARIED = get_args(Varied)
 
 
 class StudyFile(StrictTable):
-    """A study file, as it is written."""
+    """Layout of a study file."""
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
