@@ -25,7 +25,7 @@ from ppafo.parameters.parts import load_catalogue
 from ppafo.rig.experiments import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.storage.foreign import load_column_map
+from ppafo.storage.column_map import load_column_map
 from ppafo.storage.result_folder import read_document, read_recording
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk

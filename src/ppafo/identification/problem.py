@@ -31,7 +31,7 @@ from ppafo.identification.trajectory.section import TrajectorySection, refuse_re
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
-from ppafo.storage.foreign import ColumnMap
+from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]

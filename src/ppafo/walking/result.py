@@ -22,7 +22,8 @@ from ppafo.simulation.oscillation import Oscillation, oscillation_in
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
-from ppafo.storage.opensim import opensim_recording, write_opensim
+from ppafo.storage.opensim import write_opensim
+from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
