@@ -11,7 +11,7 @@ from ppafo.errors import DataError, nearest_name
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import lasting_change
-from ppafo.simulation.recorded import (
+from ppafo.simulation.recorded.channels import (
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
@@ -19,11 +19,12 @@ from ppafo.simulation.recorded import (
     check_absolute,
     check_command,
     check_gaps,
-    usual_interval,
 )
+from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.storage import read_recording
+from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import ColumnMap, read_foreign
+from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units import from_si
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
