@@ -15,8 +15,9 @@ from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
-from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.regulator import SupplyLines
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term

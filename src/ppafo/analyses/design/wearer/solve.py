@@ -20,7 +20,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.model.catalog import VALVES
-from ppafo.model.plant_faults import SHUT_OFF
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Part, load_catalogue, rated_pressure
 from ppafo.parameters.parts.catalogue import DEFAULT
