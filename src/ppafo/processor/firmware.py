@@ -104,7 +104,7 @@ def _written(row: Any) -> str:
 
 
 def macro(quantity: Quantity) -> str:
-    """Name of a number in ``parameters.h``."""
+    """Name that a number has in ``parameters.h``."""
     return f"CONTROLLER_{quantity.name.upper()}"
 
 

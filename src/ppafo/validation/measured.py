@@ -22,8 +22,9 @@ from ppafo.simulation.recorded.channels import (
 )
 from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.storage import read_recording
+from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import ColumnMap, read_foreign
+from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units import from_si
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2

@@ -162,7 +162,7 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
 
 
 def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:
-    """The events of a part of the samples."""
+    """Return the events that lie in a part of the samples, by name."""
     return {name: times[(times >= part.start) & (times < part.stop)] for name, times in events.items()}
 
 

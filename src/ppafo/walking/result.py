@@ -22,7 +22,8 @@ from ppafo.simulation.oscillation import Oscillation, oscillation_in
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
-from ppafo.storage.opensim import opensim_recording, write_opensim
+from ppafo.storage.opensim import write_opensim
+from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
@@ -55,7 +56,7 @@ REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.st
 
 
 def led_leg(run: Run) -> Walk:
-    """The leg of a run that walks."""
+    """Return the leg of a planned walk."""
     assert run.walk is not None, "a walk has a leg"
     return run.walk
 

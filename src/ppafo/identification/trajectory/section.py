@@ -59,7 +59,7 @@ class PriorSection(StrictTable):
 
 
 class ParameterSection(StrictTable):
-    """A number to be fitted."""
+    """Entry of a problem file for a number that is to be fitted."""
 
     path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
     start: Text | None = Field(
@@ -106,7 +106,7 @@ class ExperimentSection(StrictTable):
 
 
 class CandidateSection(StrictTable):
-    """An experiment that could be done next."""
+    """Entry of a problem file for an experiment that could be done next."""
 
     label: _Label
     scenario: Text = Field(description="name of a scenario, or a file relative to this one")
@@ -116,7 +116,7 @@ class CandidateSection(StrictTable):
 
 
 class TrajectorySection(StrictTable):
-    """A trajectory fit, as it is written."""
+    """Section of a problem file for a fit of trajectories."""
 
     parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
     experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")
