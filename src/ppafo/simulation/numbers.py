@@ -14,7 +14,7 @@ from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
-from ppafo.parameters.overrides import either, in_two_forms, one_path
+from ppafo.parameters.overrides import either, in_two_forms, one_path, read_overrides
 from ppafo.parameters.plant import all_settings
 from ppafo.simulation.clock import read_clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
@@ -277,7 +277,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
 
 def time_texts(base: Scenario) -> TimeTexts:
     """Return the times as the scenario's file gives them, or the numbers where the scenario was changed since."""
-    document = apply_overrides(base.origin.content, base.origin.overrides, base.name).document
+    document = apply_overrides(base.origin.content, read_overrides(base.origin.overrides), base.name).document
     texts = {
         section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
         for section in ("run", "controller")

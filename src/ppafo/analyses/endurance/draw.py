@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.errors import DataError, ParameterError, PpafoError, nearest_name, refused_as
+from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, nearest_name, refused_as
+from ppafo.parameters.overrides import read_overrides
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.loading import ScenarioRequest, scenario_of
@@ -176,7 +177,8 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
         if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(given, str | None)):
             raise DataError("'configuration' says no walk")
         folder = Path() if given is None else Path(given).parent
-        return scenario_of(ScenarioRequest(name, given, folder, content, tuple(map(str, overrides))), WALKING)
+        changes = read_overrides(map(str, overrides), ScenarioError)
+        return scenario_of(ScenarioRequest(name, given, folder, content, changes), WALKING)
 
 
 def _table(document: Mapping[str, Any], name: str, file: Path) -> Mapping[str, Any]:
