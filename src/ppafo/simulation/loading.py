@@ -465,10 +465,9 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
 
 def request_again(origin: Origin) -> ScenarioRequest:
     """Return the request of which a scenario was made."""
-    content, overrides = origin.content, read_overrides(origin.overrides, ScenarioError)
-    if origin.file is None:
-        return ScenarioRequest(_called(content), None, Path(), content, overrides)
-    return ScenarioRequest(label(origin.file), origin.file, Path(origin.file).parent, content, overrides)
+    file, content = origin.file, origin.content
+    name, folder = (_called(content), Path()) if file is None else (label(file), Path(file).parent)
+    return ScenarioRequest(name, file, folder, content, read_overrides(origin.overrides, ScenarioError))
 
 
 def _called(content: Mapping[str, Any]) -> str:

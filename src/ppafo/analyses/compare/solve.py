@@ -8,11 +8,8 @@ from ppafo.errors import StudyError, first_twice
 from ppafo.progress import Report
 from ppafo.report.kind import Interval
 from ppafo.simulation.scenario import Scenario
-from ppafo.studies.draws import (
-    Uncertainty,
-    with_new_noise,
-)
-from ppafo.studies.sampling import NOISE
+from ppafo.studies.draws import Uncertainty
+from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Study
 from ppafo.studies.varying import value_at
 from ppafo.study.runs import Rows, Runs, Tally, unvaried

@@ -97,9 +97,9 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si, with_overrides
 from ppafo.report.display_units import display_unit, quantity_of_unit
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.compiling import asked, complaint
