@@ -18,8 +18,9 @@ FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("r
 
 
 class Override(NamedTuple):
-    """An override as it was typed: path and value."""
+    """An override: its words as they were given, path and value in them."""
 
+    words: str
     typed: str
     text: str
 
@@ -34,7 +35,7 @@ def split_override(override: str, error: type[PpafoError] = ParameterError) -> O
     path, separator, text = (part.strip() for part in on_one_line.partition("="))
     if not separator or not path or not text:
         raise error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
-    return Override(path, text)
+    return Override(override, path, text)
 
 
 def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterError) -> tuple[Override, ...]:
@@ -58,7 +59,7 @@ def override_set(
     """
     by_path: dict[str, Override] = {}
     # Sorted, so that of two messages the same one comes in any order.
-    for override in sorted(overrides, key=str):
+    for override in sorted(overrides):
         path = one_path((same or {}).get(override.typed, override.typed), valve)
         if path in by_path:
             raise error(f"overrides '{by_path[path]}' and '{override}': the same value is given twice; omit one")
@@ -93,7 +94,7 @@ def over(
 ) -> tuple[str, ...]:
     """Return two layers of texts as the texts of one set, as ``layered`` does."""
     old, new = (read_overrides(texts, error) for texts in (earlier, later))
-    return tuple(map(str, layered(old, new, error, valve=valve).values()))
+    return tuple(override.words for override in layered(old, new, error, valve=valve).values())
 
 
 def one_path(path: str, valve: str) -> str:
@@ -114,7 +115,7 @@ def check_valve(
 
     The ``error`` names the override and the ``choice`` as it was given.
     """
-    for override in sorted(overrides, key=str) if valve else ():
+    for override in sorted(overrides) if valve else ():
         if valve and of_another_valve(override.typed, valve):
             raise error(f"override '{override}' and {choice}: with the latter that valve is not used; omit one")
 

@@ -157,7 +157,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
 
 def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
     """Return where a scenario comes from; ``named`` are overrides for what the request gives ``instead``."""
-    overrides = (*map(str, request.overrides), *named)
+    overrides = (*(override.words for override in request.overrides), *named)
     return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
 
 
