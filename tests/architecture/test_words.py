@@ -57,7 +57,7 @@ COMPOSED = ("engine/", "translation/", "gym/episodes.py")
 SOMETHING_ELSE = ("answers?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, 'must be a whole number'."""
 ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
-    "analyses/endurance/draw.py": ("'course'", "the old key of a walk"),
+    "analyses/endurance/walk_gas.py": ("'course'", "the old key of a walk"),
     "exports/c_library/program.py": ("'course'|course=", "source text, in which it is the time course of a reference"),
     "identification/trajectory/section.py": ("held: is now locked", "the old key of a problem file"),
 }

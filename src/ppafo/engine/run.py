@@ -149,7 +149,7 @@ def whole_and_rest(delay: float, step: float) -> tuple[float, float]:
 
 
 def batch_of(run: Run) -> Batch:
-    """The run as a batch of one, for the lanes."""
+    """A run as a batch of one lane."""
     return batches_of(run, 1)[0][1]
 
 

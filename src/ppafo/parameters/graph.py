@@ -25,7 +25,7 @@ _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
 
 def itself(number: Any) -> Any:
-    """The number that is followed."""
+    """Return the number that is followed, unchanged."""
     return number
 
 

@@ -29,7 +29,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A tuple without names."""
+    """The type of a tuple without names, by the types of its items."""
 
     types: tuple["Type", ...]
 

@@ -400,7 +400,7 @@ def _as_written(problem: str, written: str) -> str:
 
 
 def kind_of(kind: Type) -> str:
-    """What a value is, in words."""
+    """Return what a value of a type is called in messages."""
     if isinstance(kind, Scalar):
         return "a number"
     if isinstance(kind, Row):

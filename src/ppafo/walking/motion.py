@@ -67,7 +67,7 @@ class WalkMotion:
 
 
 def walk_of(scenario: Scenario) -> WalkMotion:
-    """The motion of a scenario that is a walk."""
+    """Return the motion of a scenario that walks, which has gait, wearer and phases."""
     motion = scenario.motion
     assert isinstance(motion, WalkMotion), "only walks come here"
     return motion

@@ -109,7 +109,7 @@ def vented_state(plant: PlantParameters, filled: Chambers, angle: float, angular
 
 
 def walk_from_strike(now: GaitNow) -> WalkState:
-    """A leg that begins at a heel strike."""
+    """State of a leg that begins to walk at a heel strike."""
     return walk_from(now, HEEL, 0.0)
 
 

@@ -46,7 +46,7 @@ Say = Callable[[str], None]
 
 
 def silent(done: float, total: float) -> None:  # both are there for those who listen
-    """Ignore the progress."""
+    """Ignore how far a walk is, where nobody wants to see it."""
 
 
 @checked("scenario", "minutes", "overrides", "gait", "progress", "task_sequence", "bottle")

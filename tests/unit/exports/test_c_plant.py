@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.exports.c_library import c_library
 from ppafo.exports.c_library.plant import plant_library
-from ppafo.exports.fmu import FLAGS
+from ppafo.exports.fmu.platforms import FLAGS
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
