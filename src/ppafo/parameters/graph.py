@@ -187,6 +187,11 @@ def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[Follows, ..
     }
 
 
+def outside(graph: Graph, *sections: str) -> dict[str, tuple[Follows, ...]]:
+    """Return the links of the numbers that are in none of some sections, such as ``controller``, which are left out."""
+    return {path: links for path, links in graph.items() if path.partition(".")[0] not in sections}
+
+
 def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[Follows, ...]]:
     """Return the links that are still true of numbers which may have been changed by other means since."""
     links_held = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
