@@ -119,8 +119,8 @@ def load_program(program: Program) -> Advancing:
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     different = dict.fromkeys(programs)
-    compilers = compilers_to_try()
-    if len(different) > 1 and compilers:
+    compilers = compilers_to_try() if len(different) > 1 else ()
+    if compilers:
         from ppafo.engine.cache.making import load_all  # most runs have one program
 
         load_all([_current_source(program) for program in different], compilers[0], compiled)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch
 from ppafo.engine.program import Program
-from ppafo.engine.rows import group_of, leaf_paths
+from ppafo.engine.rows import group_of, row_numbers
 from ppafo.signals.meter import MeterKind
 
 
@@ -20,7 +20,7 @@ def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] 
     """
     program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
     clock = replace(batch.clock, record_every=0, measure_every=batch.clock.record_every, trace_every=trace_every)
-    rows = sum(len(leaf_paths(row, name)) for name, row in program.state_rows().items())
+    rows = len(row_numbers(program.state_rows()))
     # Meters begin with zeros; their first sample fills them.
     states = np.zeros((rows, batch.states.shape[1]))
     states[: batch.states.shape[0]] = batch.states

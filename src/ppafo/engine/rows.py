@@ -10,6 +10,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hi
 
 import numpy as np
 
+from ppafo.model.columns import over_runs
 from ppafo.model.declaration import number_of
 
 
@@ -121,3 +122,14 @@ def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, np.dt
             return rebuilt(row, rows[start : start + count])
         start += count
     raise KeyError(name)
+
+
+def of_each(function: Callable[..., Any], *rows: Any) -> Any:
+    """What a function makes of some NamedTuples of floats; where they have arrays (runs,), run by run."""
+    kinds, numbers = [type(row) for row in rows], leaves(rows)
+
+    def from_numbers(*numbers: float) -> Any:
+        rest = iter(numbers)
+        return function(*(rebuilt(kind, rest) for kind in kinds))
+
+    return over_runs(from_numbers, *numbers)
