@@ -39,8 +39,6 @@ from ppafo.gym.tasks import (
     Task,
     finite,
     reward_of,
-    valve_command,
-    valve_or_vent,
     within,
 )
 from ppafo.model.plant import chamber_pressures, joint_torque
@@ -133,7 +131,7 @@ def _kernel(step: StepText, task: Task) -> list[str]:
     rows.cells.update({f"outcome.{name}": f"outcomes[{row}, first + lane]" for row, name in enumerate(Outcome._fields)})
     rows.cells.update({path: f"observations[first + lane, {row}]" for row, path in enumerate(task.observed_paths)})
     add = step.collector.add
-    command = add(valve_or_vent if task.walks else valve_command)
+    command = add(task.command)
     heights = {
         "states": str(count),
         "parameters": str(len(rows.parameter_at)),
@@ -260,7 +258,7 @@ class Environments:
         self._commands = np.zeros((blocks, clock.command_delay + 2, width))
         self._own = np.zeros((blocks, len(OWN_PATHS), width))
         # Where the next actions are written (environments, 1 or 2).
-        self.actions = np.zeros((count, 1 + task.walks))
+        self.actions = np.zeros((count, task.actions))
         self._chosen = np.zeros(count)
         self._observations = np.zeros((count, len(task.observed_paths)))
         self._outcomes = np.zeros((OUTCOMES, count))

@@ -15,12 +15,12 @@ from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
 from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
 from ppafo.parameters.overrides import either, in_two_forms, one_path
-from ppafo.parameters.plant import all_settings
+from ppafo.parameters.plant import number_under, part_of
 from ppafo.simulation.clock import read_clock
 from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
 from ppafo.simulation.motion_kind import Clock
 from ppafo.simulation.overrides import apply_overrides
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
+from ppafo.simulation.scenario import Scenario
 
 TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
 """Paths that decide the clock of a run."""
@@ -66,11 +66,6 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
     return {f"{section}.{quantity.name}": quantity for section, quantity in declared}
 
 
-def device_number_at(device: Device, path: str) -> float:
-    """Return the number at a path of ``device_numbers``, in SI units; not of the form in which an orifice is not."""
-    return float(_number(device, tuple(path.split("."))))
-
-
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     """Return the scenario with numbers replaced, by the paths of ``declared_numbers`` that are not in ``TIMES``.
 
@@ -105,7 +100,7 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
     moved = resolved(
         links,
         {**replaced, **period},
-        lambda path: _number(scenario, _attributes(path, scenario)),
+        lambda path: number_under(scenario, _attributes(path, scenario)),
         _changing_form(scenario, replaced),
     )
     return {path: number for path, number in moved.items() if path not in period}
@@ -113,25 +108,12 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario without links of numbers that were changed since it was loaded."""
-    return holding(scenario.graph, lambda path: _number(scenario, _attributes(path, scenario)))
+    return holding(scenario.graph, lambda path: number_under(scenario, _attributes(path, scenario)))
 
 
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
-    return float(_number(scenario, _attributes(chosen_path(path, scenario), scenario)))
-
-
-def _number(node: Any, attributes: tuple[str, ...]) -> Any:
-    for name in attributes:
-        node = _inner(node, name)
-    return node
-
-
-def _inner(node: Any, name: str) -> Any:
-    # A device has settings of the effects that its set names; those of all others are their defaults.
-    if name == EFFECT_SETTINGS and isinstance(node, Device):
-        return all_settings(node)
-    return node[name] if isinstance(node, Mapping) else getattr(node, name)
+    return float(number_under(scenario, _attributes(chosen_path(path, scenario), scenario)))
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
@@ -151,7 +133,7 @@ def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:
     """Return the path of the angle at which a vane stays, None where it moves."""
-    if scenario.walks or vane_motion(scenario).locked_angle is None:
+    if scenario.motion.locked_angle is None:
         return None
     return LOCKED_ANGLE if LOCKED_ANGLE in scenario.motion.motion_kind.places else "motion.profile.level"
 
@@ -167,7 +149,7 @@ def _attributes(path: str, scenario: Scenario) -> tuple[str, ...]:
 
 def _replace_number(node: Any, attributes: tuple[str, ...], number: Any) -> Any:
     name, inside = attributes[0], attributes[1:]
-    inner = _replace_number(_inner(node, name), inside, number) if inside else number
+    inner = _replace_number(part_of(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
         return {**node, name: inner}
     if any(field.name == name for field in fields(node)):
@@ -204,7 +186,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
 
     Those of the paths in ``gauge`` count from the atmosphere of their run.
     """
-    if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
+    if base.controller.is_outside and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
     # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
@@ -247,7 +229,7 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
         return
     if path in _TEXTS:
         raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
-    if base.controller.kind == PYTHON_CONTROLLER and path.startswith("controller."):
+    if base.controller.is_outside and path.startswith("controller."):
         raise ScenarioError(
             f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
             "a module with a KIND has them (docs/how-to/extend.md)"

@@ -157,7 +157,7 @@ def finding_of(
     overrides = over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)
     said, file = verdict(problem, before, after), problem.scenario.origin.file or problem.scenario.name
     options = " ".join(f'--set "{line}"' for line in overrides)
-    verb = "simulate" if not problem.scenario.walks else "walk"
+    kind = problem.scenario.motion.motion_kind
     remarks = _remarks(problem, after, starts, runs, reached)
     gains = []
     for gain in problem.searched:
@@ -167,7 +167,7 @@ def finding_of(
     listed = ", ".join(f'"{line}"' for line in overrides)
     pasted = (
         f"# {said}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\nppafo.{verb}({problem.scenario.name!r}, {'overrides=' * (verb == 'walk')}[{listed}])\n"
+        f"# in Python\n{kind.python_call(problem.scenario.name, listed)}\n"
     )
     return Finding(
         name="tune",
@@ -193,7 +193,7 @@ def finding_of(
                 across=2,
                 size=(4.4, max(2.6, 0.9 + 0.4 * len(problem.searched))),
             ),
-            Part("To use the gains", code=f"ppafo {verb} {file} {options}"),
+            Part("To use the gains", code=f"ppafo {kind.command} {file} {options}"),
         ),
         found=Tuned(
             tuning=problem.name,

@@ -1,14 +1,17 @@
 """The plant of a scenario or a walk alone: its inputs come from outside at each step."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import singledispatch
+from typing import NamedTuple
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
+from ppafo.errors import ScenarioError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import ExportedProgram
-from ppafo.exports.c_library.files import Library, Surface, c_identifier, library_files
+from ppafo.exports.c_library.files import Library, Setting, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
@@ -17,13 +20,14 @@ from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import (
     Control,
     FreeMotion,
+    Motion,
     PrescribedMotion,
     ProfileChoice,
     Scenario,
     Sensors,
 )
 from ppafo.walking.declaration import FORCES
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import WalkMotion
 from ppafo.walking.preparation import FaultSettings
 
 
@@ -88,48 +92,31 @@ _LEAD_ANGLE = (
 )
 
 
+class Driven(NamedTuple):
+    """How a plant goes on between two steps, in words, and what comes from outside beside the command.
+
+    ``first`` and ``lead`` as in ``PlantAlone``; ``given`` are the channels that are no outputs, since they come in,
+    ``highest`` is the largest command.
+    """
+
+    motion: str
+    command: Input = COMMAND
+    further: tuple[Input, ...] = ()
+    first: tuple[tuple[str, str], ...] = ()
+    lead: tuple[tuple[str, str], ...] = ()
+    given: tuple[str, ...] = ()
+    highest: float = 1.0
+
+
 def plant_of(scenario: Scenario) -> PlantAlone:
     """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
-    chosen = _prescribed_vane(scenario) if not scenario.walks else _commanded_walk(scenario)
-    library, motion = library_of(chosen), chosen.motion
-    command, unseen, highest = COMMAND, {"command", *(kind.reference for kind in CONTROLLED.values())}, 1.0
-    further: tuple[Input, ...] = ()
-    first: tuple[tuple[str, str], ...] = ()
-    lead: tuple[tuple[str, str], ...] = ()
-    if isinstance(motion, PrescribedMotion):
-        # An angle and its rate at each step make a ramp, which the profile of the library already is.
-        said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
-        angle = motion.profile.start_level
-        settings = {setting.path: setting for setting in library.settings}
-        stops = [settings[f"actuator.angle_{end}"].value for end in ("min", "max")]
-        # So fast that the short ramp of the first angle still ends within what a level may be.
-        fastest = (settings["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT
-        further = (
-            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle, *stops),
-            Input("angular_velocity", "rad/s", "its rate", 0.0, -fastest, fastest),
-        )
-        unseen |= {"angle", "angular_velocity"}
-    elif isinstance(motion, FreeMotion):
-        # T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed.
-        is_alone = motion.leg is None
-        said = FREE
-        first = (
-            (("motion_external_torque", "external_torque"),)
-            if is_alone
-            else (("motion_ankle_torque", "-external_torque"),)
-        )
-        lead = (("plant.external_torque", "external_torque"),)
-        joint = "T_ex on the joint" if is_alone else "on the ankle of the leg, -T_2"
-        words = f"torque {joint}, above 0 works against plantarflexion"
-        path = "motion.external_torque" if is_alone else "motion.ankle_torque"
-        range_of = next(setting.quantity for setting in library.settings if setting.path == path)
-        limits = range_of.minimum, range_of.maximum
-        further = (Input("external_torque", "N m", words, motion.outside_torque, *limits),)
-    else:
-        said, command, highest = ON_LEG, WALKING_COMMAND, VENT
+    chosen = _commanded(scenario.motion, scenario)
+    library = library_of(chosen)
+    driven = _driven(chosen.motion, library.settings)
+    unseen = {"command", *driven.given, *(kind.reference for kind in CONTROLLED.values())}
     unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
     # Times of a run and of a controller mean nothing to a plant that is stepped from outside.
     hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
@@ -137,15 +124,54 @@ def plant_of(scenario: Scenario) -> PlantAlone:
     # Metrics need a whole run, which only the caller sees.
     program = replace(library.program.program, meters=(), traced=outputs)
     return PlantAlone(
-        library=replace(library, program=ExportedProgram(program, ()), keeps_times=False),
-        inputs=(command, *further),
-        motion=said,
-        first=(("controller_period", "@.run_step"), ("run_output_interval", "@.run_step"), *first),
-        lead=lead,
-        highest=highest,
+        library=replace(library, program=ExportedProgram(program, ()), rules=()),
+        inputs=(driven.command, *driven.further),
+        motion=driven.motion,
+        first=(("controller_period", "@.run_step"), ("run_output_interval", "@.run_step"), *driven.first),
+        lead=driven.lead,
+        highest=driven.highest,
         hidden=frozenset(hidden | {setting.path for setting in library.settings if setting.path.startswith(unused)}),
         step=chosen.run.step,
     )
+
+
+@singledispatch
+def _driven(motion: Motion, _settings: Sequence[Setting]) -> Driven:
+    """What drives a plant that moves so, whose library has these settings."""
+    raise ScenarioError(f"{motion.label}: a plant that moves so has no library")
+
+
+@_driven.register
+def _prescribed(motion: PrescribedMotion, settings: Sequence[Setting]) -> Driven:
+    # An angle and its rate at each step make a ramp, which the profile of the library already is.
+    by_path = {setting.path: setting for setting in settings}
+    stops = [by_path[f"actuator.angle_{end}"].value for end in ("min", "max")]
+    # So fast that the short ramp of the first angle still ends within what a level may be.
+    fastest = (by_path["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT
+    angle = motion.profile.start_level
+    further = (
+        Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle, *stops),
+        Input("angular_velocity", "rad/s", "its rate", 0.0, -fastest, fastest),
+    )
+    return Driven(LED, COMMAND, further, _FIRST_ANGLE, _LEAD_ANGLE, ("angle", "angular_velocity"))
+
+
+@_driven.register
+def _free(motion: FreeMotion, settings: Sequence[Setting]) -> Driven:
+    # T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed.
+    path, sign, joint = "motion.external_torque", "", "T_ex on the joint"
+    if motion.leg is not None:
+        path, sign, joint = "motion.ankle_torque", "-", "on the ankle of the leg, -T_2"
+    words = f"torque {joint}, above 0 works against plantarflexion"
+    quantity = next(setting.quantity for setting in settings if setting.path == path)
+    torque = Input("external_torque", "N m", words, motion.outside_torque, quantity.minimum, quantity.maximum)
+    first = ((c_identifier(path), f"{sign}external_torque"),)
+    return Driven(FREE, COMMAND, (torque,), first, (("plant.external_torque", "external_torque"),))
+
+
+@_driven.register
+def _on_leg(_motion: WalkMotion, _settings: Sequence[Setting]) -> Driven:
+    return Driven(ON_LEG, WALKING_COMMAND, highest=VENT)
 
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
@@ -208,14 +234,21 @@ def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) ->
     return "\n".join(f"    {settings}->{field} = {value.replace('@.', f'{settings}->')};" for field, value in lines)
 
 
-def _prescribed_vane(scenario: Scenario) -> Scenario:
+@singledispatch
+def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
     """The scenario under a command at every step of its engine; an ankle is prescribed from outside as well."""
-    motion = scenario.motion
-    if isinstance(motion, PrescribedMotion):
-        start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-        settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
-        # It begins where the scenario has it.
-        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
+    return _commanded_vane(scenario)
+
+
+@_commanded.register
+def _commanded_ankle(motion: PrescribedMotion, scenario: Scenario) -> Scenario:
+    start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+    settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
+    # It begins where the scenario has it.
+    return replace(_commanded_vane(scenario), motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
+
+
+def _commanded_vane(scenario: Scenario) -> Scenario:
     # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
@@ -227,15 +260,14 @@ def _prescribed_vane(scenario: Scenario) -> Scenario:
         run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
         sensors=Sensors(),
-        motion=motion,
     )
 
 
-def _commanded_walk(walk: Scenario) -> Scenario:
-    """The walk with a command that is handed in at every step, and sensors that nothing reads."""
+@_commanded.register
+def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
+    # Sensors are there that nothing reads.
     check_can_leave(walk)
     step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
-    motion = walk_of(walk)
     # The forces under the foot are among the outputs.
     forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
     return replace(
