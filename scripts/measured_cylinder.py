@@ -31,7 +31,8 @@ from ppafo.identification.tolerances import tolerances_of
 from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.report.style import BLACK, COLOURS, GREY, house_style
-from ppafo.storage.foreign import load_column_map, read_foreign
+from ppafo.storage.column_map import load_column_map
+from ppafo.storage.foreign import read_foreign
 from ppafo.units import to_si
 
 Floats = NDArray[np.float64]

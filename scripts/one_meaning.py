@@ -31,8 +31,9 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
-from ppafo.gym.environments import TARGETS
-from ppafo.gym.episodes import FromOutside, scenario_episodes
+from ppafo.gym.lanes import FromOutside
+from ppafo.gym.scenario_episodes import scenario_episodes
+from ppafo.gym.world import TARGETS
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.page.wasm import description_of

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
     from ppafo.analyses.find.question import find as find
     from ppafo.analyses.identify.answer import Identification as Identification
     from ppafo.analyses.identify.question import identify as identify
-    from ppafo.analyses.linearise.answer import LinearModel as LinearModel
+    from ppafo.analyses.linearise.model import LinearModel as LinearModel
     from ppafo.analyses.linearise.question import linearise as linearise
-    from ppafo.analyses.parts.solve import Parts as Parts
-    from ppafo.analyses.parts.solve import parts as parts
+    from ppafo.analyses.parts.answer import Parts as Parts
+    from ppafo.analyses.parts.question import parts as parts
     from ppafo.analyses.reproduce.answer import Reproduction as Reproduction
     from ppafo.analyses.reproduce.question import reproduce as reproduce
     from ppafo.analyses.sensitivity.question import sensitivity as sensitivity
@@ -134,8 +134,9 @@ _HOMES = {
     "ppafo.analyses.endurance.question": ("bottle",),
     "ppafo.analyses.endurance.solve": ("endurance_of_walk",),
     "ppafo.analyses.identify.answer": ("Identification",),
-    "ppafo.analyses.linearise.answer": ("LinearModel",),
-    "ppafo.analyses.parts.solve": ("Parts", "parts"),
+    "ppafo.analyses.linearise.model": ("LinearModel",),
+    "ppafo.analyses.parts.answer": ("Parts",),
+    "ppafo.analyses.parts.question": ("parts",),
     "ppafo.analyses.reproduce.answer": ("Reproduction",),
     "ppafo.analyses.sweep.answer": ("load_study_results",),
     "ppafo.analyses.sweep.results": ("StudyResults",),

@@ -10,9 +10,8 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.processor.catalog import CATALOG
+from ppafo.processor.catalog import CATALOG, TARGETS
 from ppafo.processor.simulators import missing_tools
-from ppafo.processor.torque_laws import TARGETS
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 

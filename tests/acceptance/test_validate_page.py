@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.simulation.recorded import COMMAND, SUPPLY
+from ppafo.simulation.recorded.channels import COMMAND, SUPPLY
 from ppafo.storage import read_csv
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "validate-a-model.md").read_text(encoding="utf-8")

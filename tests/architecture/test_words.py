@@ -52,12 +52,12 @@ ALLOWED_IN_PAGES: Mapping[str, tuple[str, str]] = {
 }
 """By page: words that stand there for something else, and for what."""
 
-COMPOSED = ("engine/", "translation/", "gym/episodes.py")
+COMPOSED = ("engine/", "translation/", "gym/kernel.py")
 """Strings there are source text, in which a lane is a lane of a processor."""
 SOMETHING_ELSE = ("answers?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, 'must be a whole number'."""
 ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
-    "analyses/endurance/draw.py": ("'course'", "the old key of a walk"),
+    "analyses/endurance/walk_gas.py": ("'course'", "the old key of a walk"),
     "exports/c_library/program.py": ("'course'|course=", "source text, in which it is the time course of a reference"),
     "identification/trajectory/section.py": ("held: is now locked", "the old key of a problem file"),
 }

@@ -20,7 +20,9 @@ from ppafo.engine.run import batch_of
 from ppafo.exports.c_library import c_library, library_of
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import c_identifier
-from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
+from ppafo.exports.fmu.interface import closed_loop
+from ppafo.exports.fmu.platforms import host_platform
+from ppafo.exports.fmu.unit import functional_unit
 from ppafo.identification.trajectory.problem import declaration_of
 from ppafo.identification.trajectory.problem import with_numbers as with_fitted
 from ppafo.model.catalog import EFFECTS

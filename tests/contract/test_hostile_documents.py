@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from ppafo.analyses.design.loading import read_design_file
-from ppafo.analyses.endurance.draw import read_walk_gas
+from ppafo.analyses.endurance.walk_gas import read_walk_gas
 from ppafo.analyses.reproduce.publication import load_publication
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.analyses.tune.problem import load_tuning
@@ -25,7 +25,7 @@ from ppafo.parameters.parts import load_catalogue
 from ppafo.rig.experiments import check_rig_folder
 from ppafo.rig.preset import load_preset
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.storage.foreign import load_column_map
+from ppafo.storage.column_map import load_column_map
 from ppafo.storage.result_folder import read_document, read_recording
 from ppafo.studies.loading import load_study
 from ppafo.walking.loading import load_walk

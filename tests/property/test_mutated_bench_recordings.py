@@ -18,7 +18,8 @@ from ppafo.identification.bench import (
 from ppafo.identification.bench.flow import GasAt
 from ppafo.identification.source import Source
 from ppafo.storage import read_csv
-from ppafo.storage.foreign import ColumnMap, read_foreign
+from ppafo.storage.column_map import ColumnMap
+from ppafo.storage.foreign import read_foreign
 from tests.repeatable import TOO_SLOW
 
 CO2 = GasAt(0.044, 1.3, 298.0)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from ppafo.errors import PpafoError
 from ppafo.parameters import load_device
-from ppafo.storage.foreign import ColumnMap
+from ppafo.storage.column_map import ColumnMap
 from ppafo.validation.agreement import ReplaySettings, compare_recording
 from ppafo.validation.measured import read_measured
 from ppafo.validation.replay import MOTIONS

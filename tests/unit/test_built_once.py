@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.errors import ProgramError
-from ppafo.exports import fmu
+from ppafo.exports.fmu import platforms
 from ppafo.translation import compiling
 from tests import built_once
 
@@ -23,25 +23,25 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[list[str]]:
         lines.append(line)
         return compiling.asked(line, remedy, folder, scratch)
 
-    monkeypatch.setattr(fmu, "asked", built_once._asked_once(ask))
-    monkeypatch.setattr(fmu, "compiler_for", lambda _name: ["gcc", "-s"])
+    monkeypatch.setattr(platforms, "asked", built_once._asked_once(ask))
+    monkeypatch.setattr(platforms, "compiler_for", lambda _name: ["gcc", "-s"])
     return lines
 
 
 def test_the_same_sources_are_built_once_and_others_anew(asked: list[list[str]], tmp_path: Path) -> None:
     mark = f"/* {tmp_path} */\n"
-    first, again = (fmu.build("linux64", {"a.c": (mark + SOURCE).encode()}, "a.c") for _ in range(2))
+    first, again = (platforms.build("linux64", {"a.c": (mark + SOURCE).encode()}, "a.c") for _ in range(2))
     assert first == again
     assert first.startswith(b"\x7fELF")
     assert len(asked) == 1
-    fmu.build("linux64", {"a.c": (mark + SOURCE.replace("42", "43")).encode()}, "a.c")
+    platforms.build("linux64", {"a.c": (mark + SOURCE.replace("42", "43")).encode()}, "a.c")
     assert len(asked) == 2
 
 
 def test_what_is_refused_is_refused_again(asked: list[list[str]]) -> None:
     for _ in range(2):
         with pytest.raises(ProgramError, match="does not build the library"):
-            fmu.build("linux64", {"a.c": b"double answer(void) {\n"}, "a.c")
+            platforms.build("linux64", {"a.c": b"double answer(void) {\n"}, "a.c")
     assert len(asked) == 2
 
 

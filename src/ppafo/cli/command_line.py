@@ -85,7 +85,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Commands that share their first word."""
+    """Commands that share their first word, as ``sets audit`` and ``sets show`` do."""
 
     summary: str
     actions: Mapping[str, Command]

@@ -41,7 +41,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
                 "list": Command(f"{_DEVICE}:sets_list"),
                 "show": Command(f"{_DEVICE}:sets_show", listing=_SETS),
                 "audit": Command(f"{_DEVICE}:sets_audit", listing=_SETS),
-                "parts": Command(f"{_ANALYSES}.parts.solve:parts"),
+                "parts": Command(f"{_ANALYSES}.parts.question:parts"),
             },
         ),
     },

@@ -20,7 +20,7 @@ FORMATS: dict[str, str] = {
     "walk": "ppafo.walking.declaration",
     "task-sequence": "ppafo.walking.task_sequence",
     "identification": "ppafo.identification.problem",
-    "columns": "ppafo.storage.foreign",
+    "columns": "ppafo.storage.column_map",
     "rig": "ppafo.rig.preset",
     "gait": "ppafo.gait.document",
     "gait-map": "ppafo.gait.recorded.mapping",

@@ -55,19 +55,19 @@ class Joint(NamedTuple):
 
 
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
-    """W [rad/s]: as quick as the torque loop lets it be, or as the torque can change for that way."""
+    """Bandwidth w [rad/s]: as the torque loop allows, or as quickly as the torque can change on the way."""
     by_dead_time = 1.0 / (OUTER_TIMES_INNER * loop.dead_time)
     return min(by_dead_time, power(max(loop.rate, 1.0e-9) / (joint.inertia * joint.travel), THIRD))
 
 
 def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:
-    """k_a = I w^2 [N m/rad]."""
+    """Gain k_a = I w^2 [N m/rad]: torque requested per error of the angle."""
     frequency = bandwidth(loop, joint)
     return joint.inertia * frequency * frequency
 
 
 def angle_damping(loop: TorqueLoop, joint: Joint) -> float:
-    """d_a = 2 I w [N m s/rad], of two equal roots."""
+    """Gain d_a = 2 I w [N m s/rad]: torque requested per rate of that error, for two equal roots."""
     return 2.0 * joint.inertia * bandwidth(loop, joint)
 
 
@@ -82,17 +82,17 @@ def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:
 
 
 def gravity(_loop: TorqueLoop, joint: Joint) -> float:
-    """Largest torque of gravity [N m]."""
+    """Largest torque of gravity on the joint [N m], which a default may follow."""
     return joint.gravity
 
 
 def friction(_loop: TorqueLoop, joint: Joint) -> float:
-    """Friction in motion [N m]."""
+    """Torque of the joint's friction in motion [N m], which a default may follow."""
     return joint.friction
 
 
 def inertia(_loop: TorqueLoop, joint: Joint) -> float:
-    """Inertia [kg m^2]."""
+    """Inertia of the joint [kg m^2], which a default may follow."""
     return joint.inertia
 
 

@@ -21,9 +21,9 @@ CONTROLLERS: Kinds[ControllerKind] = Kinds(
         "damped_proportional": "ppafo.control.controllers.feedback:DAMPED_PROPORTIONAL",
         "feedback_linearisation": "ppafo.control.controllers.model_based:FEEDBACK_LINEARISATION",
         "cascade": "ppafo.control.controllers.cascade:CASCADE",
-        "pid_fixed_point": "ppafo.processor.torque_laws:PID_FIXED_POINT",
-        "on_off_fixed_point": "ppafo.processor.torque_laws:ON_OFF_FIXED_POINT",
-        "on_off_dead_zone_fixed_point": "ppafo.processor.torque_laws:DEAD_ZONE_FIXED_POINT",
+        "pid_fixed_point": "ppafo.processor.torque_laws.pid:PID_FIXED_POINT",
+        "on_off_fixed_point": "ppafo.processor.torque_laws.on_off:ON_OFF_FIXED_POINT",
+        "on_off_dead_zone_fixed_point": "ppafo.processor.torque_laws.on_off:DEAD_ZONE_FIXED_POINT",
     },
 )
 

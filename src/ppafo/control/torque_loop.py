@@ -53,12 +53,12 @@ def torque_in_dead_time(loop: TorqueLoop) -> float:
 
 
 def proportional_gain(loop: TorqueLoop) -> float:
-    """k_p = 1 / (2 R theta) [1/(N m)]."""
+    """Gain k_p = 1 / (2 R theta) [1/(N m)] of a loop whose torque rises at R [N m/s] after a dead time theta [s]."""
     return 0.5 / torque_in_dead_time(loop)
 
 
 def integral_rate(loop: TorqueLoop) -> float:
-    """1 / T_i = 1 / (8 theta) [1/s]."""
+    """Integral action per proportional action, 1 / T_i = 1 / (8 theta) [1/s], at a dead time theta [s]."""
     return 0.125 / loop.dead_time
 
 
@@ -88,12 +88,12 @@ def learning_gain(proportional: float) -> float:
 
 
 def torque_rate(loop: TorqueLoop) -> float:
-    """R [N m/s]."""
+    """Rate R [N m/s] at which the torque rises with the valve fully open."""
     return loop.rate
 
 
 def dead_time(loop: TorqueLoop) -> float:
-    """Theta [s]."""
+    """Dead time theta [s] from a command to the torque that is measured."""
     return loop.dead_time
 
 

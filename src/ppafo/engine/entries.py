@@ -68,7 +68,7 @@ def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -
 
 
 def indent(lines: Iterable[str]) -> list[str]:
-    """The lines, one level further in."""
+    """Lines of Python, each one level further in."""
     return [f"    {line}" for line in lines]
 
 

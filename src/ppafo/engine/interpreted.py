@@ -82,6 +82,6 @@ def _with_views(entry: Callable[..., None], path: str, lines: list[str]) -> Call
 
 
 def empty_rows(rows: int, lanes: int) -> memoryview:
-    """Return the working array of a block."""
+    """Return the working array of a block, rows by lanes, whose numbers are not set."""
     made: Any = np.empty((rows, lanes))
     return memoryview(made)

@@ -33,7 +33,7 @@ HANDED = ("held.", "carried.")
 
 @lru_cache(maxsize=64)
 def lanes_of(program: Program) -> int:
-    """Runs of one block of a program."""
+    """Number of runs that a block of a program takes side by side: all lanes, or half where rows would spill."""
     groups = (program.state_rows(), program.parameter_rows(), program.step_rows())
     # Fewer lanes rather than a block that spills: a miss of the first cache costs more than half-used loops.
     rows = sum(len(leaf_paths(row, name)) for group in groups for name, row in group.items())

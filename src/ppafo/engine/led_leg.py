@@ -42,7 +42,7 @@ class LedLeg:
 
 
 def shank_at(kind: ProfileKind, shank: Any, time: float) -> ShankNow:
-    """The shank at a time [s]."""
+    """Angle [rad], rate, acceleration and knee of the shank at a time [s], by the profile or gait that leads it."""
     if kind is GAIT_SHANK:
         return shank_in_gait(shank, time)
     angle, rate, acceleration = kind.value(shank, time)

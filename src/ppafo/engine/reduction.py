@@ -130,7 +130,7 @@ class Definition:
 
 
 def names_in(node: ast.AST) -> list[ast.Name]:
-    """All names in a tree."""
+    """Return every name in a tree, where it is read and where it is set."""
     return [inner for inner in ast.walk(node) if isinstance(inner, ast.Name)]
 
 
@@ -587,7 +587,7 @@ def _bound(body: Iterable[ast.stmt]) -> set[str]:
 
 
 def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> ast.expr:
-    """A place in terms of a caller's arguments."""
+    """An expression of a function with the expressions that its caller gives in place of its arguments."""
 
     class Replacing(ast.NodeTransformer):
         def visit_Name(self, node: ast.Name) -> ast.expr:

@@ -10,7 +10,7 @@ from ppafo.model.declaration import number_of
 
 
 def is_row(candidate: object) -> bool:
-    """True for a NamedTuple class."""
+    """True for a NamedTuple class, of whose numbers a row of a lane is made."""
     return isinstance(candidate, type) and issubclass(candidate, tuple) and hasattr(candidate, "_fields")
 
 

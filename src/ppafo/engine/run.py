@@ -25,8 +25,9 @@ if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.gait import GaitSeries, GaitTiming, TimedSequence
     from ppafo.model.leg import LegParameters
-    from ppafo.model.plant_faults import PlantFaults, ShutOff
+    from ppafo.model.plant_faults import PlantFaults
     from ppafo.model.regulator import LineState, SupplyLines
+    from ppafo.model.shut_off import ShutOff
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -78,7 +79,7 @@ class Walk:
         faults: FaultPhases | None = None
         if self.failing is not None:
             from ppafo.engine.step import failing as faults  # most runs have no fault
-            from ppafo.model.plant_faults import POWERED
+            from ppafo.model.shut_off import POWERED
 
             parameters += self.failing
             states.append(POWERED)
@@ -149,7 +150,7 @@ def whole_and_rest(delay: float, step: float) -> tuple[float, float]:
 
 
 def batch_of(run: Run) -> Batch:
-    """The run as a batch of one, for the lanes."""
+    """A run as a batch of one lane."""
     return batches_of(run, 1)[0][1]
 
 

@@ -375,7 +375,7 @@ def composed_lines(lines: Iterable[str], needs: Mapping[str, tuple[str, ...]]) -
 
 @dataclass(slots=True)
 class MadeFrom:
-    """What was read and composed for a text."""
+    """Names that were read and functions that were composed for a text, by which it stays current or not."""
 
     reads: list[Read] = field(default_factory=list)
     functions: list[Made] = field(default_factory=list)

@@ -95,7 +95,7 @@ class Outcome(NamedTuple):
 
 
 def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
-    """What every task shows of a measurement."""
+    """Readings that an agent of any task is shown of a measurement."""
     return Sensed(
         angle=seen.angle, pressure_1=seen.pressure_1 / BAR, pressure_2=seen.pressure_2 / BAR, torque=seen.torque
     )
@@ -118,7 +118,7 @@ def view_angle(
 def view_walk(
     seen: GaitMeasurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> WalkView:
-    """What is observed at a time [s] of a walk."""
+    """Readings that an agent is shown at a time [s] of a walk."""
     return WalkView(
         sensed=sensed_of(seen),
         heel_force=seen.heel_force,
@@ -142,12 +142,12 @@ def remember_strike(memory: Memory, supplied_mass: float, seen: GaitMeasurement,
 
 
 def torque_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Requested less true torque [N m]."""
+    """Error of the torque [N m]: requested less true."""
     return wanted.torque - torque
 
 
 def angle_error(goal: Goal, wanted: Requested, angle: float, phase: float, torque: float) -> float:
-    """Requested less true angle [rad]."""
+    """Error of the angle [rad]: requested less true."""
     return goal.angle - angle
 
 

@@ -31,7 +31,7 @@ from ppafo.identification.trajectory.section import TrajectorySection, refuse_re
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
-from ppafo.storage.foreign import ColumnMap
+from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]
@@ -307,7 +307,7 @@ def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float
 
 
 class ProblemFile(StrictTable):
-    """A problem file, as it is written."""
+    """Layout of a problem file: the set, the recordings, the procedures and the fit."""
 
     schema_version: Literal[1] = Field(description="version of this layout")
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")

@@ -22,17 +22,17 @@ def controlled(angle: float, pressure_1: float, pressure_2: float, torque: float
 
 
 def controlled_angle(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
-    """The angle [rad]."""
+    """Angle [rad] of a measurement, for a loop that controls the angle."""
     return angle
 
 
 def controlled_pressure_1(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
-    """The absolute pressure in chamber 1 [Pa]."""
+    """Absolute pressure in chamber 1 [Pa] of a measurement, for a loop that controls it."""
     return pressure_1
 
 
 def controlled_pressure_2(angle: float, pressure_1: float, pressure_2: float, torque: float) -> float:
-    """The absolute pressure in chamber 2 [Pa]."""
+    """Absolute pressure in chamber 2 [Pa] of a measurement, for a loop that controls it."""
     return pressure_2
 
 
@@ -77,7 +77,7 @@ class Ends(NamedTuple):
 
 
 def stops(ends: Ends) -> tuple[Any, Any]:
-    """Between which angles [rad] a joint turns."""
+    """Return the angles [rad] between which a joint turns."""
     return ends.angle_min, ends.angle_max
 
 

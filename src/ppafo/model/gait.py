@@ -51,7 +51,7 @@ def harmonics(turns: float) -> tuple[Harmonic, ...]:
 
 
 def value_at(series: Series, at: tuple[Harmonic, ...]) -> float:
-    """Value of a series, in its unit."""
+    """Value of a periodic series at a place in the stride, in the unit of the series."""
     by = series.harmonics
     # Two sums that do not wait for each other, each without a loop.
     low = term_value(by[0], at[0]) + term_value(by[1], at[1]) + term_value(by[2], at[2]) + term_value(by[3], at[3])
@@ -206,7 +206,7 @@ def gait_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, time: floa
 
 
 def place_at(timing: GaitTiming, time: float) -> GaitPlace:
-    """The place in the stride at a time [s]."""
+    """Place in the stride [-], from 0 to 1, at a time [s] since a heel strike."""
     # Times are 0 or more, so int() is the floor; math.floor is a call in vector code.
     turns = timing.start + timing.frequency * time
     phase = turns - float(int(turns))

@@ -6,17 +6,17 @@ from ppafo.model import columns
 
 
 def root(number: float) -> float:
-    """Square root of a number."""
+    """Square root of a number of one run."""
     return math.sqrt(number)
 
 
 def larger(first: float, second: float) -> float:
-    """The larger of two numbers."""
+    """The larger of two numbers of one run."""
     return max(first, second)
 
 
 def smaller(first: float, second: float) -> float:
-    """The smaller of two numbers."""
+    """The smaller of two numbers of one run."""
     return min(first, second)
 
 
@@ -31,7 +31,7 @@ def truncated(number: float) -> float:
 
 
 def whole(number: float) -> int:
-    """A whole number as an int."""
+    """A whole number of one run as an int."""
     return int(number)
 
 

@@ -72,7 +72,7 @@ def mix_bits(value: int) -> int:
 
 
 def next_word(value: int) -> int:
-    """The 32-bit word after this one."""
+    """The 32-bit word that follows one in the sequence of the noise generator."""
     return mix_bits((value + 0x1E3779B9) & MASK)
 
 

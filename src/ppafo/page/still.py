@@ -3,14 +3,18 @@
 import math
 from collections.abc import Mapping, Sequence
 from html import escape
-from typing import Any
+from typing import Any, NamedTuple
 
 from ppafo.model.controlled import CONTROLLED
 from ppafo.report.display_units import axis_unit, display_value, quantity_of_unit
 from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
 
+Points = list[tuple[float, float]]
+"""Time [s] and value, in the unit in which it is shown."""
+
 _WIDTH, _HEIGHT = 720.0, 340.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 56.0, 12.0, 30.0, 44.0
+"""Size of the picture, and its margins around the axes, in pixels."""
 _NAMES = {
     "torque": "Torque",
     "angle": "Angle of the ankle",
@@ -21,72 +25,108 @@ _UNITS = {name: CONTROLLED[name].level.unit for name in _NAMES}
 _STEPS = (1.0, 2.0, 5.0, 10.0)
 
 
+class Axes(NamedTuple):
+    """Ticks of time [s] and of the value; the picture goes from the first to the last of each."""
+
+    times: list[float]
+    values: list[float]
+
+    def x(self, time: float) -> str:
+        """Return the place of a time across the picture, in pixels."""
+        width = _WIDTH - _LEFT - _RIGHT
+        return f"{_LEFT + width * (time - self.times[0]) / (self.times[-1] - self.times[0]):.1f}"
+
+    def y(self, value: float) -> str:
+        """Return the place of a value down the picture, in pixels."""
+        height = _HEIGHT - _TOP - _BOTTOM
+        return f"{_TOP + height * (self.values[-1] - value) / (self.values[-1] - self.values[0]):.1f}"
+
+
 def still_of(
     tab: Mapping[str, Any], openings: Sequence[Mapping[str, Any]], programs: Sequence[Mapping[str, Any]]
 ) -> str:
-    """Return the first panel of a tab as the text of an SVG: a curve for each configuration, and the reference."""
-    lead = next((name for name in _NAMES if all(name in opening["courses"] for opening in openings)), "")
-    if not lead:
+    """Return the first panel of a tab as the text of an SVG: a curve for each configuration, and the reference.
+
+    ``openings`` and ``programs`` are of the configurations with which the tab opens, in order. Empty where they share
+    no channel that a panel shows.
+    """
+    channel = next((name for name in _NAMES if all(name in opening["courses"] for opening in openings)), "")
+    if not channel:
         return ""
-    quantity = quantity_of_unit(_UNITS[lead])
-
-    def course(opening: Mapping[str, Any], name: str) -> list[tuple[float, float]]:
-        both = zip(opening["times"], opening["courses"][name], strict=True)
-        return [(time, display_value(value, quantity)) for time, value in both if value is not None]
-
-    curves = [(course(opening, lead), colour) for opening, colour in zip(openings, _colours(programs), strict=False)]
-    reference = CONTROLLED[lead].reference
-    required = course(openings[0], reference) if reference in openings[0]["courses"] else []
-    points = [point for curve in (required, *(points for points, _ in curves)) for point in curve]
+    quantity, reference = quantity_of_unit(_UNITS[channel]), CONTROLLED[channel].reference
+    curves = [_points(opening, channel, quantity) for opening in openings]
+    required = _points(openings[0], reference, quantity) if reference in openings[0]["courses"] else []
+    points = [point for curve in (required, *curves) for point in curve]
     if not points:
         return ""
-    across, up = _ticks([time for time, _ in points]), _ticks([value for _, value in points])
-    wide, high = _WIDTH - _LEFT - _RIGHT, _HEIGHT - _TOP - _BOTTOM
-
-    def x(time: float) -> str:
-        return f"{_LEFT + wide * (time - across[0]) / (across[-1] - across[0]):.1f}"
-
-    def y(value: float) -> str:
-        return f"{_TOP + high * (up[-1] - value) / (up[-1] - up[0]):.1f}"
-
-    def line(curve: Sequence[tuple[float, float]], look: str) -> str:
-        places = [(x(time), y(value)) for time, value in curve]
-        # Of a level stretch its two ends are enough.
-        levels = [up for _, up in places]
-        same = zip(levels, levels[1:], levels[2:], strict=False)
-        kept = [True, *(not before == here == after for before, here, after in same), True]
-        shown = " ".join(f"{across},{up}" for (across, up), is_kept in zip(places, kept, strict=False) if is_kept)
-        return f'<polyline fill="none" {look} points="{shown}"/>'
-
-    def text(words: str, where: str) -> str:
-        return f"<text {where}>{escape(words)}</text>"
-
-    bottom, names, at = _HEIGHT - _BOTTOM, [program["label"] for program in programs], _LEFT
-    parts = [f'<path stroke="#e3e3e3" d="{"".join(f"M{_LEFT} {y(tick)}h{wide}" for tick in up)}"/>']
-    parts += [text(f"{tick:g}", f'x="{_LEFT - 6}" y="{float(y(tick)) + 4:.1f}" text-anchor="end"') for tick in up]
-    parts += [text(f"{tick:g}", f'x="{x(tick)}" y="{bottom + 16}" text-anchor="middle"') for tick in across]
-    parts.append(text("Time (s)", f'x="{_LEFT + wide / 2}" y="{_HEIGHT - 8}" text-anchor="middle"'))
-    label = f"{_NAMES[lead]} ({axis_unit(quantity)})"
-    parts.append(text(label, f'transform="translate(14 {_TOP + high / 2}) rotate(-90)" text-anchor="middle"'))
-    parts += [line(curve, f'stroke="{colour}" stroke-width="2"') for curve, colour in curves]
+    axes = Axes(_ticks([time for time, _ in points]), _ticks([value for _, value in points]))
+    colours = _colours(programs)
+    label = f"{_NAMES[channel]} ({axis_unit(quantity)})"
+    parts = _frame(axes, label)
+    parts += [
+        _line(axes, curve, f'stroke="{colour}" stroke-width="2"')
+        for curve, colour in zip(curves, colours, strict=False)
+    ]
+    legend = list(zip((program["label"] for program in programs), colours, strict=False))
     if required:
-        parts.append(line(required, f'stroke="{BLACK}" stroke-width="1.5" stroke-dasharray="6 4"'))
-    for name, colour in [
-        *zip(names, (colour for _, colour in curves), strict=False),
-        *([("required", BLACK)] if required else []),
-    ]:
-        parts.append(
-            f'<path stroke="{colour}" stroke-width="3" d="M{at} 14h18"/>' + text(name, f'x="{at + 24}" y="18"')
-        )
-        at += 50.0 + 7.0 * len(name)
-    said = escape(f"{tab['title']}: {label} over time, as the page opens", quote=True)
-    look = f'font-family="sans-serif" font-size="12" fill="{GREY}" role="img" aria-label="{said}"'
+        parts.append(_line(axes, required, f'stroke="{BLACK}" stroke-width="1.5" stroke-dasharray="6 4"'))
+        legend.append(("required", BLACK))
+    parts += _legend(legend)
+    described = escape(f"{tab['title']}: {label} over time, as the page opens", quote=True)
+    look = f'font-family="sans-serif" font-size="12" fill="{GREY}" role="img" aria-label="{described}"'
     box = f'xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" width="{_WIDTH:g}"'
     return f"<svg {box} {look}>{''.join(parts)}</svg>"
 
 
+def _points(opening: Mapping[str, Any], channel: str, quantity: str) -> Points:
+    """The course of a channel as the page opens, without samples that have no value."""
+    samples = zip(opening["times"], opening["courses"][channel], strict=True)
+    return [(time, display_value(value, quantity)) for time, value in samples if value is not None]
+
+
+def _frame(axes: Axes, label: str) -> list[str]:
+    """Lines and labels of the ticks, and the titles of both axes."""
+    below, middle = _HEIGHT - _BOTTOM + 16, _LEFT + (_WIDTH - _LEFT - _RIGHT) / 2
+    lines = "".join(f"M{_LEFT} {axes.y(tick)}h{_WIDTH - _LEFT - _RIGHT}" for tick in axes.values)
+    turned = f"translate(14 {_TOP + (_HEIGHT - _TOP - _BOTTOM) / 2}) rotate(-90)"
+    return [
+        f'<path stroke="#e3e3e3" d="{lines}"/>',
+        *(
+            _text(f"{tick:g}", f'x="{_LEFT - 6}" y="{float(axes.y(tick)) + 4:.1f}" text-anchor="end"')
+            for tick in axes.values
+        ),
+        *(_text(f"{tick:g}", f'x="{axes.x(tick)}" y="{below}" text-anchor="middle"') for tick in axes.times),
+        _text("Time (s)", f'x="{middle}" y="{_HEIGHT - 8}" text-anchor="middle"'),
+        _text(label, f'transform="{turned}" text-anchor="middle"'),
+    ]
+
+
+def _legend(entries: Sequence[tuple[str, str]]) -> list[str]:
+    """A short line and a name for each curve, of name and colour, side by side above the axes."""
+    parts, left = [], _LEFT
+    for name, colour in entries:
+        parts.append(f'<path stroke="{colour}" stroke-width="3" d="M{left} 14h18"/>')
+        parts.append(_text(name, f'x="{left + 24}" y="18"'))
+        left += 50.0 + 7.0 * len(name)
+    return parts
+
+
+def _line(axes: Axes, curve: Points, look: str) -> str:
+    """A curve, of whose level stretches the two ends are enough."""
+    places = [(axes.x(time), axes.y(value)) for time, value in curve]
+    heights = [height for _, height in places]
+    level = (before == here == after for before, here, after in zip(heights, heights[1:], heights[2:], strict=False))
+    kept = [True, *(not is_level for is_level in level), True]
+    shown = " ".join(f"{x},{y}" for (x, y), is_kept in zip(places, kept, strict=False) if is_kept)
+    return f'<polyline fill="none" {look} points="{shown}"/>'
+
+
+def _text(words: str, attributes: str) -> str:
+    return f"<text {attributes}>{escape(words)}</text>"
+
+
 def _colours(programs: Sequence[Mapping[str, Any]]) -> list[str]:
-    """The colours that the page gives to configurations: of a valve its own, once, of others what is left."""
+    """The colours that the page gives to configurations: to a valve its own, once, to others what is left."""
     looks = [program["look"] for program in programs]
     free = [number for number in range(1, len(PAGE_COLOURS) + 1) if number not in looks]
     colours = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, final
+from typing import Any, ClassVar, NamedTuple, Protocol, final
 
 from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError, UnitError
@@ -425,8 +425,8 @@ def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides
     b'<!DOCTYPE html>'
     """
     name_plugins(plugins)
-    content, modules, still = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
-    return page_of(TITLE, content, modules, still)
+    content = _content([str(scenario) for scenario in scenarios], tuple(overrides), "page")
+    return page_of(TITLE, content.document, content.modules, content.still)
 
 
 def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
@@ -440,7 +440,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         for named_scenario in reversed(scenarios)
     }
     try:
-        content, modules, _ = _content(list(reversed(named.values())), (), "block")
+        content = _content(list(reversed(named.values())), (), "block")
     except PpafoError:
         return None
     remark = ""
@@ -449,29 +449,21 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
         if isinstance(named_scenario, Scenario) and shorter is not None and shorter < named_scenario.run.duration:
             part = f"{shorter:g} s of the {named_scenario.run.duration:g} s above"
             remark = max(remark, f"It begins with {part}: lengthen run.duration to compare the numbers.")
-    html, policy = block_of(content, modules)
+    html, policy = block_of(content.document, content.modules)
     return LivePart(policy, html, remark)
 
 
-def _content(
-    scenarios: "Sequence[str | Scenario]",
-    overrides: Sequence[str],
-    form: str,
-) -> tuple[dict[str, Any], dict[str, str], str]:
-    """Content of a page, its modules by name, where programs that are the same are there once, and a still picture."""
-    if not 1 <= len(scenarios) <= MOST_SCENARIOS:
-        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
-    loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
-    by_label: dict[str, Scenario] = {}
-    for scenario in loaded:
-        if scenario.name in by_label:
-            raise ScenarioError(f"two scenarios are called '{scenario.name}'; a workbench distinguishes them by name")
-        by_label[scenario.name] = scenario
-    simulated = []
-    for scenario in loaded:
-        spoken = scenario.name.replace("-", " ").replace("_", " ")
-        label = _LABELS.get(scenario.name, spoken[:1].upper() + spoken[1:])
-        simulated.append(Simulated(scenario, module_of(scenario), label))
+class _PageContent(NamedTuple):
+    """What a page simulates and shows, its packed modules by name, and the picture of its first tab."""
+
+    document: dict[str, Any]
+    modules: dict[str, str]
+    still: str
+
+
+def _content(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], form: str) -> _PageContent:
+    """Content of a ``"page"`` or of a ``"block"`` of one; programs that are the same share one module."""
+    simulated = _simulated(scenarios, overrides)
     intervals = known_intervals()
     names: dict[str, str] = {}
     programs = []
@@ -484,23 +476,42 @@ def _content(
     described = {program["name"]: program for program in programs}
     stills = []
     for tab in content["tabs"]:
-        openings = []
-        for program in tab["start"]:
-            one = by_name[program["program"]]
-            if form == "block":
-                openings.append(opening_like(one.module))
-                continue
-            openings.append(opening_of(one.scenario, one.module, usual_values(one.scenario), tab["claims"]))
+        started = [by_name[entry["program"]] for entry in tab["start"]]
         shown = [described[entry["program"]] for entry in tab["start"]]
+        openings = [_opening(program, form, tab["claims"]) for program in started]
         tab["first"] = first_settings(openings, shown)
         # A question is asked where one of the programs has all the settings that it changes.
-        taken = [{setting["key"] for setting in program["settings"] if setting["kept"] != "zero"} for program in shown]
+        settings = [{entry["key"] for entry in program["settings"] if entry["kept"] != "zero"} for program in shown]
         tab["questions"] = [
-            question for question in tab["questions"] if any(set(question["changes"]) <= keys for keys in taken)
+            question for question in tab["questions"] if any(set(question["changes"]) <= keys for keys in settings)
         ]
-        with shown_in(by_name[tab["start"][0]["program"]].scenario.device.shown):
+        with shown_in(started[0].scenario.device.shown):
             stills.append(still_of(tab, openings, shown))
-    return content, {name: text for text, name in names.items()}, stills[0]
+    return _PageContent(content, {name: text for text, name in names.items()}, stills[0])
+
+
+def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) -> list[Simulated]:
+    """The scenarios with their programs and labels; ScenarioError for none, too many, or two of one name."""
+    if not 1 <= len(scenarios) <= MOST_SCENARIOS:
+        raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
+    loaded = [load_scenario(scenario, overrides) if isinstance(scenario, str) else scenario for scenario in scenarios]
+    names = [scenario.name for scenario in loaded]
+    repeated = next((name for place, name in enumerate(names) if name in names[:place]), None)
+    if repeated is not None:
+        raise ScenarioError(f"two scenarios are called '{repeated}'; a workbench distinguishes them by name")
+    simulated = []
+    for scenario in loaded:
+        spoken = scenario.name.replace("-", " ").replace("_", " ")
+        label = _LABELS.get(scenario.name, spoken[:1].upper() + spoken[1:])
+        simulated.append(Simulated(scenario, module_of(scenario), label))
+    return simulated
+
+
+def _opening(simulated: Simulated, form: str, claims: Sequence[str]) -> dict[str, Any]:
+    """What a program shows as it opens, with the metrics called claims; a block opens as the shipped scenario does."""
+    if form == "block":
+        return opening_like(simulated.module)
+    return opening_of(simulated.scenario, simulated.module, usual_values(simulated.scenario), claims)
 
 
 def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:

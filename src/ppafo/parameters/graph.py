@@ -25,7 +25,7 @@ _COUNTS_FROM_ATMOSPHERE = ("supply.", "initial.", "reference.")
 
 
 def itself(number: Any) -> Any:
-    """The number that is followed."""
+    """Return the number that is followed, unchanged."""
     return number
 
 
@@ -177,6 +177,11 @@ def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[Follows, ..
         for path, links in graph.items()
         if path not in replaced
     }
+
+
+def outside(graph: Graph, *sections: str) -> dict[str, tuple[Follows, ...]]:
+    """Return the links of the numbers that are in none of some sections, such as ``controller``, which are left out."""
+    return {path: links for path, links in graph.items() if path.partition(".")[0] not in sections}
 
 
 def holding(graph: Graph, present: Callable[[str], Any]) -> dict[str, tuple[Follows, ...]]:

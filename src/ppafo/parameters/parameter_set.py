@@ -63,7 +63,7 @@ class Entry(StrictTable):
 
 
 class TextEntry(StrictTable):
-    """A name or formula as it was given."""
+    """Entry of a parameter set that is a name or a formula."""
 
     value: Text
     origin: Annotated[Origin, Field(description="how the value came to be known")]
@@ -72,7 +72,7 @@ class TextEntry(StrictTable):
 
 
 class FlagEntry(StrictTable):
-    """A yes or no as it was given."""
+    """Entry of a parameter set that is yes or no."""
 
     value: Annotated[bool, Field(description="true or false")]
     origin: Annotated[Origin, Field(description="how the value came to be known")]

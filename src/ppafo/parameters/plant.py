@@ -41,7 +41,7 @@ def sonic_restriction(orifice: SonicOrifice, gas: Gas, linear_ratio: float) -> R
 
 
 def restriction(orifice: Orifice | SonicOrifice, gas: Gas, linear_ratio: float) -> Restriction:
-    """An orifice in either form with a gas."""
+    """Return an orifice, by conductance or by area, for a gas."""
     if isinstance(orifice, SonicOrifice):
         return sonic_restriction(orifice, gas, linear_ratio)
     return area_restriction(orifice, gas, linear_ratio)

@@ -144,6 +144,8 @@ CORTEX_M4 = Target(
     machine=Machine("mps2-an386", 25.0e6),
 )
 CATALOG: dict[str, Target] = {target.name: target for target in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
+TARGETS = tuple(CATALOG)
+"""Names of the processors that an integer controller can be written for, the usual one first."""
 
 
 def target_of(name: str) -> Target:

@@ -41,7 +41,7 @@ def export_firmware(
     written: firmware (LICENSE, Makefile, README.md, board.h, board_msp430f2013.c, board_simulated.c, controller.c,
     controller.h, host.c, main.c, msp430.h, msp430f2013.ld, parameters.h, start_msp430.c); next: make -C firmware
     """
-    from ppafo.processor.torque_laws import TARGETS
+    from ppafo.processor.catalog import TARGETS
 
     if target is not None and target not in TARGETS:
         hint = nearest_name(target, TARGETS)

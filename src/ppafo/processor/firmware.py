@@ -13,9 +13,10 @@ from ppafo.exports import filled, in_markdown, template
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
-from ppafo.processor.catalog import target_of
+from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
-from ppafo.processor.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
+from ppafo.processor.torque_laws.catalog import FIXED_LAWS
+from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
@@ -103,7 +104,7 @@ def _written(row: Any) -> str:
 
 
 def macro(quantity: Quantity) -> str:
-    """Name of a number in ``parameters.h``."""
+    """Name that a number has in ``parameters.h``."""
     return f"CONTROLLER_{quantity.name.upper()}"
 
 

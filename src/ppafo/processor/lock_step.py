@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
-from ppafo.processor.catalog import target_of
+from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
 from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, Readings, read
 from ppafo.processor.simulators import (
@@ -20,7 +20,6 @@ from ppafo.processor.simulators import (
     Target,
     processor_simulator,
 )
-from ppafo.processor.torque_laws import TARGETS
 from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate

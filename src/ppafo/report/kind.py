@@ -109,7 +109,7 @@ TIME = Kind("Time", "s", "time")
 
 
 def of_metric(name: str, form: str = ".4g") -> Kind:
-    """Return what a metric is."""
+    """Return the kind of quantity of a metric, by which it is shown."""
     return of_stored_metric(name, METRICS[name].unit, form)
 
 

@@ -32,7 +32,7 @@ def result_html(head: str, metrics: Mapping[str, Metric], device: Device, figure
 
 
 def png_of(figure: "Figure") -> bytes:
-    """Return a figure as a picture."""
+    """Return a figure as the bytes of a PNG, for a notebook."""
     return render_figure(figure, ("png",))["png"]
 
 

@@ -110,7 +110,7 @@ PATHS: dict[str, Quantity] = {
 
 
 class PresetValue(StrictTable):
-    """A value of the rig, with its reason."""
+    """A number of the simulated bench in a preset, with its unit and the reason for it."""
 
     value: float = Field(description="the number, in the unit beside it")
     unit: str = Field(description="unit of the number, such as 'mm^2'; empty for a plain number")

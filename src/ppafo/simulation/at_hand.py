@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Recorded(Protocol):
-    """A result with a recording."""
+    """A result of a scenario or a walk that holds its recording."""
 
     @property
     def scenario(self) -> Scenario:

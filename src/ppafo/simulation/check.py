@@ -199,7 +199,7 @@ class Check:
 
 
 class Ran(Protocol):
-    """A finished run."""
+    """A finished run, as its check needs it."""
 
     @property
     def scenario(self) -> Scenario:

@@ -45,7 +45,7 @@ def read_followers(
 
 
 def numbers_of_sensors(sensors: Mapping[str, Any]) -> dict[str, float]:
-    """Return settings of sensors by path."""
+    """Return the settings of sensors by their path in a scenario."""
     return {f"sensors.{name}": number for name, number in sensors.items()}
 
 

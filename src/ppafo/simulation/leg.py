@@ -89,7 +89,7 @@ def _leg_of(scenario: Scenario) -> Leg:
 
 
 def shank_kind(leg: Leg) -> ProfileKind:
-    """What leads the shank of a leg."""
+    """The profile that leads the shank of a leg: a kind by name, or the curves of a gait."""
     return PROFILES[leg.shank.kind] if leg.curves is None else GAIT_SHANK
 
 

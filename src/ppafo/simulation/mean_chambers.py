@@ -130,7 +130,7 @@ def shaped_in_the_middle(settings: Any, stops: Range, around: Surroundings) -> M
 
 
 def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
-    """Growth of chamber 1 of a vane [m^3/rad]."""
+    """Growth of chamber 1 of a vane with the angle [m^3/rad], which is the same everywhere."""
     return settings.displacement_per_radian
 
 

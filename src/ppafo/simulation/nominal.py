@@ -48,12 +48,12 @@ _SPOOL = "proportional"
 
 
 def yes(number: float) -> float:
-    """1, whatever a finite number is."""
+    """Return 1 for any finite number, so that a column of numbers gives one of ones."""
     return 1.0 + 0.0 * number
 
 
 def no(number: float) -> float:
-    """0, whatever a finite number is."""
+    """Return 0 for any finite number, so that a column of numbers gives one of zeros."""
     return 0.0 * number
 
 

@@ -77,7 +77,7 @@ class Limits(NamedTuple):
 
 
 def stops_of(device: Device) -> Limits:
-    """The stops [rad] of a device."""
+    """Angles [rad] of both stops of a device."""
     return limits_of(device, CONTROLLED[ANGLE])
 
 

@@ -90,7 +90,7 @@ def motion_kinds() -> dict[str, MotionKind[Any]]:
 
 
 def shank_table() -> Any:
-    """Return the section of the shank of a leg."""
+    """Return the layout of the section of a scenario file on the shank of a leg."""
     gait = {"gait": (str, Field(min_length=1, description="name of a gait, or a path relative to this file"))}
     return one_of(
         [
@@ -112,7 +112,7 @@ def shank_table() -> Any:
 
 
 def controller_table(kinds: Mapping[str, ControllerKind], suffix: str) -> Any:
-    """Return the section of the controller."""
+    """Return the layout of the section on the controller, of a scenario or walk file."""
     sampling = {
         quantity.name: optional(number_type(quantity), _description(quantity)) for quantity in declaration.SAMPLING
     }

@@ -112,7 +112,7 @@ def area_flow(numbers: FlowNumbers) -> float:
 
 
 def sonic_flow(numbers: FlowNumbers) -> float:
-    """R T times a sonic conductance [m^3/s]."""
+    """Flow of a sonic orifice per pressure, R T times its conductance [m^3/s]."""
     return flow_of_sonic(numbers.molar_mass, numbers.temperature, numbers.orifice_1)
 
 
@@ -139,7 +139,7 @@ def time_in_scenario(signals: Signals) -> float:
 
 
 def time_in_walk(signals: SignalsOfWalk) -> float:
-    """How late the pressure sensors follow [s]."""
+    """Time [s] by which pressure sensors of a walk follow late."""
     return lag_of_sensor(signals.bandwidth)
 
 
@@ -159,7 +159,7 @@ def whole_pressure(_mean: MeanChambers) -> float:
 
 
 def no_pressure(_mean: MeanChambers) -> float:
-    """0 [-], of a pressure that is not."""
+    """Return 0 [-], by which the pressure of the other chamber enters a loop that controls one of them."""
     return 0.0
 
 

@@ -1,7 +1,8 @@
 """Files in and out: recordings as NetCDF and CSV, and result folders. Nothing is ever half written."""
 
 from ppafo.storage.comma_separated import read_csv, write_csv
-from ppafo.storage.netcdf import dataset_of, read_netcdf, write_netcdf
+from ppafo.storage.netcdf import dataset_of, write_netcdf
+from ppafo.storage.netcdf_reading import read_netcdf
 from ppafo.storage.result_folder import StoredResult, check_result_folder, read_recording, read_result, write_result
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""Clocks of loggers: times of day with and without a date, and counters that begin again, as seconds."""
+"""Times of day that loggers write, with and without a date and a zone, as seconds."""
 
 import re
 from collections.abc import Sequence
@@ -11,25 +11,32 @@ from ppafo.errors import DataError, one_line
 from ppafo.signals.recording import Floats
 
 DateOrder = Literal["day month", "month day"]
-Form = Literal["h:min", "min:s"]
+"""What comes first in a date such as 03/04/2026."""
+ClockForm = Literal["h:min", "min:s"]
+"""What a time of day such as 08:10 is."""
 
 _DAY = 86400.0
+"""Seconds of a day."""
 _TIME = re.compile(
     r"T?(?P<first>\d{1,4}):(?P<second>\d{2})(?::(?P<third>\d{2}))?(?:[.,:](?P<fraction>\d+))?"
     r"(?:\s*(?P<half>[AaPp])\.?\s?[Mm]\b\.?)?(?:\s*(?P<zone>Z\b|[+-]\d{2}:?(?:\d{2})?|[A-Z]{2,5}\b(?:[+-]\d{1,2})?))?"
     r"(?:\[[\w/]+\])?"
 )
+"""Hours, minutes and seconds, or two of them, with a fraction, a half of the day (am, pm), a zone and its place."""
 _COMPACT = re.compile(r"(?P<date>\d{8})T(?P<hour>\d{2})(?P<minute>\d{2})(?P<second>\d{2})(?P<rest>.*)")
+"""A date and a time in digits alone, ``20260321T080010``."""
 _YEAR_FIRST = re.compile(r"(\d{4})[-/.]?(\d{2})[-/.]?(\d{2})|(\d{4})[-/.](\d{1,2})[-/.](\d{1,2})")
 _DOTTED = re.compile(r"(\d{1,2})\.\s?(\d{1,2})\.\s?(\d{2,4})")
 _SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
 _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
 _MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name in names.split()}
+"""Number of a month by the first three letters of its name, in English and German."""
 _LONGEST_SHOWN = 40
+"""Characters of a cell that a message repeats."""
 
 
 class _Stamp(NamedTuple):
-    """A time of day [s], what is said of its zone, and the words of the date beside it."""
+    """A time of day [s], its zone, and the words beside it, which may be a date; texts are empty without one."""
 
     seconds: float
     zone: str
@@ -47,55 +54,58 @@ def clock_seconds(
     rows: Sequence[str],
     dates: Sequence[str] | None = None,
     order: DateOrder | None = None,
-    form: Form | None = None,
+    form: ClockForm | None = None,
 ) -> Floats:
     """Return the seconds since the first of some times of day; ``rows`` say where each stands, for messages.
 
-    Without a date a fall by more than half a day is midnight. DataError for a cell that is no time, for what may be
-    two times, and for a clock that changes its zone by name.
+    ``dates`` are cells of a column of dates beside the times; else a date may stand in the cell itself, and without
+    any a fall by more than half a day is midnight. ``order`` says how a date begins, ``form`` what 08:10 is. DataError
+    for a cell that is no time, for what may be two times, and for a clock that changes its zone by name.
     """
     stamps = [_stamp(cell, form, row) for cell, row in zip(cells, rows, strict=True)]
     zones = dict.fromkeys(re.sub(r"[+-].*", "", stamp.zone) for stamp in stamps)
     if len(zones) > 1:
         raise DataError(f"the clock changes its time zone ({', '.join(zones)}): give times of one zone, or numbers")
     seconds = np.array([stamp.seconds - _offset(stamp.zone) for stamp in stamps])
-    words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
-    if any(words):
-        days = _days(words, rows, seconds, order)
+    days_in_words = [stamp.date for stamp in stamps] if dates is None else [cell.strip() for cell in dates]
+    if any(days_in_words):
+        days = _days(days_in_words, rows, seconds, order)
         return np.asarray(_DAY * (days - days[0]) + (seconds - seconds[0]))
     midnights = np.concatenate(([0.0], np.cumsum(np.diff(seconds) < -0.5 * _DAY)))
     return np.asarray(seconds - seconds[0] + _DAY * midnights)
 
 
-def _stamp(cell: str, form: Form | None, row: str) -> _Stamp:
+def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
+    """Return the time of day in a cell; DataError, after what ``row`` says, for one that is none or may be two."""
     text = one_line(cell.strip())
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
         text = f"{compact['date']} {compact['hour']}:{compact['minute']}:{compact['second']}{compact['rest']}"
+    shown = repr(text[:_LONGEST_SHOWN])
     match = _TIME.search(text)
     if match is None:
-        raise DataError(f"{row}: {text[:_LONGEST_SHOWN]!r} is no time of day such as '08:00:10,5'")
+        raise DataError(f"{row}: {shown} is no time of day such as '08:00:10,5'")
     first, second, third = int(match["first"]), int(match["second"]), match["third"]
-    if third is None:
-        # 00:10.5 has a fraction, which minutes have not.
-        is_minutes = form == "min:s" or (form is None and match["fraction"] is not None)
-        if form is None and not is_minutes:
-            raise DataError(
-                f"{row}: {text[:_LONGEST_SHOWN]!r} may be hours and minutes or minutes and seconds; give "
-                'clock = "h:min" or clock = "min:s"'
-            )
-        hour, minute, whole = (0, first, second) if is_minutes else (first, second, 0)
+    if third is not None:
+        hour, minute, whole_seconds = first, second, int(third)
+    # 00:10.5 has a fraction, which minutes have not.
+    elif form == "min:s" or (form is None and match["fraction"] is not None):
+        hour, minute, whole_seconds = 0, first, second
+    elif form == "h:min":
+        hour, minute, whole_seconds = first, second, 0
     else:
-        hour, minute, whole = first, second, int(third)
-    half = (match["half"] or "").lower()
-    is_whole_hour = 1 <= hour <= 12 if half else True
-    if (third is not None and minute > 59) or whole > 60 or not is_whole_hour:
-        raise DataError(f"{row}: {text[:_LONGEST_SHOWN]!r} is no time of day")
-    if half:
-        hour = hour % 12 + (12 if half == "p" else 0)
+        raise DataError(
+            f'{row}: {shown} may be hours and minutes or minutes and seconds; give clock = "h:min" or clock = "min:s"'
+        )
+    half_of_day = (match["half"] or "").lower()
+    # A leap second is the 60th; a logger that writes minutes and seconds alone may count minutes beyond 59.
+    if (third is not None and minute > 59) or whole_seconds > 60 or (half_of_day and not 1 <= hour <= 12):
+        raise DataError(f"{row}: {shown} is no time of day")
+    if half_of_day:
+        hour = hour % 12 + (12 if half_of_day == "p" else 0)
     fraction = float(f"0.{match['fraction']}") if match["fraction"] else 0.0
     beside = f"{text[: match.start()]} {text[match.end() :]}".strip(" T,;")
-    return _Stamp(3600.0 * hour + 60.0 * minute + whole + fraction, match["zone"] or "", beside)
+    return _Stamp(3600.0 * hour + 60.0 * minute + whole_seconds + fraction, match["zone"] or "", beside)
 
 
 def _offset(zone: str) -> float:
@@ -108,25 +118,24 @@ def _offset(zone: str) -> float:
 
 def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: DateOrder | None) -> Floats:
     """Return the day of every date as a number; which of two numbers is the month must show, or be said."""
-    known: dict[tuple[str, DateOrder], int | None] = {}
     orders: tuple[DateOrder, ...] = ("day month", "month day") if order is None else (order,)
-    readings = []
-    for which in orders:
-        for word in dict.fromkeys(words):
-            known[word, which] = _ordinal(word, which)
-        days = [known[word, which] for word in words]
-        missing = next((index for index, day in enumerate(days) if day is None), None)
-        if missing is None:
+    readings: list[Floats] = []
+    unread_row = 0
+    for possible in orders:
+        # Many rows have one date.
+        day_of = {word: _ordinal(word, possible) for word in dict.fromkeys(words)}
+        days = [day_of[word] for word in words]
+        if None in days:
+            unread_row = days.index(None)
+        else:
             readings.append(np.array(days, dtype=np.float64))
-            continue
-        bad = missing
     if not readings:
-        shown = words[bad][:_LONGEST_SHOWN]
-        raise DataError(f"{rows[bad]}: {shown!r} is no date such as '2026-03-21', '21.03.2026' or '03/21/2026'")
+        shown = words[unread_row][:_LONGEST_SHOWN]
+        raise DataError(f"{rows[unread_row]}: {shown!r} is no date such as '2026-03-21', '21.03.2026' or '03/21/2026'")
     # The days between two rows count, not the date; one that goes backwards is none.
     growing = [days for days in readings if (np.diff(_DAY * days + seconds) > 0.0).all()] or readings
-    steps = [days - days[0] for days in growing]
-    if len(steps) > 1 and not np.array_equal(steps[0], steps[1]):
+    since_first = [days - days[0] for days in growing]
+    if len(since_first) > 1 and not np.array_equal(since_first[0], since_first[1]):
         raise DataError(
             f"{rows[0]}: the date {words[0][:_LONGEST_SHOWN]!r} may begin with the day or with the month; give "
             'date_order = "day month" or date_order = "month day"'
@@ -157,23 +166,3 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
         return date(year + 2000 if year < 100 else year, month, day).toordinal()
     except ValueError:
         return None
-
-
-_COUNTERS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
-"""Seconds after which a counter of 32 bits begins again, of microseconds and of milliseconds."""
-_LARGEST_STEP = 10.0
-"""Times the usual interval; a longer one across the fall is a clock that was set back, and no counter."""
-
-
-def counted_on(time: Floats) -> Floats:
-    """Return a time [s] without the falls of a counter of 32 bits, ``micros()`` or ``millis()``; any other as it is."""
-    steps = np.diff(time)
-    falls = steps < 0.0
-    if not falls.any() or not (steps > 0.0).any():
-        return time
-    usual = float(np.median(steps[steps > 0.0]))
-    for period in _COUNTERS:
-        across = steps[falls] + period
-        if (across > 0.0).all() and (across <= _LARGEST_STEP * usual).all():
-            return np.asarray(time + period * np.concatenate(([0.0], np.cumsum(falls))))
-    return time

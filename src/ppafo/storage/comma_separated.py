@@ -23,7 +23,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
-from ppafo.storage.clock import counted_on
+from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes, text_of, write_file
 
 _OTHERS = (

@@ -84,7 +84,7 @@ def read_matlab(path: str | Path) -> MatlabFile:
     """Return the variables in a ``.mat`` file of any version. DataError for a file that is none."""
     is_hdf5 = read_bytes(path)[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5
     # A damaged file can end a library of C code; another process tries it first.
-    check_can_be_read(Path(path), __name__, "open_matlab", "h5py" if is_hdf5 else "scipy.io")
+    check_can_be_read(Path(path), open_matlab, "h5py" if is_hdf5 else "scipy.io")
     return open_matlab(path)
 
 

@@ -1,42 +1,34 @@
-"""Tables of OpenSim, ``.mot`` and ``.sto``, read and written as it does, and tables of markers, ``.trc``.
+"""Tables of OpenSim, ``.mot`` and ``.sto``, read and written as it does.
 
 A header is lines until ``endheader``: ``nRows=211`` and ``inDegrees=yes`` (or the sentence "Angles are in degrees."),
 or in the older style ``datarows 9009``. Then come one line of labels and the rows.
-
-Of a ``.trc`` file lines 1 to 3 are ``PathFileType 4 (X/Y/Z) NAME``, names of the header's values, and these. Line 4 has
-``Frame#``, ``Time`` and a name for every three columns, line 5 ``X1 Y1 Z1 ...``; then come the rows. A marker that was
-not seen leaves its cells empty, or has ``nan``.
-
-A recording in OpenSim's names, zero and signs is at the end. ``ankle_angle_r`` is 0 with the foot square to the shank
-and grows in dorsiflexion [rad]. ``ankle_angle_r_moment`` is the moment along it [N m], below 0 in push-off, and
-``ankle_angle_r_device_moment`` what a device adds. ``ground_force_r_vy`` is the vertical force [N].
-``shank_angle_r`` is no coordinate of OpenSim's models, whose legs have hip and knee: it stays as the package has it, as
-do channels without a counterpart.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, one_line
-from ppafo.signals import Channel, Recording, RecordingKind
+from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
-from ppafo.storage.files import read_bytes, text_of, write_file
+from ppafo.storage.files import write_file
+from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, text_lines
 
 _END = "endheader"
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)", re.IGNORECASE)
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
-_LONGEST_SHOWN = 40
-GAPS, _UNSEEN = ("nan",), ("", "nan")
-"""What stands for a gap in a table, and for a marker that was not seen."""
+_KIND = "kind="
+"""What the header says of a recording that nobody measured, where this package wrote the file."""
+_MOST_DIGITS = 11
+"""Digits of a count in a header; no file has more rows."""
+GAPS = ("nan",)
+"""What stands for a gap in a table."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
@@ -59,11 +51,15 @@ class OpenSimTable:
     is_old: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class _Header:
+class _Header(NamedTuple):
+    """What the header of a table says; counts of rows and columns are None where it has none.
+
+    ``end`` is the index, from 0, of the line that ends it.
+    """
+
     name: str
-    rows: int | None
-    width: int | None
+    row_count: int | None
+    column_count: int | None
     in_degrees: bool | None
     end: int
     kind: RecordingKind
@@ -77,88 +73,136 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
     so. A cell with one of the texts in ``gaps`` is NaN, to fill or to refuse; without them it is refused here.
     """
     try:
-        lines = _text_lines(path)
+        lines = text_lines(path)
         header = _header(lines)
-        number, written = _labels(lines, header)
+        label_line, written = _labels(lines, header)
         labels = told_apart(written)
-        # The numbers, row by row; blank lines may only follow the last row.
-        first = number + 1
-        last = len(lines)
-        while last >= first and not lines[last - 1].strip():
-            last -= 1
-        count = last - first + 1
-        if count <= 0:
-            raise DataError("has labels but no rows")
-        if header.rows is not None and header.rows != count:
-            raise DataError(
-                f"has {count} rows, its header states {header.rows}: the file is cut off or was edited; "
-                "get it again, or correct the header"
-            )
-        table = np.empty((count, len(labels)))
-        for index in range(count):
-            cells = lines[first - 1 + index].split()
-            if len(cells) != len(labels):
-                raise DataError(f"line {first + index} has {len(cells)} values for {len(labels)} columns")
-            table[index, 0] = _number(cells[0], first + index, labels[0])
-            pairs = zip(cells[1:], labels[1:], strict=True)
-            table[index, 1:] = [_number(text, first + index, label, gaps) for text, label in pairs]
-        # Last rows that repeat a time, as some tools write them, are dropped.
-        kept, remarks = count, []
-        while kept > 1 and table[kept - 1, 0] == table[kept - 2, 0]:
-            kept -= 1
-        if kept < count:
-            rows = "the last row repeats" if kept == count - 1 else f"the last {count - kept} rows repeat"
-            was = "was" if kept == count - 1 else "were"
-            remarks.append(f"{rows} the time {table[-1, 0]:g} s and {was} dropped")
-        values = table[:kept]
-        time = values[:, 0]
-        _check_clock(time, range(first, first + kept))
-        if header.width is not None and header.width != len(labels):
-            said = (
-                f"the header states {header.width} columns, labels and every row have {len(labels)}, which were taken"
-            )
-            remarks.insert(0, said)
+        row_lines = _row_lines(lines, label_line + 1, header)
+        table = _numbers(lines, row_lines, labels, gaps)
+        kept = _without_repeated_ends(table)
+        time = kept[:, 0]
+        check_growing(time, row_lines[: len(kept)])
     except DataError as error:
         raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
     twins = doubled(written[1:], labels[1:])
-    named = {label: values[:, index] for index, label in enumerate(labels) if index > 0}
+    named = {label: kept[:, index] for index, label in enumerate(labels) if index > 0}
     columns = without_copies(named, twins)
-    remarks += said_of_doubled(twins, columns, "columns")
     return OpenSimTable(
-        header.name, time, columns, header.in_degrees, number + 1, tuple(remarks), header.kind, header.is_old
+        name=header.name,
+        time=time,
+        columns=columns,
+        in_degrees=header.in_degrees,
+        first_line=row_lines.start,
+        remarks=(
+            *_said_of_width(header, len(labels)),
+            *_said_of_dropped(len(table) - len(kept), float(table[-1, 0])),
+            *said_of_doubled(twins, columns, "columns"),
+        ),
+        kind=header.kind,
+        is_old=header.is_old,
     )
 
 
+def _row_lines(lines: list[str], first: int, header: _Header) -> range:
+    """Return the numbers of the lines with rows, from ``first``; blank lines may only follow the last row."""
+    last = len(lines)
+    while last >= first and not lines[last - 1].strip():
+        last -= 1
+    row_lines = range(first, last + 1)
+    if not row_lines:
+        raise DataError("has labels but no rows")
+    if header.row_count is not None and header.row_count != len(row_lines):
+        raise DataError(
+            f"has {len(row_lines)} rows, its header states {header.row_count}: the file is cut off or was edited; "
+            "get it again, or correct the header"
+        )
+    return row_lines
+
+
+def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequence[str]) -> Floats:
+    """Return the numbers (rows, columns), time first."""
+    table = np.empty((len(row_lines), len(labels)))
+    for row, number in enumerate(row_lines):
+        cells = lines[number - 1].split()
+        if len(cells) != len(labels):
+            raise DataError(f"line {number} has {len(cells)} values for {len(labels)} columns")
+        table[row, 0] = number_in(cells[0], number, labels[0])
+        others = zip(cells[1:], labels[1:], strict=True)
+        table[row, 1:] = [number_in(cell, number, label, gaps) for cell, label in others]
+    return table
+
+
+def _without_repeated_ends(table: Floats) -> Floats:
+    """Return a table without the last rows that repeat a time, as some tools write them."""
+    count = len(table)
+    while count > 1 and table[count - 1, 0] == table[count - 2, 0]:
+        count -= 1
+    return table[:count]
+
+
+def _said_of_width(header: _Header, width: int) -> list[str]:
+    """Return a remark where the header states another number of columns than labels and rows have."""
+    if header.column_count in (None, width):
+        return []
+    stated = header.column_count
+    return [f"the header states {stated} columns, labels and every row have {width}, which were taken"]
+
+
+def _said_of_dropped(count: int, time: float) -> list[str]:
+    """Return a remark on a number of last rows that repeated a time [s] and were dropped."""
+    if not count:
+        return []
+    rows, verb = ("the last row repeats", "was") if count == 1 else (f"the last {count} rows repeat", "were")
+    return [f"{rows} the time {time:g} s and {verb} dropped"]
+
+
 def _header(lines: list[str]) -> _Header:
+    """Return what the lines until ``endheader`` say; DataError names the line of what is not usable."""
     end = next((index for index, line in enumerate(lines) if line.strip().lower() == _END), None)
     if end is None:
         raise DataError(f"has no line '{_END}': it is cut off in its header, or is no .mot or .sto file")
     counts: dict[str, int] = {}
     in_degrees: bool | None = None
-    for number, line in enumerate(lines[:end], start=1):
-        match = _COUNT.match(line.strip())
-        if match is not None:
-            text = match[2]
-            if not (text.isascii() and text.isdigit() and len(text) < 12):
-                raise DataError(f"line {number}: {match[1]} is {one_line(text)[:_LONGEST_SHOWN]!r}, not a whole number")
-            counts[match[1].lower()] = int(text)
-        key, sentence = _DEGREES.match(line.strip()), _SENTENCE.search(line)
-        if key is not None and key[1].lower() not in ("yes", "no"):
-            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:_LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
-        said = None if sentence is None else sentence[1].lower() == "degrees"
-        said = said if key is None else key[1].lower() == "yes"
-        if said is not None and in_degrees is not None and said != in_degrees:
-            raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
-        in_degrees = in_degrees if said is None else said
+    kind: RecordingKind | None = None
+    for number, line in enumerate((line.strip() for line in lines[:end]), start=1):
+        count = _COUNT.match(line)
+        if count is not None:
+            counts[count[1].lower()] = _whole_number(count[1], count[2], number)
+        says_degrees = _says_degrees(line, number)
+        if says_degrees is not None:
+            if in_degrees is not None and says_degrees != in_degrees:
+                raise DataError(f"line {number}: the header states degrees and radians; correct the one that is wrong")
+            in_degrees = says_degrees
+        if kind is None and line.startswith(_KIND):
+            kind = next((known for known in _KINDS if line == f"{_KIND}{known}"), None)
     first = lines[0].strip()
-    name = first.removeprefix("name ").strip() if end > 0 and first else "unnamed"
-    rows, width = (
-        counts.get(new, counts.get(old)) for new, old in (("nrows", "datarows"), ("ncolumns", "datacolumns"))
-    )
-    kinds = [kind for line in lines[:end] for kind in _KINDS if line.strip() == f"kind={kind}"]
     return _Header(
-        one_line(name), rows, width, in_degrees, end, kinds[0] if kinds else "measured", "datacolumns" in counts
+        name=one_line(first.removeprefix("name ").strip() if end > 0 and first else "unnamed"),
+        row_count=counts.get("nrows", counts.get("datarows")),
+        column_count=counts.get("ncolumns", counts.get("datacolumns")),
+        in_degrees=in_degrees,
+        end=end,
+        kind=kind or "measured",
+        is_old="datacolumns" in counts,
     )
+
+
+def _whole_number(key: str, text: str, line: int) -> int:
+    """Return the count that the header has at a key."""
+    if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
+        raise DataError(f"line {line}: {key} is {one_line(text)[:LONGEST_SHOWN]!r}, not a whole number")
+    return int(text)
+
+
+def _says_degrees(line: str, number: int) -> bool | None:
+    """Return whether a line of the header says that angles are in degrees; None where it says neither."""
+    key = _DEGREES.match(line)
+    if key is not None:
+        if key[1].lower() not in ("yes", "no"):
+            raise DataError(f"line {number}: inDegrees is {one_line(key[1])[:LONGEST_SHOWN]!r}; it is 'yes' or 'no'")
+        return key[1].lower() == "yes"
+    sentence = _SENTENCE.search(line)
+    return None if sentence is None else sentence[1].lower() == "degrees"
 
 
 def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
@@ -169,39 +213,12 @@ def _labels(lines: list[str], header: _Header) -> tuple[int, list[str]]:
             line = lines[number - 1]
             labels = [cell.strip() for cell in line.strip().split("\t")] if "\t" in line else line.split()
             if labels[0].lower() != TIME:
-                first = one_line(labels[0])[:_LONGEST_SHOWN]
+                first = one_line(labels[0])[:LONGEST_SHOWN]
                 raise DataError(f"line {number}: the first column must be '{TIME}', it is {first!r}")
             if "" in labels:
                 raise DataError(f"line {number}: column {labels.index('') + 1} has no name")
             return number, labels
     raise DataError(f"has nothing after '{_END}': the file is cut off")
-
-
-def _number(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:
-    """Return the number in a cell, NaN for one of the texts that stand for a gap."""
-    if cell.lower() in gaps:
-        return float("nan")
-    value = float(cell) if _NUMBER.fullmatch(cell) else float("nan")
-    if not np.isfinite(value):
-        shown = one_line(cell)[:_LONGEST_SHOWN]
-        raise DataError(
-            f"line {line}, column {label!r}: {shown!r} is not a finite number; fill the gap or cut the file there"
-        )
-    return value
-
-
-def _check_clock(time: Floats, lines: Sequence[int]) -> None:
-    """Refuse a time [s] that does not grow from row to row; ``lines`` are the lines of the rows in the file."""
-    stalled = np.flatnonzero(np.diff(time) <= 0.0)
-    if stalled.size:
-        index = int(stalled[0]) + 1
-        word = "stands still" if time[index] == time[index - 1] else "goes backwards"
-        raise DataError(f"line {lines[index]}: the clock {word}: {time[index]:g} s follows {time[index - 1]:g} s")
-
-
-def _text_lines(path: str | Path) -> list[str]:
-    """Return the lines of a file, with any line ends."""
-    return text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 _SIGNS = {
@@ -233,7 +250,7 @@ def opensim_bytes(recording: Recording) -> bytes:
         f"nRows={len(recording)}",
         f"nColumns={1 + len(recording.names)}",
         "inDegrees=no",
-        f"kind={recording.kind}",
+        f"{_KIND}{recording.kind}",
         f"units={units}",
         _signs(recording.names),
         _END,
@@ -247,105 +264,3 @@ def opensim_bytes(recording: Recording) -> bytes:
 def write_opensim(path: str | Path, recording: Recording) -> Path:
     """Write a recording as a ``.sto`` file that OpenSim reads; returns the path."""
     return write_file(path, opensim_bytes(recording))
-
-
-_FIRST = "PathFileType"
-_HEAD_LINES = 5
-_UNITS = ("mm", "cm", "m")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class MarkerTable:
-    """Markers over time [s]: coordinates (3, frames) by name in ``unit``; NaN where a marker was not seen.
-
-    ``remarks`` say which have the names of others in the file.
-    """
-
-    time: Floats
-    markers: Mapping[str, Floats]
-    unit: str
-    remarks: tuple[str, ...] = ()
-
-
-def read_trc(path: str | Path) -> MarkerTable:
-    """Return the markers in a ``.trc`` file; DataError names file, line and what is wrong."""
-    try:
-        lines = _text_lines(path)
-        if not lines[0].startswith(_FIRST) or len(lines) <= _HEAD_LINES:
-            raise DataError(
-                f"is not a .trc file: its first line begins with '{_FIRST}', and five lines come before rows"
-            )
-        unit = dict(zip(lines[1].split(), lines[2].split(), strict=False)).get("Units", "")
-        if unit not in _UNITS:
-            shown = one_line(unit)[:_LONGEST_SHOWN]
-            raise DataError(f"line 3: Units is {shown!r}; allowed are {', '.join(_UNITS)}")
-        # The names of the markers; the two names before them are frame and time.
-        line = lines[3]
-        cells = [cell.strip() for cell in line.split("\t")]
-        if len(cells) < 3 or cells[1].lower() != "time":
-            raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
-        written = [name for name in cells[2:] if name]
-        if not written:
-            raise DataError("line 4: names no marker; every marker needs a name of its own")
-        names = told_apart(written)
-        labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
-        rows, wanted = [], 2 + len(labels)
-        numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]
-        for number in numbers:
-            line = lines[number - 1]
-            cells = [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
-            if len(cells) > wanted and any(cells[wanted:]):
-                raise DataError(f"line {number} has {len(cells)} values for {wanted} columns")
-            # Cells that are not there belong to markers that were not seen.
-            cells = [*cells, *[""] * (wanted - len(cells))][:wanted]
-            labelled = zip(cells[2:], labels, strict=True)
-            rows.append(
-                [_number(cells[1], number, TIME), *(_number(cell, number, of, _UNSEEN) for cell, of in labelled)]
-            )
-        if not rows:
-            raise DataError("has no rows")
-        values = np.array(rows)
-        _check_clock(values[:, 0], numbers)
-    except DataError as error:
-        raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
-    twins = doubled(written, names)
-    named = {name: values[:, 1 + 3 * index : 4 + 3 * index].T for index, name in enumerate(names)}
-    markers = without_copies(named, twins)
-    return MarkerTable(values[:, 0], markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
-
-
-_ANGLES = {"ankle_angle": "{}", "angle": "{}", "healthy_angle": "healthy_{}"}
-_REVERSED = {"angular_velocity": "{}_speed", "ankle_moment": "{}_moment", "external_torque": "{}_device_moment"}
-_KEPT = ("shank_angle",)
-_PER_MASS = ("ankle_moment", "vertical_force")
-
-
-def opensim_recording(
-    recording: Recording, side: str = "right", body_mass: float | None = None
-) -> tuple[Recording, tuple[str, ...]]:
-    """Return a recording of a walk in OpenSim's names, zero and signs, and the channels that need ``body_mass`` [kg].
-
-    Moment and force per mass become the body's; without a body mass they are left out and named.
-    """
-    foot, ankle, mass = side[0], f"ankle_angle_{side[0]}", body_mass or 0.0
-    units = {name: recording.unit(name) for name in recording.names}
-    per_mass = [name for name in _PER_MASS if units.get(name) in ("N m/kg", "-", "N/kg")]
-    missing = tuple(per_mass) if body_mass is None else ()
-    channels = {}
-    for name, unit in units.items():
-        values = recording[name]
-        if name in missing:
-            continue
-        if name in _ANGLES and unit == "rad":
-            channels[_ANGLES[name].format(ankle)] = Channel(0.5 * math.pi - values, unit)
-        elif name in _REVERSED:
-            factor = mass if unit == "N m/kg" else 1.0
-            channels[_REVERSED[name].format(ankle)] = Channel(-factor * values, unit.removesuffix("/kg"))
-        elif name == "vertical_force":
-            factor = {"-": mass * STANDARD_GRAVITY, "N/kg": mass}.get(unit, 1.0)
-            channels[f"ground_force_{foot}_vy"] = Channel(factor * values, "N")
-        else:
-            channels[f"{name}_{foot}" if name in _KEPT else name] = Channel(values, unit)
-    if {"heel_force", "toe_force"} <= set(recording.names):
-        channels[f"ground_force_{foot}_vy"] = Channel(recording["heel_force"] + recording["toe_force"], "N")
-    return Recording(recording.label, recording.time, channels, recording.kind), missing

@@ -1,7 +1,8 @@
 """Tables as Parquet files: columns with unit and meaning, the same table giving the same bytes, damage found."""
 
+import contextlib
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,17 +12,21 @@ from ppafo.errors import DataError, one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    import pyarrow.parquet as pq
 
-_LEVEL = 1
+_COMPRESSION_LEVEL = 1
+"""Of zstd: the quickest."""
 _MAXIMUM_VALUES = 200_000_000
 """Values of a table that is read; a chunk with channels over time has some millions."""
-
-_FLOATING = ("double", "float")
+_FLOATING_TYPES = ("double", "float")
+"""Arrow's names for the types of floats."""
+_LONGEST_SHOWN = 120
+"""Characters of a message of the library that one of ours repeats."""
 
 
 @dataclass(frozen=True, slots=True)
 class TableColumn:
-    """Values of a column, a NumPy or Arrow array, with unit and meaning."""
+    """Values of a column, a NumPy or Arrow array of one value a row, with their unit and what they mean."""
 
     values: Any
     unit: str
@@ -33,8 +38,8 @@ def table_of(columns: Mapping[str, TableColumn], described: Mapping[str, str]) -
     import pyarrow as pa
 
     arrays = [
-        pa.array(channel.values) if isinstance(channel.values, np.ndarray) else channel.values
-        for channel in columns.values()
+        pa.array(column.values) if isinstance(column.values, np.ndarray) else column.values
+        for column in columns.values()
     ]
     fields = [
         pa.field(name, array.type, metadata={"unit": column.unit, "summary": column.summary})
@@ -51,14 +56,14 @@ def parquet_bytes(table: "pa.Table") -> bytes:
     import pyarrow.parquet as pq
 
     # Bytes of one significance are alike from row to row, and texts are few that repeat.
-    floats = [field.name for field in table.schema if str(field.type) in _FLOATING]
+    floats = [field.name for field in table.schema if str(field.type) in _FLOATING_TYPES]
     texts = [field.name for field in table.schema if str(field.type).startswith("dictionary")]
     buffer = io.BytesIO()
     pq.write_table(
         table,
         buffer,
         compression="zstd",
-        compression_level=_LEVEL,
+        compression_level=_COMPRESSION_LEVEL,
         use_dictionary=texts,
         use_byte_stream_split=floats,
         write_page_checksum=True,
@@ -67,35 +72,42 @@ def parquet_bytes(table: "pa.Table") -> bytes:
 
 
 def read_parquet(file: io.BufferedIOBase, name: str, columns: Sequence[str] | None = None) -> "pa.Table":
-    """Return a table, or some of its columns; DataError where the file is damaged, checksums included."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    """Return a table, or some of its columns, of a file that messages call ``name``; the file is closed.
 
-    try:
-        with file, pq.ParquetFile(file, page_checksum_verification=True) as opened:
-            # Counted before memory is taken: a column of one constant takes no room in the file.
-            groups = (opened.metadata.row_group(number) for number in range(opened.metadata.num_row_groups))
-            values = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
-            if values > _MAXIMUM_VALUES:
-                raise DataError(f"{name}: has {values:,} values, more than any table of a study")
-            lost = [column for column in columns or () if column not in opened.schema_arrow.names]
-            if lost:
-                raise DataError(f"{name}: has no column '{one_line(lost[0])}'")
-            return opened.read(columns=None if columns is None else list(columns))
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
+    DataError where it is damaged, checksums included, has far too many values, or has no such column.
+    """
+    with _opened(file, name) as parquet:
+        # Counted before memory is taken: a column of one constant takes no room in the file.
+        groups = (parquet.metadata.row_group(number) for number in range(parquet.metadata.num_row_groups))
+        value_count = sum(group.column(column).num_values for group in groups for column in range(group.num_columns))
+        if value_count > _MAXIMUM_VALUES:
+            raise DataError(f"{name}: has {value_count:,} values, more than any table of a study")
+        missing = [column for column in columns or () if column not in parquet.schema_arrow.names]
+        if missing:
+            raise DataError(f"{name}: has no column '{one_line(missing[0])}'")
+        return parquet.read(columns=None if columns is None else list(columns))
 
 
 def column_names(file: io.BufferedIOBase, name: str) -> list[str]:
-    """Return the names of the columns of a table; DataError where the file is damaged."""
+    """Return the names of the columns in a file that messages call ``name``; the file is closed.
+
+    DataError where it is damaged.
+    """
+    with _opened(file, name) as parquet:
+        return list(parquet.schema_arrow.names)
+
+
+@contextlib.contextmanager
+def _opened(file: io.BufferedIOBase, name: str) -> "Iterator[pq.ParquetFile]":
+    """Open a Parquet file, checksums checked, and close it behind the block; damage met within is a DataError."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        with file, pq.ParquetFile(file) as opened:
-            return list(opened.schema_arrow.names)
+        with file, pq.ParquetFile(file, page_checksum_verification=True) as parquet:
+            yield parquet
     except (pa.ArrowException, OSError, ValueError) as error:
-        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:120]}") from error
+        raise DataError(f"{name}: is not a whole Parquet file: {one_line(error)[:_LONGEST_SHOWN]}") from error
 
 
 def matrix_of(column: "pa.ChunkedArray") -> "np.ndarray[Any, Any]":
@@ -110,14 +122,14 @@ def as_numpy(table: "pa.Table") -> dict[str, "np.ndarray[Any, Any]"]:
 
 
 def encode_texts(codes: "np.ndarray[Any, Any]", texts: Sequence[str]) -> "pa.DictionaryArray":
-    """Return a column of texts from their numbers in a list."""
+    """Return a column of texts, each given by its number, from 0, in ``texts``: at most 128 different ones."""
     import pyarrow as pa
 
     return pa.DictionaryArray.from_arrays(pa.array(codes, type=pa.int8()), pa.array(list(texts), type=pa.string()))
 
 
 def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
-    """Return a column of texts that only some rows have, by their number."""
+    """Return a column of ``length`` texts, empty but for the rows whose number, from 0, is in ``texts``."""
     import pyarrow as pa
 
     column: list[str | None] = [None] * length
@@ -127,7 +139,7 @@ def texts_of_some(texts: Mapping[int, str], length: int) -> "pa.Array":
 
 
 def lists_of(values: "np.ndarray[Any, Any]") -> "pa.ListArray":
-    """Return a column whose rows are the rows of a matrix, as lists."""
+    """Return a column whose rows are the rows of a matrix (rows, values), as lists."""
     import pyarrow as pa
 
     offsets = np.arange(values.shape[0] + 1, dtype=np.int32) * values.shape[1]

@@ -140,7 +140,7 @@ class DiskFolder:
 
 @dataclass(frozen=True, slots=True)
 class RemoteFolder:
-    """A folder of a file system of fsspec."""
+    """A folder at an address that fsspec knows, such as an object store."""
 
     address: str
     system: Any

@@ -22,11 +22,11 @@ from ppafo.errors import DataError, one_line, reason, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import csv_bytes, read_csv
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
-from ppafo.storage.netcdf import netcdf_bytes, read_netcdf
-from ppafo.storage.trial_reading import check_can_be_read
+from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.storage.netcdf_reading import read_netcdf
 
 if TYPE_CHECKING:
-    from ppafo.storage.foreign import ColumnMap
+    from ppafo.storage.column_map import ColumnMap
 
 _MAXIMUM_BYTES_WRITTEN = 16_000_000
 """No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
@@ -302,7 +302,8 @@ def read_recording(
     """
     file = Path(path)
     if columns is not None:
-        from ppafo.storage.foreign import column_map_of, read_foreign
+        from ppafo.storage.column_map import column_map_of
+        from ppafo.storage.foreign import read_foreign
 
         column_map, map_name = column_map_of(columns)
         return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
@@ -315,8 +316,10 @@ def read_recording(
             )
         file /= WALK_RECORDING
     if file.suffix == ".nc":
+        from ppafo.storage.trial_reading import check_can_be_read
+
         # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
-        check_can_be_read(file, "ppafo.storage.netcdf", "read_netcdf", "h5py")
+        check_can_be_read(file, read_netcdf, "h5py")
         return read_netcdf(file)
     if file.suffix.lower() == ".mat":
         raise DataError(

@@ -3,72 +3,50 @@
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from ppafo.errors import DataError
 
-_MAXIMUM_SECONDS, _BYTES_PER_SECOND = 30.0, 5e6
-"""How long reading may take: what a start takes on a busy computer, and as long as a slow disk needs for the file."""
+TRIAL = ("-P", "-m", "ppafo.storage.trial_process")
+"""What Python runs in the other process; by ``-P`` nothing of the working folder is imported."""
+REFUSED, OUT_OF_MEMORY = 76, 77
+"""Exit codes of the other process: it refuses the file in one line on its output; it needs more memory than allowed."""
 
-_ALWAYS_ALLOWED, _MAXIMUM_GROWTH = 400_000_000, 100
-"""Bytes of memory that reading any file may take, and how often its own size a larger one may."""
-
-_REFUSED, _OUT_OF_MEMORY = 76, 77
-_TRIAL = f"""
-import os, sys
-from importlib import import_module
-from ppafo.errors import DataError
-from ppafo.storage.trial_reading import limit_memory
-
-module, function, library, path = sys.argv[1:]
-import_module(library)
-read = getattr(import_module(module), function)
-limit_memory(path)
-try:
-    read(path)
-except DataError as error:
-    sys.stdout.buffer.write(os.fsencode(str(error)))
-    sys.exit({_REFUSED})
-except MemoryError:
-    sys.exit({_OUT_OF_MEMORY})
-"""
+_MAXIMUM_SECONDS = 30.0
+"""Time [s] that reading any file may take: what the start of a process takes on a busy computer."""
+_BYTES_PER_SECOND = 5e6
+"""Bytes per second of a slow disk, which give a large file more time."""
 
 
-def check_can_be_read(path: Path, module: str, function: str, library: str) -> None:
-    """Refuse a file on which ``function(path)`` of a module brings down a process, or which it refuses itself.
+def check_can_be_read(path: Path, read: Callable[[str], object], library: str) -> None:
+    """Refuse a file that ``read`` refuses, or on which it crashes, hangs or takes far more memory than the file has.
 
-    Memory is limited where the system can do it. DataError says why.
+    ``read`` is a public function of a module, called in another process with the path alone; ``library`` is the module
+    of C code that it uses, loaded before memory is limited, where the system can limit it. DataError says why.
     """
     if not sys.executable or not path.is_file():
         return
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    # -P: nothing of the working folder is imported
-    words = [sys.executable, "-P", "-c", _TRIAL, module, function, library, str(path)]
+    reader = f"{read.__module__}:{read.__qualname__}"
     # A slow disk must not pass for a damaged file, nor a busy computer.
     limit = _MAXIMUM_SECONDS + path.stat().st_size / _BYTES_PER_SECOND
-    nothing = subprocess.DEVNULL
     try:
-        done = subprocess.run(
-            words, env=environment, stdin=nothing, stdout=subprocess.PIPE, stderr=nothing, timeout=limit, check=False
+        ended = subprocess.run(
+            [sys.executable, *TRIAL, reader, library, str(path)],
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            timeout=limit,
+            check=False,
         )
     except subprocess.TimeoutExpired as error:
         raise DataError(f"{path}: is damaged: the library {library} does not finish reading it") from error
-    if done.returncode == _REFUSED:
-        raise DataError(os.fsdecode(done.stdout))
-    if done.returncode == _OUT_OF_MEMORY:
+    if ended.returncode == REFUSED:
+        raise DataError(os.fsdecode(ended.stdout))
+    if ended.returncode == OUT_OF_MEMORY:
         raise DataError(f"{path}: is damaged: the library {library} requires far more memory than the file contains")
-    if done.returncode < 0:
+    # Below 0 is the signal that ended it. Any other end is of no file, and the reading itself shows what is wrong.
+    if ended.returncode < 0:
         raise DataError(f"{path}: is damaged: the library {library} crashes on it")
-
-
-def limit_memory(path: str) -> None:
-    """Let this process take no more memory than reading a file may need, beside what it has; only Linux can that."""
-    pages = Path("/proc/self/statm")
-    if not pages.exists():
-        return
-    import resource
-
-    has = int(pages.read_text().split()[0]) * resource.getpagesize()
-    limit = has + max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * Path(path).stat().st_size)
-    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-    resource.setrlimit(resource.RLIMIT_AS, (limit if hard == resource.RLIM_INFINITY else min(limit, hard), hard))

@@ -10,14 +10,17 @@ from pydantic import Field
 
 from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema
 
-# A Sobol sequence of 32 bits repeats after 2**32 draws; no other method needs a lower limit.
 MAXIMUM_RUNS = 2**32
-# A million rows of some ten columns are about 100 MB, held in memory until the block is on the disk.
+"""Draws after which a Sobol sequence of 32 bits repeats; no other method needs a lower limit."""
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
-# 32 bits, so that a seed is exact in a column of floats.
+"""Rows that are held in memory until they are on the disk: of some ten columns about 100 MB."""
 LARGEST_SEED = 2**32 - 1
+"""Of 32 bits, so that a seed is exact in a column of floats."""
 MAXIMUM_GRID_VALUES = 1_000_000
+"""Values of one axis, which are made before anything is run."""
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Fractions of the runs: nine tenths of them, half of them, and the middle."""
+
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Values = Annotated[tuple[_Value, ...], Field(strict=False, min_length=1)]
 _Path = Annotated[Text, Field(description="what is varied: a path as for --set, such as 'supply.pressure'")]
@@ -74,7 +77,7 @@ class LogUniform(StrictTable):
 
 
 class Normal(StrictTable):
-    """A normal distribution."""
+    """Entry of a study file: a number drawn from a normal distribution."""
 
     path: _Path
     kind: Literal["normal"]
@@ -144,6 +147,15 @@ class Stated(StrictTable):
     only: _Only = ()
 
 
+class SameAs(StrictTable):
+    """The value that another varied path has in the same run."""
+
+    path: _Path
+    kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
+    same_as: Annotated[Text, Field(description="a path that varies in this study")]
+    only: _Only = ()
+
+
 class Correlation(StrictTable):
     """Correlation of two distributions: the correlation of their normal scores (a Gaussian copula)."""
 
@@ -160,7 +172,7 @@ class Sample(StrictTable):
 
 
 class Outputs(StrictTable):
-    """What is kept of every run."""
+    """Section of a study file: which metrics, traces and bands are kept of every run."""
 
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
     trajectories: Annotated[Texts, Field(description="channels kept for every run")] = ()
@@ -172,15 +184,6 @@ class Outputs(StrictTable):
     quantiles: Annotated[tuple[Annotated[float, Field(ge=0.0, le=1.0)], ...], Field(strict=False, min_length=1)] = (
         DEFAULT_QUANTILES
     )
-
-
-class SameAs(StrictTable):
-    """The value that another varied path has in the same run."""
-
-    path: _Path
-    kind: Annotated[Literal["same_as"], Field(description="optional")] = "same_as"
-    same_as: Annotated[Text, Field(description="a path that varies in this study")]
-    only: _Only = ()
 
 
 Varied = (
@@ -198,10 +201,11 @@ Varied = (
     | Stated
 )
 VARIED = get_args(Varied)
+"""The classes of ``Varied``, one for each kind of ``[[vary]]``."""
 
 
 class StudyFile(StrictTable):
-    """A study file, as it is written."""
+    """Layout of a study file."""
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]

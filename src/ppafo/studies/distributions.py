@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 class Distribution(Protocol):
-    """What turns uniform numbers into values."""
+    """A distribution from which uniform numbers are turned into values."""
 
     def values(self, uniform: Floats) -> Floats:
         """Return the quantile [SI] at each probability."""
@@ -25,7 +25,7 @@ class Distribution(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class UniformBetween:
-    """Equally likely between two bounds."""
+    """A uniform distribution between two bounds [SI]."""
 
     minimum: float
     maximum: float
@@ -49,7 +49,7 @@ class LogUniformBetween:
 
 @dataclass(frozen=True, slots=True)
 class NormalAround:
-    """Normal with mean and standard deviation."""
+    """A normal distribution by mean and standard deviation [SI]."""
 
     mean: float
     standard_deviation: float

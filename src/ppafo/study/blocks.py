@@ -51,12 +51,12 @@ def samples_of(study: Study, configuration: Configuration) -> int:
 
 
 def chunk_count(study: Study) -> int:
-    """Return the number of all chunks."""
+    """Return the number of chunks of a study, of all its configurations."""
     return len(study.configurations) * -(-study.runs_of_configuration // chunk_size(study))
 
 
 def chunk(study: Study, number: int) -> Chunk:
-    """Return a chunk by its number."""
+    """Return the chunk of a number, counted over all configurations from 0."""
     size = chunk_size(study)
     configuration, index = divmod(number, -(-study.runs_of_configuration // size))
     first = index * size

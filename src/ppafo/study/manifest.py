@@ -1,21 +1,12 @@
-"""What identifies a study: the controllers in Python, the programs, and ``study.json``, which refuses another study."""
+"""``study.json``: what a study computes, by which its folder refuses another study, and what a reader finds there."""
 
-import copy
 import hashlib
-import inspect
 import json
-import math
-import numbers
-import sys
 from collections.abc import Iterator, Mapping
-from pathlib import Path
-from types import CodeType, FunctionType
 from typing import Annotated, Any, Self
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
 from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
@@ -27,101 +18,26 @@ from ppafo.simulation.scenario import scenario_document
 from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
+from ppafo.study.python_controller import DIGITS, controller_document
 from ppafo.units import to_si
 from ppafo.version import __version__
-
-_DIGITS = 16
-"""Digits of the hashes of a program and of a controller in Python."""
-_DEEPEST, _LONGEST = 12, 64
-"""Levels of settings that are looked into, items of a list that is kept and not hashed, and digits of a hash."""
-Inside = tuple[int, ...]
-"""Identities of what a value is inside of, so that what holds itself comes to an end."""
-
-
-def controller_document(controller: PythonController) -> dict[str, Any]:
-    """Return type, hash of the source text and settings of a controller as it is after a reset, as plain data."""
-    try:
-        fresh = copy.deepcopy(controller)
-    except (TypeError, copy.Error, NotImplementedError, RecursionError):  # it holds what has no copy, such as a port
-        return _object(controller, ())
-    # What a run left behind is no setting: a study resumes with the same object too.
-    fresh.reset()
-    return _object(fresh, ())
-
-
-def _object(value: object, inside: Inside) -> dict[str, Any]:
-    try:
-        state = object.__getstate__(value)
-    except TypeError:  # made outside of Python
-        state = None
-    tables = [table for table in (state if isinstance(state, tuple) else (state,)) if isinstance(table, dict)]
-    settings = {str(name): setting for table in tables for name, setting in table.items()}
-    return {**_written(type(value), type(value).__mro__), "settings": _plain_setting(settings, inside)}
-
-
-def _written(made: type | FunctionType, parts: tuple[type | FunctionType, ...]) -> dict[str, Any]:
-    """Return the name of a class or function, and a hash of the files of its parts; of their code without a file."""
-    digest = hashlib.sha256()
-    for part in parts:
-        # The standard library is another one with another Python, which is no other controller.
-        if part.__module__ != "__main__" and part.__module__.partition(".")[0] in sys.stdlib_module_names:
-            continue
-        try:
-            text = Path(inspect.getfile(part)).read_bytes()
-        except (TypeError, OSError):  # from a notebook, or typed in
-            functions = [part] if isinstance(part, FunctionType) else vars(part).values()
-            text = repr(
-                [list(_code(function.__code__)) for function in functions if isinstance(function, FunctionType)]
-            ).encode()
-        digest.update(text)
-    return {"type": f"{made.__module__}.{made.__qualname__}", "source": digest.hexdigest()[:_DIGITS]}
-
-
-def _code(code: CodeType) -> Iterator[object]:
-    yield from (code.co_name, code.co_code, code.co_names)
-    for constant in code.co_consts:
-        yield list(_code(constant)) if isinstance(constant, CodeType) else constant
-
-
-def _plain_setting(value: object, inside: Inside) -> Any:
-    """Return a setting as data that JSON can hold; one that holds itself, or lies too deep, is its type's name."""
-    if value is None or isinstance(value, str | bytes | bool | numbers.Number | np.generic):
-        bare = value.item() if isinstance(value, np.generic) else value
-        bare = hashlib.sha256(bare).hexdigest()[:_DIGITS] if isinstance(bare, bytes) else bare
-        # JSON has no complex numbers, and no infinite ones.
-        is_plain = bare is None or isinstance(bare, str | int) or (isinstance(bare, float) and math.isfinite(bare))
-        return bare if is_plain else repr(bare)
-    if isinstance(value, type | FunctionType):
-        return _written(value, (value,))
-    if id(value) in inside or len(inside) >= _DEEPEST:
-        return f"{type(value).__module__}.{type(value).__qualname__}"
-    deeper = (*inside, id(value))
-    if isinstance(value, Mapping):
-        return {str(key): _plain_setting(inner, deeper) for key, inner in value.items()}
-    items: Any = np.atleast_1d(value).tolist() if isinstance(value, np.ndarray) else value
-    if isinstance(items, set | frozenset):
-        items = sorted(items, key=repr)
-    if not isinstance(items, tuple | list):
-        return _object(value, deeper)
-    plainly = [_plain_setting(inner, deeper) for inner in items]
-    digest = hashlib.sha256(json.dumps(plainly).encode()).hexdigest()
-    # Weights of a network, a long table of gains: that they are the same matters, not every one of them.
-    return plainly if len(plainly) <= _LONGEST else {"items": len(plainly), "sha256": digest}
-
 
 MANIFEST = "study.json"
 STUDY_COPY = "study.toml"
 FORMAT = "ppafo study results"
 SCHEMA_VERSION = 2
 _NAMED = 4
+"""Differences that a message names."""
 _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
 
 
 def manifest(study: Study) -> dict[str, Any]:
     """Return the document: study, base scenarios in SI units, runs, columns with units; no time and no machine."""
-    scenarios, programs = {}, {}
+    scenarios: dict[str, Any] = {}
+    programs: dict[str, str] = {}
     for configuration in study.configurations:
-        document, custom = _plain(scenario_document(configuration.scenario)), configuration.scenario.controller.custom
+        document = _plain(scenario_document(configuration.scenario))
+        custom = configuration.scenario.controller.custom
         # Without the file it came from, which may lie elsewhere the next time.
         del document["origin"]
         if custom is not None:
@@ -131,7 +47,7 @@ def manifest(study: Study) -> dict[str, Any]:
         # a function stands, which may be elsewhere the next time too.
         lines = write_source(plan_run(configuration.scenario).program, 1)[1].splitlines()
         code = "\n".join(line for line in lines if not line.startswith("#"))
-        programs[configuration.name] = hashlib.sha256(code.encode()).hexdigest()[:_DIGITS]
+        programs[configuration.name] = hashlib.sha256(code.encode()).hexdigest()[:DIGITS]
     # What is drawn may come from a parameter set, or have been changed in Python, and the file says neither.
     parts = {name: getattr(study, name) for name in ("axes", "drawn", "same", "scores", "sample", "outputs")}
     drawn = _plain(plain(parts))
@@ -239,7 +155,7 @@ class _StoredScenario(_Part):
 
 
 class _Stored(_Part):
-    """What everybody may rely on in the document; how it differs from a study's is said elsewhere."""
+    """What every reader of the document relies on; ``check_same_study`` compares it with the study asked for."""
 
     study: _StoredStudy
     scenarios: dict[str, _StoredScenario]
@@ -285,6 +201,7 @@ def check_same_study(location: Place, stored: Mapping[str, Any], requested: Mapp
 
 
 def _plain(document: Any) -> Any:
+    """A document as it is once it was written and read: lists for tuples."""
     return json.loads(json.dumps(document))
 
 

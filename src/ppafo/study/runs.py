@@ -143,12 +143,12 @@ def unvaried(scenario: Scenario, runs: int) -> dict[str, Floats]:
 
 
 def joined(parts: Sequence[Rows]) -> Rows:
-    """Return rows one after the other."""
+    """Return the rows of several parts as one table, in order."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def failures_of(rows: Rows) -> int:
-    """Return how many of some rows failed."""
+    """Return how many runs of a table failed."""
     return int(np.count_nonzero(rows[FAILED]))
 
 

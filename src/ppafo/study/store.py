@@ -70,7 +70,7 @@ class Finished:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """The chunks of a study at a place."""
+    """The results of a study at a place, written chunk by chunk."""
 
     study: Study
     place: Place
@@ -225,7 +225,7 @@ def trace_column(channel: str) -> str:
 
 
 def chunk_file(number: int) -> str:
-    """Return the name of the file of a chunk."""
+    """Return the name of the file of a chunk, relative to the place."""
     return f"runs/chunk-{number:07d}.parquet"
 
 

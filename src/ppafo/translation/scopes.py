@@ -206,7 +206,7 @@ class Names:
 
 
 def changed(body: Iterable[ast.stmt]) -> set[str]:
-    """Names that some statements give values."""
+    """Return the names to which some statements assign."""
     names: set[str] = set()
     for statement in body:
         targets: list[ast.expr] = []

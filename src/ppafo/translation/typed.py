@@ -35,7 +35,7 @@ FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
 
 @dataclass(frozen=True, slots=True)
 class Assign:
-    """A local name gets a value."""
+    """An assignment to a local name."""
 
     name: str
     value: Term
@@ -43,7 +43,7 @@ class Assign:
 
 @dataclass(frozen=True, slots=True)
 class Reserve:
-    """A local array without values yet."""
+    """A local array whose elements are not set yet."""
 
     name: str
     type: Array
@@ -51,7 +51,7 @@ class Reserve:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """An element of an array gets a value."""
+    """An assignment to an element of an array."""
 
     element: Term
     value: Term
@@ -59,7 +59,7 @@ class Store:
 
 @dataclass(frozen=True, slots=True)
 class If:
-    """A branch."""
+    """A branch on a test: one body or the other."""
 
     test: Term
     body: tuple["Statement", ...]
@@ -87,7 +87,7 @@ class While:
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """``break`` or ``continue``."""
+    """``break`` or ``continue`` of the loop around it."""
 
     word: str
 
@@ -136,7 +136,7 @@ class Function:
 
 @dataclass(slots=True)
 class Module:
-    """All functions, callees first."""
+    """All functions of a translated text, each after those that it calls."""
 
     functions: list[Function] = field(default_factory=list)
 
@@ -155,7 +155,7 @@ def converted(term: Term, kind: Type) -> Term:
 
 
 def field_of(term: Term, name: str) -> Term:
-    """A field of a row."""
+    """Return the term for a field of a row, by its name."""
     row = term.type.row if isinstance(term.type, Shared) else term.type
     assert isinstance(row, Row)
     # A field of a struct that is just made is the value it was made of: no struct need exist.
@@ -164,7 +164,7 @@ def field_of(term: Term, name: str) -> Term:
 
 
 def item_of(term: Term, index: int) -> Term:
-    """An item of a row or tuple by its place."""
+    """Return the term for an item of a row or of a tuple, by its index."""
     if isinstance(term.type, Row):
         return field_of(term, term.type.fields[index][0])
     assert isinstance(term.type, Items)

@@ -29,7 +29,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Items:
-    """A tuple without names."""
+    """The type of a tuple without names, by the types of its items."""
 
     types: tuple["Type", ...]
 
@@ -62,9 +62,6 @@ class Shared:
 
 
 Type: TypeAlias = Scalar | Row | Items | Array | Handed | Shared
-
-LIBRARY = frozenset({"exp", "log", "pow"})
-"""Functions that every C library has, with last bits of its own."""
 
 
 def entries_of(source: str) -> dict[str, tuple[Type, ...]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any, Protocol
 
-from ppafo.engine.compilers import UntranslatableError
+from ppafo.engine.compilers import LIBRARY, UntranslatableError
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
@@ -23,7 +23,6 @@ from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
     INT,
-    LIBRARY,
     Array,
     Handed,
     Items,
@@ -400,7 +399,7 @@ def _as_written(problem: str, written: str) -> str:
 
 
 def kind_of(kind: Type) -> str:
-    """What a value is, in words."""
+    """Return what a value of a type is called in messages."""
     if isinstance(kind, Scalar):
         return "a number"
     if isinstance(kind, Row):

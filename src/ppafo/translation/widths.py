@@ -18,7 +18,7 @@ MOST_TURNS = 64
 
 
 class Interval(NamedTuple):
-    """Lowest and highest whole number."""
+    """The range of a whole number: its lowest and its highest value."""
 
     low: int
     high: int
@@ -52,7 +52,7 @@ def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
 
 
 def hull(first: Range, other: Range) -> Range:
-    """The smallest range that holds both."""
+    """Return the smallest range in which two ranges lie."""
     if isinstance(first, Interval) and isinstance(other, Interval):
         return Interval(min(first.low, other.low), max(first.high, other.high))
     assert not isinstance(first, Interval)

@@ -1,7 +1,7 @@
 """Is the model good enough? Replays what was recorded and compares, channel by channel, in units and in percent."""
 
 from ppafo.validation.agreement import ChannelAgreement, RecordingAgreement, ReplaySettings, compare_recording
-from ppafo.validation.measured import Thresholds, parse_thresholds
+from ppafo.validation.compared import Thresholds, parse_thresholds
 
 __all__ = [
     "ChannelAgreement",

@@ -15,10 +15,13 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Recording
 from ppafo.signals.faults import correlated_noise_of, noise_of, resolution_of
 from ppafo.signals.recording import Floats
-from ppafo.simulation.recorded import DORSIFLEXION_SUPPLY, SUPPLY, regular_interval, start_of, with_fixed_volume
+from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, SUPPLY
+from ppafo.simulation.recorded.clock import regular_interval
+from ppafo.simulation.recorded.replay import with_fixed_volume
+from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.scenario import Leg
 from ppafo.units import from_si
-from ppafo.validation.measured import (
+from ppafo.validation.compared import (
     ACCEPTABLE_FRACTION,
     ANGLE,
     COMPARED,
@@ -27,11 +30,10 @@ from ppafo.validation.measured import (
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
     Limit,
-    Measured,
     Thresholds,
     parse_thresholds,
-    supply_gauge,
 )
+from ppafo.validation.measured import Measured, supply_gauge
 from ppafo.validation.replay import INITIAL_REMEDIES, Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02

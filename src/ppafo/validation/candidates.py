@@ -12,10 +12,11 @@ from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.parameters.device import Device
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
-from ppafo.simulation.recorded import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.units import from_si
 from ppafo.validation.agreement import ReplaySettings, replay_of
-from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
+from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
+from ppafo.validation.measured import Measured
 from ppafo.validation.replay import Motion, replayed_scenario
 
 SENSORS = (ANGLE, PRESSURE_1, PRESSURE_2)

@@ -23,7 +23,9 @@ from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import correlated_noise_of, isolated_samples
 from ppafo.signals.recording import Floats, Recording
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.recorded import COMMAND, samples_at_rest, usual_interval
+from ppafo.simulation.recorded.channels import COMMAND
+from ppafo.simulation.recorded.clock import usual_interval
+from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.validation.agreement import (
     ENGINE_ERROR,
     ChannelAgreement,
@@ -35,7 +37,8 @@ from ppafo.validation.agreement import (
     replay_of,
 )
 from ppafo.validation.candidates import SENSORS, Candidate, Change, Sensor, effects, exchanges, joined, numbers, sizes
-from ppafo.validation.measured import ANGLE, EXPLAINED_FRACTION, PRESSURE_1, PRESSURE_2, Measured
+from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION, PRESSURE_1, PRESSURE_2
+from ppafo.validation.measured import Measured
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
 Flags = NDArray[np.bool_]

@@ -1,21 +1,17 @@
-"""A recording as evidence: read from its file, and refused or remarked on where it cannot carry a comparison.
-
-The channels in which it is compared with a model are here too, their full ranges, and how large an error may be.
-"""
+"""A recording as evidence: read from its file, and refused or remarked on where it cannot carry a comparison."""
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.errors import DataError, nearest_name
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import lasting_change
-from ppafo.simulation.recorded import (
+from ppafo.simulation.recorded.channels import (
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
@@ -23,125 +19,33 @@ from ppafo.simulation.recorded import (
     check_absolute,
     check_command,
     check_gaps,
-    usual_interval,
 )
+from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.storage import read_recording
+from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import ColumnMap, read_foreign
+from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
-from ppafo.units import from_si, parse_quantity, split_quantity
-
-ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
-PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
-
-
-@dataclass(frozen=True, slots=True)
-class Compared:
-    """A channel: unit of an error in it (``Pa_d``: a pressure difference), kind of quantity of its errors, full range.
-
-    ``full_range(device, gauge)`` takes the gauge pressure of the supply [Pa].
-    """
-
-    unit: str
-    quantity: str
-    title: str
-    full_range: Callable[[Device, float], float]
-
-
-COMPARED: dict[str, Compared] = {
-    ANGLE: Compared(
-        "rad", "angle", "Vane angle", lambda device, _: device.actuator.angle_max - device.actuator.angle_min
-    ),
-    PRESSURE_1: Compared("Pa_d", "pressure change", "Pressure in chamber 1", lambda _, gauge: gauge),
-    PRESSURE_2: Compared("Pa_d", "pressure change", "Pressure in chamber 2", lambda _, gauge: gauge),
-    PRESSURE_DIFFERENCE: Compared("Pa_d", "pressure change", "Pressure difference", lambda _, gauge: 2.0 * gauge),
-    TORQUE: Compared(
-        "N m", "torque", "Actuator torque", lambda device, gauge: 2.0 * gauge * device.actuator.torque_constant
-    ),
-}
-"""Full ranges as the paper has them: 110 deg, 55 psi, 55 psi and 110 psi; the torque follows by equation (2).
-
-A difference goes from full supply on one side to full supply on the other.
-"""
-
-ACCEPTABLE_FRACTION = 0.10
-"""RMS error over full range that the paper calls acceptable (page with figure 7)."""
-
-EXPLAINED_FRACTION = 0.5
-"""Fraction of the variance of a signal that a model explains at least (R^2); its mean would explain none."""
-
-_FRACTION_UNITS = ("%", "percent")
-_EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' for all channels"
-
-
-@dataclass(frozen=True, slots=True)
-class Limit:
-    """Largest RMS error: a fraction of the full range [-], or an error in the SI unit of the channel."""
-
-    value: float
-    is_fraction: bool
-
-    def fraction_of(self, full_range: float) -> float:
-        """The limit as a fraction [-] of a full range in the SI unit of the channel."""
-        return self.value if self.is_fraction else self.value / full_range
-
-
-@dataclass(frozen=True, slots=True)
-class Thresholds:
-    """The limit of every channel that has one of its own, and the others' limit; None where none was given."""
-
-    others: Limit | None
-    channels: Mapping[str, Limit]
-
-    def limit(self, channel: str) -> Limit | None:
-        """The limit that was given for a channel; None for one that is judged by what its signal goes through."""
-        return self.channels.get(channel, self.others)
-
-
-def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
-    """Return the thresholds of texts such as ``angle=10%``, ``pressure_1=3.7 psi_d`` or ``5%``; later ones win."""
-    others = None
-    channels: dict[str, Limit] = {}
-    for text in texts:
-        name, separator, value = text.rpartition("=")
-        if separator:
-            channel = name.strip()
-            if channel not in COMPARED:
-                hint, known = nearest_name(channel, COMPARED), ", ".join(COMPARED)
-                raise DataError(
-                    f"threshold '{one_line(text)}': there is no channel '{one_line(channel)}'{hint}; available: {known}"
-                )
-            channels[channel] = _limit(value, text, COMPARED[channel].unit)
-        else:
-            others = _limit(value, text, "")
-    return Thresholds(others, channels)
-
-
-def _limit(value: str, text: str, unit: str) -> Limit:
-    try:
-        is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
-        number = parse_quantity(value, "" if is_fraction else unit)
-    except UnitError as error:
-        raise DataError(f"threshold '{one_line(text)}': {error}; {_EXAMPLES}") from error
-    if not unit and not is_fraction:
-        raise DataError(f"threshold '{one_line(text)}': a limit for all channels is a percentage of the full range")
-    if number <= 0.0:
-        raise DataError(f"threshold '{one_line(text)}': must be above 0; {_EXAMPLES}")
-    return Limit(number, is_fraction)
-
+from ppafo.units import from_si
+from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 
 MINIMUM_SAMPLES = 10
 """Fewer are a few readings and no course in time."""
 
 _REMARKED_GAP = 3.0
-_KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
-_LEAST_OF_SUPPLY = 0.5
-"""Factor that a wrong unit needs, and fraction of the supply that a chamber then reaches at least."""
+"""Usual intervals between samples [-] from which a gap in time is remarked on."""
 _ABOVE_SUPPLY = 0.05
+"""Part of the gauge pressure of the supply [-] by which two sensors may disagree on it."""
 _ROUNDING = 1.0e-9
 """Fraction of a pressure [-] that is no difference: a chamber that has settled stands at its supply but for this."""
+_KILOPASCALS_AS_PSI = 1.0e3 / PASCALS_PER_PSI
+"""Factor on a pressure [-] that undoes kPa read as psi."""
+_LEAST_OF_SUPPLY = 0.5
+"""Fraction of the supply [-] that a chamber reaches at least, where a factor shall explain its pressure."""
 _MAXIMUM_RANGES = 20.0
+"""Full ranges [-] beyond which a reading is a damaged line or a wrong unit, and no reading."""
 _MINIMUM_CHANGE = 0.01
+"""Part of a full range [-] by which some channel has to change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +67,7 @@ def read_measured(
 ) -> Measured:
     """Return a recording, or the one of a file or result folder; DataError where it cannot be compared with a model.
 
-    A file with columns of its own is read through a column map; ``map_name`` is what messages call this one.
+    A file with columns of its own is read through a column map, which messages call ``map_name``.
     """
     if isinstance(source, Recording):
         values = [source.time, *(source[name] for name in sorted(source.names))]
@@ -249,7 +153,7 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
         if level > allowed * (1.0 + _ROUNDING):
             atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
             unit = device.shown.get("Pa_a", "psi_g")
-            shown = [f"{from_si(one, unit, 'Pa_a', atmosphere):.4g} {unit}" for one in (level, highest)]
+            shown = [f"{from_si(pressure, unit, 'Pa_a', atmosphere):.4g} {unit}" for pressure in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
             remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
             top = float(recording[name].max()) - atmosphere
@@ -267,6 +171,7 @@ def supply_gauge(recording: Recording, device: Device) -> float:
 
 
 def _check_change(recording: Recording, device: Device, file: str) -> None:
+    """Refuse a recording in which nothing happens, since every model would agree with it."""
     gauge = supply_gauge(recording, device)
     if gauge <= 0.0:
         owner = f"the recorded '{SUPPLY}'" if SUPPLY in recording else f"the supply of {device.name}"

@@ -15,23 +15,15 @@ from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded import (
-    COMMAND,
-    DORSIFLEXION_SUPPLY,
-    EXTERNAL_TORQUE,
-    SUPPLY,
-    RecordedInputs,
-    Start,
-    locked_vane,
-    replay_scenario,
-    sample_period,
-    step_inputs,
-    with_highest_supply,
-    with_prescribed_angle,
-)
+from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.clock import sample_period
+from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
+from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
+from ppafo.simulation.recorded.rest import Start
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
 from ppafo.units import parse_quantity
-from ppafo.validation.measured import ANGLE, PRESSURE_1, PRESSURE_2, Measured
+from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
+from ppafo.validation.measured import Measured
 
 Motion = Literal["free", "measured", "locked", "leg"]
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")

@@ -14,12 +14,14 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.fault_flags import FAULT_FLAGS, FaultFlag
 from ppafo.engine.lanes import Floats
 from ppafo.model import contact as ground
-from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED, SWING
+from ppafo.model.helping import HELPS, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
+from ppafo.model.shut_off import NEVER
+from ppafo.signals import Recording
 from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si, without_exponent
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import law_of
+from ppafo.walking.planning import gait_sensors_of, law_of
 
 EVENTS = ("heel strike", "toes on", "heel off", "toes off")
 """In the order of a stride; 'toes on' is the foot that has come down flat."""
@@ -29,6 +31,8 @@ Samples = NDArray[np.intp]
 TOO_FAR = 0.25
 """Fraction of a stride: what the controller takes for an event further from it than this is not that event."""
 
+_FAULT_SUFFIX = "_fault"
+"""How the fields of the sensors end in which their faults are."""
 _AFTER = {ground.HEEL: 0, ground.FLAT: 1, ground.TOE: 2, ground.SWING: 3}
 _STATE = "controller_state."
 EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
@@ -64,6 +68,30 @@ _NOTHING = 1.0e-12
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
 SHOWN = 5
 """Events that are listed one by one; of more the first ones are, and all are in the file."""
+
+
+def failure_times(configuration: Scenario) -> dict[str, float]:
+    """Return when which sensor or part of the plant fails [s], by its name, in this order; {} where all are sound."""
+    sensors = gait_sensors_of(configuration)._asdict()
+    times = {
+        name.removesuffix(_FAULT_SUFFIX): fault.time
+        for name, fault in sensors.items()
+        if name.endswith(_FAULT_SUFFIX) and fault.time < NEVER
+    }
+    times |= {part: fault.numbers["time"] for part, fault in walk_of(configuration).broken.items()}
+    return dict(sorted(times.items(), key=lambda failure: failure[1]))
+
+
+def acting_phase(recording: Recording) -> Floats:
+    """Return the phase of each sample in which the device acts (samples,), as the numbers of ``model.helping``.
+
+    It is the one that the controller sees, but it never pushes while it only lifts, and acts as in mid-stance, without
+    a torque, while it pauses or has stopped. The recording has a ``controller_phase``.
+    """
+    seen = recording["controller_phase"]
+    level = recording["safe_state"] if "safe_state" in recording else np.zeros(seen.size)
+    is_idle = (level > LIFTS) | ((level == LIFTS) & (seen == PUSH_OFF))
+    return np.where(is_idle, MID_STANCE, seen)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,7 +162,7 @@ def event_errors(true: Samples, known: Samples, interval: float, stride_time: fl
 
 
 def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:
-    """The events of a part of the samples."""
+    """Return the events that lie in a part of the samples, by name."""
     return {name: times[(times >= part.start) & (times < part.stop)] for name, times in events.items()}
 
 

@@ -6,17 +6,18 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ppafo.arguments import Overrides, checked
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused_as
-from ppafo.gait import NORMATIVE, load_gait
+from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
-from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.regulator import SupplyLines
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
@@ -73,7 +74,7 @@ from ppafo.walking.motion import (
 )
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.task_sequence import load_task_sequence
+from ppafo.walking.task_sequence import TaskSequence, load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
@@ -154,7 +155,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     origin = scenario.origin
     folder = Path() if origin.file is None else Path(origin.file).parent
     as_given = ScenarioRequest(scenario.name, origin.file, folder, origin.content, origin.overrides)
-    if _walked_with(scenario_of(as_given, WALKING)) != _walked_with(scenario):
+    if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
             f"{scenario.name}: this walk is not what its file says (a number was changed after it was loaded, or the "
             "file or the package has changed since): give the bottle where the walk is loaded, with --bottle"
@@ -170,8 +171,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     return scenario_of(replace(as_given, content=content, overrides=every, instead=instead), WALKING)
 
 
-def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
-    """Return what a walk on another bottle shares with a walk: all but how long it is and what it hangs on."""
+def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:
+    """Return what a walk shares with the same walk on another bottle: all but its length and the bottle."""
     hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
     return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
 
@@ -181,56 +182,32 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
 
     ScenarioError, ParameterError or DataError for the first value that cannot be used.
     """
-    document, instead = changed.document, request.instead
-    if BOTTLE_NAME in instead:
-        document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
+    document = changed.document
+    if BOTTLE_NAME in request.instead:
+        document.setdefault(BOTTLE, {})["name"] = request.instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    named_sequence = _named_file("task_sequence", request, document)
-    with _named_by("task_sequence", reading, request, ScenarioError):
-        sequence = None if named_sequence is None else load_task_sequence(named_sequence)
-    with _named_by("gait", reading, request, DataError):
-        walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
-    is_named = "gait" in instead or "gait" in document
-    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
+    led = _led_by(reading, request)
+    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in request.instead else request.folder)
     if bottle is not None:
         # A bottle always feeds lines, with the defaults of what the file does not say of them.
         document.setdefault(SUPPLY_LINE, {})
     line = read_supply_line(reading, device)
-    line = line if line is None or bottle is None else bottle.fed(line)
+    if line is not None and bottle is not None:
+        line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
-    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
-    person = reading.number(f"wearer.{PERSON.name}", PERSON)
-    if person != int(person):
-        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
-    motion = WalkMotion(
-        motion_kind=MOTIONS[kind_at(document, "motion") or WALK],
-        gait=walked,
-        wearer=read_wearer(reading, walked, is_named),
-        timing=timing_of(document),
-        forces={name: sensors[name] for name in FORCES},
-        faults=faults,
-        task_sequence=sequence,
-        bottle=bottle,
-        wearer_origin=wearer_origin(reading, walked, is_named),
-        person=person,
-        broken=_broken(reading, line),
-        shut_off=_shut_off(reading),
-    )
-    # The path of a file in full means the same from any folder.
-    full = {path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in instead.items()}
-    named = tuple(f"{path}={name}" for path, name in full.items())
+    motion = _motion(reading, led, line, bottle, sensors)
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
-    room = device.supply.atmospheric_pressure
+    atmosphere = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
         run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
         motion=motion,
-        initial=Initial(room, room),
+        initial=Initial(atmosphere, atmosphere),
         controller=controller,
         reference=NO_REFERENCE,
         sensors=Sensors(
@@ -238,9 +215,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=Origin(
-            request.path, document["device"]["set"], hardware.valve, (*request.overrides, *named), request.content
-        ),
+        origin=_origin(request, document["device"]["set"], hardware.valve),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -248,6 +223,62 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     # Contradictions are looked for in the whole, once each number is usable by itself.
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))
+
+
+class _Led(NamedTuple):
+    """What leads the leg: a gait, whether anybody named it, and what the wearer does one after the other, if so."""
+
+    gait: Gait
+    is_named: bool
+    task_sequence: TaskSequence | None
+
+
+def _led_by(reading: Reading, request: ScenarioRequest) -> _Led:
+    """Return the gait and the task sequence of a walk, from the files that it names."""
+    sequence_file = _named_file("task_sequence", request, reading.document)
+    with _named_by("task_sequence", reading, request, ScenarioError):
+        sequence = None if sequence_file is None else load_task_sequence(sequence_file)
+    with _named_by("gait", reading, request, DataError):
+        gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
+    return _Led(gait, "gait" in request.instead or "gait" in reading.document, sequence)
+
+
+def _motion(
+    reading: Reading,
+    led: _Led,
+    line: SupplyLine | None,
+    bottle: BottleSupply | None,
+    sensors: Mapping[str, float],
+) -> WalkMotion:
+    """Return who walks how, and which sensors and parts fail; ``sensors`` are the settings [SI] of its sensors."""
+    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
+    person = reading.number(f"wearer.{PERSON.name}", PERSON)
+    if person != int(person):
+        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
+    return WalkMotion(
+        motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
+        gait=led.gait,
+        wearer=read_wearer(reading, led.gait, led.is_named),
+        timing=timing_of(reading.document),
+        forces={name: sensors[name] for name in FORCES},
+        faults=faults,
+        task_sequence=led.task_sequence,
+        bottle=bottle,
+        wearer_origin=wearer_origin(reading, led.gait, led.is_named),
+        person=person,
+        broken=_broken(reading, line),
+        shut_off=_shut_off(reading),
+    )
+
+
+def _origin(request: ScenarioRequest, set_name: str, valve: str) -> Origin:
+    """Return where a walk comes from; files that were named beside its own count as overrides."""
+    # The path of a file in full means the same from any folder.
+    full = {
+        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
+    }
+    named = tuple(f"{path}={name}" for path, name in full.items())
+    return Origin(request.path, set_name, valve, (*request.overrides, *named), request.content)
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
@@ -263,9 +294,12 @@ def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]
 def _named_by(
     path: str, reading: Reading, request: ScenarioRequest, kind: type[PpafoError]
 ) -> AbstractContextManager[None]:
-    """Return what names the key in errors about a file that the walk itself names; an option names its own."""
-    own = path not in request.instead and path in reading.document
-    return refused_as(kind, reading.quote(path), kind) if own else nullcontext()
+    """Return what puts the key at ``path`` before errors about the file that the walk names there.
+
+    A file that an option names is in the error already.
+    """
+    is_of_walk = path not in request.instead and path in reading.document
+    return refused_as(kind, reading.quote(path), kind) if is_of_walk else nullcontext()
 
 
 def _control(
@@ -362,6 +396,7 @@ def lag_of_bandwidth(bandwidth: float) -> float:
 
 
 def _terms(valve: Valve) -> dict[str, Term]:
+    """Return how lags and delays [s] of valve and sensors, which a controller may follow, come from their settings."""
     kind = VALVES[valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
     paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay

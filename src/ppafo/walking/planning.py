@@ -18,11 +18,13 @@ from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import GaitNow, gait_at
 from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters, PlantState
-from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
+from ppafo.model.plant_faults import SOUND, PlantFaults
 from ppafo.model.sensors import GaitSensors
+from ppafo.model.shut_off import NOT_FITTED, ShutOff
 from ppafo.model.valves import vent_valve
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve

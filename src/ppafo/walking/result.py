@@ -23,7 +23,8 @@ from ppafo.simulation.oscillation import Oscillation, oscillation_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
-from ppafo.storage.opensim import opensim_recording, write_opensim
+from ppafo.storage.opensim import write_opensim
+from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
@@ -56,7 +57,7 @@ REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.st
 
 
 def led_leg(run: Run) -> Walk:
-    """The leg of a run that walks."""
+    """Return the leg of a planned walk."""
     assert run.walk is not None, "a walk has a leg"
     return run.walk
 
@@ -203,6 +204,13 @@ class WalkResult:
     def is_helped(self) -> bool:
         """True where at least half of the whole strides had help."""
         return 2 * int(self.helped.sum()) >= self.helped.size
+
+    @property
+    def peak_torques(self) -> Floats:
+        """The largest torque [N m] of each whole stride (strides,)."""
+        if self.starts.size < 2:
+            return np.zeros(0)
+        return np.maximum.reduceat(self.recording["torque"], self.starts)[:-1]
 
     @property
     def oscillation(self) -> Oscillation | None:

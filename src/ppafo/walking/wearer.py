@@ -147,7 +147,7 @@ def leg_parameters(wearer: Wearer, rocker: HeelRocker) -> LegParameters:
 
 
 def paper_subject() -> Wearer:
-    """The wearer of the defaults."""
+    """Return the wearer that a walk has unless one is given: the subject of the paper."""
     return Wearer(**{quantity.name: float(quantity.default or 0.0) for quantity in WEARER})
 
 
@@ -191,7 +191,7 @@ _SHANK_INERTIA, _FOOT_INERTIA = _SHARES["shank_inertia"], _SHARES["foot_inertia"
 
 
 def shank_length_of(stature: float) -> float:
-    """Length of the shank [m] of a stature [m]."""
+    """Length of the shank [m] of a person of some stature [m]."""
     return SHANK_SHARE * stature
 
 

@@ -43,7 +43,7 @@ def test_the_commands_of_the_page_write_units(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("ppafo.exports.fmu.build", lambda *given: str(given[0]).encode())
+    monkeypatch.setattr("ppafo.exports.fmu.unit.build", lambda *given: str(given[0]).encode())
     for command in re.findall(r"^ppafo (export fmu .*)$", PAGE, re.MULTILINE):
         assert main(shlex.split(command)) == 0
     (unit,) = (tmp_path / "out" / "unit").glob("*.fmu")
@@ -59,7 +59,7 @@ def test_the_commands_of_the_page_write_units(
 def test_a_name_that_ends_in_fmu_is_the_unit_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("ppafo.exports.fmu.build", lambda *given: str(given[0]).encode())
+    monkeypatch.setattr("ppafo.exports.fmu.unit.build", lambda *given: str(given[0]).encode())
     file = tmp_path / "out" / "a.fmu"
     assert main(["export", "fmu", "step-response", "--out", str(file)]) == 0
     assert f"written: {file}; next: fmpy simulate {file}" in capsys.readouterr().out

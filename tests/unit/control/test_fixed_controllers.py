@@ -27,7 +27,9 @@ from ppafo.processor.fixed_point import (
     read,
     shifted,
 )
-from ppafo.processor.torque_laws import FIXED_LAWS, PID, FixedLaw, largest_pid
+from ppafo.processor.torque_laws.catalog import FIXED_LAWS
+from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.processor.torque_laws.pid import PID, largest_pid
 
 TORQUE_CONSTANT = 1.451e-5
 PERIOD = 1.0e-3

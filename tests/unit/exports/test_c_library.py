@@ -30,7 +30,7 @@ from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from ppafo.translation.c99 import program_source
-from ppafo.translation.native import build, run_native
+from scripts.built_programs import build, run_native
 from tests.built_once import shared_library
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "export.md"

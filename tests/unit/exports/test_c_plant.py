@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.exports.c_library import c_library
 from ppafo.exports.c_library.plant import plant_library
-from ppafo.exports.fmu import FLAGS
+from ppafo.exports.fmu.platforms import FLAGS
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
@@ -123,6 +123,13 @@ def test_an_angle_at_which_a_chamber_has_no_volume_is_refused(angle: float, rate
     before = bytes(run.memory)
     assert run.call("step")(run.memory, 0.5, angle, rate) == 1
     assert bytes(run.memory) == before
+
+
+@pytest.mark.parametrize("name", ["cylinder-servo", "pressure-loop"])
+def test_the_plant_of_a_loop_whose_gains_follow_other_numbers_has_neither_gains_nor_reference(name: str) -> None:
+    header = next(text for file, text in plant_library(load_scenario(name)).items() if file.endswith(".h")).decode()
+    assert "actuator_" in header
+    assert not re.search(r"double (controller_\w*(gain|stiffness)|reference_\w+);", header)
 
 
 @pytest.mark.parametrize("shape", ["loop", "plant"])

@@ -24,7 +24,8 @@ from ppafo.processor.simulators import (
     read_image,
     sizes,
 )
-from ppafo.processor.torque_laws import FIXED_LAWS, TARGETS, FixedLaw
+from ppafo.processor.torque_laws.catalog import FIXED_LAWS
+from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.widths import Interval
@@ -206,10 +207,6 @@ def test_a_processor_with_other_numbers_is_found_out(
     assert "on the processor" in found.first_difference
     built(wrong, tmp_path)
     assert sizes(tmp_path / "firmware.elf", target).flash > sizes(tmp_path / "simulated.elf", target).flash
-
-
-def test_the_names_of_targets_are_those_of_the_catalogue() -> None:
-    assert tuple(CATALOG) == TARGETS
 
 
 def test_numbers_stand_in_a_header_with_range_and_origin() -> None:

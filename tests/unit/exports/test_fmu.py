@@ -20,10 +20,12 @@ import pytest
 
 import ppafo.cli
 from ppafo.errors import ProgramError, ScenarioError
-from ppafo.exports import fmu
 from ppafo.exports.c_library import c_library
-from ppafo.exports.fmu import closed_loop, functional_unit, host_platform
-from ppafo.exports.fmu.description import FIXED_NAMES
+from ppafo.exports.fmu import platforms
+from ppafo.exports.fmu.interface import closed_loop
+from ppafo.exports.fmu.platforms import host_platform
+from ppafo.exports.fmu.unit import functional_unit
+from ppafo.exports.fmu.variables import FIXED_NAMES
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from scripts.instances import Instance, growth_of
@@ -392,7 +394,7 @@ def test_what_a_compiler_leaves_goes_away_with_its_folder(tmp_path: Path, monkey
     temporary.mkdir()
     monkeypatch.setenv("TMPDIR", str(temporary))
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
-    monkeypatch.setattr(fmu, "compiler_for", lambda _name: [str(compiler)])
+    monkeypatch.setattr(platforms, "compiler_for", lambda _name: [str(compiler)])
     with pytest.raises(ProgramError, match="does not build the library"):
-        fmu.build("linux64", {"unit.c": b""}, "unit.c")
+        platforms.build("linux64", {"unit.c": b""}, "unit.c")
     assert list(temporary.iterdir()) == []

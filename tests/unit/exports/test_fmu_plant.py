@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import functional_unit, host_platform, plant_alone
+from ppafo.exports.fmu.interface import plant_alone
+from ppafo.exports.fmu.platforms import host_platform
+from ppafo.exports.fmu.unit import functional_unit
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording
 from ppafo.simulation.loading import load_scenario

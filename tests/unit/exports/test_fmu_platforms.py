@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from ppafo.errors import SimulationError
-from ppafo.exports import fmu
-from ppafo.exports.fmu import closed_loop, compiler_for, functional_unit
+from ppafo.exports.fmu import platforms
+from ppafo.exports.fmu.interface import closed_loop
+from ppafo.exports.fmu.platforms import compiler_for
+from ppafo.exports.fmu.unit import functional_unit
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 
@@ -90,6 +92,6 @@ def test_a_compiler_that_fails_halfway_is_said_in_one_line(
     broken = tmp_path / "gcc"
     broken.write_text(script, encoding="utf-8")
     broken.chmod(0o755)
-    monkeypatch.setattr(fmu, "compiler_for", lambda _: [str(broken)])
+    monkeypatch.setattr(platforms, "compiler_for", lambda _: [str(broken)])
     with pytest.raises(SimulationError, match=line):
-        fmu.build("linux64", {"unit.c": b""}, "unit.c")
+        platforms.build("linux64", {"unit.c": b""}, "unit.c")

@@ -6,7 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import closed_loop, functional_unit, host_platform, plant_alone
+from ppafo.exports.fmu.interface import closed_loop, plant_alone
+from ppafo.exports.fmu.platforms import host_platform
+from ppafo.exports.fmu.unit import functional_unit
 from ppafo.walking import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk

@@ -15,7 +15,8 @@ from ppafo.gait.recorded.reading import find_convention, read_table
 from ppafo.gait.recorded.walk import Signal
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.storage.opensim import opensim_recording, write_opensim
+from ppafo.storage.opensim import write_opensim
+from ppafo.storage.opensim_names import opensim_recording
 from tests.unit.gait.laboratory import GAIT, MASS, SPEED, STRIDE, UNLOADED, angles, curve, force, markers, opensim, trc
 
 PHASES = np.linspace(0.0, 1.0, 101)

@@ -13,6 +13,7 @@ from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
 from ppafo.parameters.actuator_table import read_actuator_table, table_of
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
+from ppafo.parameters.measured_volumes import MeasuredVolumes
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import check_columns
@@ -60,8 +61,8 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
     degree = min(3, angles - 1)
     places = np.linspace(0.3, 1.9, angles)
     polynomial = np.polynomial.Polynomial([2e-4, 1e-4, 3e-5, 2e-5][: degree + 1])
-    columns = {"angle": places, "pressure": np.zeros(angles), "volume_1": polynomial(places)}
-    table = table_of(columns, "a.csv")
+    volumes = MeasuredVolumes(places, np.zeros(1), polynomial(places)[:, None], None)
+    table = table_of(volumes, "a.csv")
     for angle in np.linspace(0.3, 1.9, 31):
         level = level_of(table.chamber_1.lowest, bases_at(table, angle))
         assert level.volume == pytest.approx(polynomial(angle), rel=1e-10)

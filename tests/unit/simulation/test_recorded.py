@@ -10,19 +10,16 @@ from ppafo.parameters import apply_overrides, load_device, load_parameter_set
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.recorded import (
+from ppafo.simulation.recorded.clock import regular_interval, sample_period
+from ppafo.simulation.recorded.inputs import (
     RecordedInputs,
-    Start,
     between_stops,
-    regular_interval,
-    replay_scenario,
-    sample_period,
-    samples_at_rest,
     step_inputs,
     supply_paths,
-    value_at_rest,
     with_highest_supply,
 )
+from ppafo.simulation.recorded.replay import replay_scenario
+from ppafo.simulation.recorded.rest import Start, samples_at_rest, value_at_rest
 
 
 def recording(time: np.ndarray, command: np.ndarray, supply: np.ndarray) -> Recording:

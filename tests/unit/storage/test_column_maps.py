@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 import ppafo
 from ppafo.errors import DataError
-from ppafo.storage.foreign import ColumnMap, json_schema, load_column_map, read_foreign
+from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
+from ppafo.storage.foreign import read_foreign
 from tests.repeatable import TOO_SLOW
 
 TIME = {"column": 1, "unit": "ms"}

@@ -186,7 +186,7 @@ def test_library_that_crashes_or_hangs_on_a_file_takes_nobody_with_it(
         file["time"] = np.arange(3.0)
         file["time"].attrs["units"] = "s"
     assert len(read_recording(tmp_path / "bench.nc")) == 3
-    monkeypatch.setattr(trial_reading, "_TRIAL", code)
+    monkeypatch.setattr(trial_reading, "TRIAL", ("-c", code))
     monkeypatch.setattr(trial_reading, "_MAXIMUM_SECONDS", 1.5)
     with pytest.raises(DataError, match=rf"bench\.nc: is damaged: {message}"):
         read_recording(tmp_path / "bench.nc")

@@ -9,7 +9,8 @@ import pytest
 import scipy.io
 
 from ppafo.errors import DataError
-from ppafo.storage.foreign import ColumnMap, read_foreign
+from ppafo.storage.column_map import ColumnMap
+from ppafo.storage.foreign import read_foreign
 from ppafo.storage.matlab import open_matlab, read_matlab
 from ppafo.storage.result_folder import read_recording
 

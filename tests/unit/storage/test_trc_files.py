@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage.opensim import read_trc
+from ppafo.storage.trc import read_trc
 
 HEAD = (
     "PathFileType\t4\t(X/Y/Z)\twalk.trc\nDataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\n100\t100\t3\t2\tmm\n"

@@ -14,7 +14,7 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.validation.agreement import Curve, channel_agreement
-from ppafo.validation.measured import parse_thresholds
+from ppafo.validation.compared import parse_thresholds
 
 Agree = Callable[..., Any]
 Step = tuple[Device, Recording]

@@ -11,11 +11,12 @@ from ppafo.analyses.walk.answer import comparison_table, wearers_finding
 from ppafo.report.finding import Part, text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
-from ppafo.walking.figures import over_time
+from ppafo.walking.events import acting_phase, failure_times
+from ppafo.walking.figures import whole_walk
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.over_time import acting_phase, over_time_figure
 from ppafo.walking.figures.population import population_figure
+from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import settled
 
@@ -115,7 +116,7 @@ def test_pictures_of_the_leg_show_a_stride_with_help_where_there_was_one() -> No
 
 def test_the_walk_over_time_shows_the_fault_the_pause_and_how_long_it_helped() -> None:
     result = failing()
-    figure = over_time_figure(result)
+    figure = whole_walk_figure(result)
     gas, toes, phases, level = figure.axes
     assert {"toe fails", "help", "pause", "simulated"} <= set(texts(figure))
     lines = [line for line in gas.lines if len(np.asarray(line.get_xdata())) == 2]
@@ -131,9 +132,11 @@ def test_parts_of_the_plant_that_fail_are_marked_and_close_failures_have_one_lab
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     broken = ["faults.valve_1.kind=stuck", "faults.valve_1.time=5 s", "faults.toe.kind=stuck", "faults.toe.time=4 s"]
-    assert list(over_time.failures(load_walk("solenoid", broken)).items()) == [("toe", 4.0), ("valve_1", 5.0)]
-    monkeypatch.setattr(over_time, "failures", lambda _: {"heel": 1.0, "toe": 5.0, "pressure_1": 5.5, "vane": 99.0})
-    shown = texts(over_time_figure(failing()))
+    assert list(failure_times(load_walk("solenoid", broken)).items()) == [("toe", 4.0), ("valve_1", 5.0)]
+    monkeypatch.setattr(
+        whole_walk, "failure_times", lambda _: {"heel": 1.0, "toe": 5.0, "pressure_1": 5.5, "vane": 99.0}
+    )
+    shown = texts(whole_walk_figure(failing()))
     assert {"heel fails", "toe, pressure 1 fail"} <= set(shown)
     assert not any("vane" in text for text in shown)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.endurance.draw import walk_gas
+from ppafo.analyses.endurance.walk_gas import walk_gas
 from ppafo.analyses.walk.task_sequence import task_sequence_parts
 from ppafo.errors import ScenarioError
 from ppafo.gait import load_gait

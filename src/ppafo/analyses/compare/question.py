@@ -65,78 +65,20 @@ def compare(
     name_plugins(plugins)
     from dataclasses import replace
 
-    from ppafo.analyses.compare.answer import Case, Compared, finding_of, remarks_of
-    from ppafo.analyses.compare.pairs import COMPARED, compared_metrics
-    from ppafo.analyses.compare.solve import DEFAULT_SEED, drawn_runs, on_task, overrides_by_task
+    from ppafo.analyses.compare.answer import finding_of
+    from ppafo.analyses.compare.solve import Draws, baseline_of, compared, overrides_by_task
     from ppafo.arguments.words import taken_tasks
-    from ppafo.errors import StudyError, nearest_name
-    from ppafo.simulation.simulate import simulate_many
-    from ppafo.studies.draws import (
-        CONFIDENCE,
-        FEWEST_DRAWS,
-        MAXIMUM_DRAWS,
-        Uncertainty,
-        check_fraction,
-        study_of,
-        uncertainty_of,
-    )
-    from ppafo.studies.sampling import NOISE
-    from ppafo.studies.study import choose_configurations, with_overrides
-    from ppafo.study.runs import failures_of
+    from ppafo.studies.draws import study_of
+    from ppafo.studies.study import choose_configurations
 
-    if not FEWEST_DRAWS <= draws <= MAXIMUM_DRAWS:
-        raise StudyError(f"draws = {draws!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
-    check_fraction(confidence, *CONFIDENCE)
-    check_fraction(maximum_failed, "maximum_failed")
-    known = study_of(study) if study is not None else None
-    chosen = choose_configurations(configurations or None, known, overrides)
-    names = [configuration.name for configuration in chosen]
-    reference = names[0] if baseline is None else baseline
-    if reference not in names:
-        hint = nearest_name(reference, names)
-        raise StudyError(f"baseline: no configuration '{reference}'{hint}; available: {', '.join(names)}")
-    wanted = overrides_by_task(taken_tasks(tasks))
-    scenarios = {
-        (task, configuration.name): with_overrides(configuration.scenario, texts)
-        for task, texts in wanted.items()
-        for configuration in chosen
-    }
-    metrics = compared_metrics(scenarios.values())
-    distributions = Uncertainty(()) if known is None or not known.paths else uncertainty_of(known)
-    uncertainty = distributions.with_noise_of(scenarios.values())
-    if seed is None:
-        seed = DEFAULT_SEED if known is None else known.sample.seed
-    drawn = drawn_runs(scenarios, metrics, known, uncertainty, draws, seed, maximum_failed, threads, progress)
-    # The nominal devices too, with the seed of each scenario: what the tables call nominal is one realisation.
-    results = simulate_many(list(scenarios.values()), threads)
-    cases: dict[str, list[Case]] = {task: [] for task in wanted}
-    for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
-        rows_of_case, renoised, reason = drawn.get((task, name), (None, None, ""))
-        cases[task].append(
-            Case(
-                configuration=name,
-                status=result.status,
-                metrics={name: metric for name, metric in result.metrics.items() if name in COMPARED},
-                oscillation=result.oscillation if result.status.is_completed else None,
-                failed_draws=0 if rows_of_case is None else failures_of(rows_of_case),
-                reason=reason,
-                scenario=scenario,
-                rows=rows_of_case,
-                renoised=renoised,
-            )
-        )
-    comparison = Compared(
-        units="SI: N m, kg, J; fractions from 0 to 1",
-        configurations=names,
-        baseline=reference,
-        draws=draws if drawn else 0,
-        seed=seed if drawn else 0,
-        remarks=[],
-        varied=[path for path in uncertainty.paths if path != NOISE],
-        confidence=confidence,
-        tasks=[on_task(task, texts, cases[task], reference, metrics, confidence) for task, texts in wanted.items()],
-        metrics=metrics,
-    )
-    said = finding_of(replace(comparison, remarks=remarks_of(comparison)))
-    steady = all(case.oscillation is None for of_task in cases.values() for case in of_task)
-    return replace(said, passed=said.passed and steady) if check else said
+    requested = Draws(draws, seed, confidence, maximum_failed, threads, progress)
+    requested.check()
+    loaded = study_of(study) if study is not None else None
+    chosen = choose_configurations(configurations or None, loaded, overrides)
+    reference = baseline_of(chosen, baseline)
+    comparison = compared(chosen, reference, overrides_by_task(taken_tasks(tasks)), loaded, requested)
+    finding = finding_of(comparison)
+    if not check:
+        return finding
+    is_steady = all(case.oscillation is None for task in comparison.tasks for case in task.cases)
+    return replace(finding, passed=finding.passed and is_steady)

@@ -1,25 +1,34 @@
 """Configurations side by side: each as it is, and all of them over the same uncertain values."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from ppafo.analyses.compare.answer import Case, OnTask, front_of
-from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs
-from ppafo.errors import StudyError, first_twice
+from ppafo.analyses.compare.answer import Case, Compared, OnTask, front_of, remarks_of
+from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs, compared_metrics
+from ppafo.errors import StudyError, first_twice, nearest_name
 from ppafo.progress import Report
 from ppafo.report.kind import Interval
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import simulate_many
 from ppafo.studies.draws import (
+    CONFIDENCE,
+    FEWEST_DRAWS,
+    MAXIMUM_DRAWS,
     Uncertainty,
+    check_fraction,
+    uncertainty_of,
     with_new_noise,
 )
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.study import Study
+from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at
-from ppafo.study.runs import Rows, Runs, Tally, unvaried
+from ppafo.study.runs import Rows, Runs, Tally, failures_of, unvaried
 
 AS_WRITTEN = "as written"
 """What the task of a configuration is called where no other is requested."""
 DEFAULT_SEED = 1
+"""Seed of the draws of a comparison without a study."""
 _SAME = 1.0e-9
 """Values that differ by less than this fraction are one."""
 
@@ -33,41 +42,146 @@ def overrides_by_task(pairs: Iterable[tuple[str, Sequence[str]]]) -> dict[str, S
     return dict(pairs)
 
 
+def baseline_of(configurations: Sequence[Configuration], name: str | None) -> str:
+    """Return the configuration that all others are compared with, the first unless one is named; StudyError if none."""
+    names = [configuration.name for configuration in configurations]
+    if name is None:
+        return names[0]
+    if name not in names:
+        hint = nearest_name(name, names)
+        raise StudyError(f"baseline: no configuration '{name}'{hint}; available: {', '.join(names)}")
+    return name
+
+
+@dataclass(frozen=True, slots=True)
+class Draws:
+    """How many draws are made of the uncertain values, and what of their runs is accepted.
+
+    ``seed`` None is the study's own. More than the fraction ``maximum_failed`` of failed runs is an error.
+    """
+
+    count: int
+    seed: int | None
+    confidence: float
+    maximum_failed: float
+    threads: int | None
+    progress: Report | None
+
+    def check(self) -> None:
+        """Refuse numbers outside their ranges with a StudyError."""
+        if not FEWEST_DRAWS <= self.count <= MAXIMUM_DRAWS:
+            raise StudyError(f"draws = {self.count!r}: must be at least {FEWEST_DRAWS} and at most {MAXIMUM_DRAWS:,}")
+        check_fraction(self.confidence, *CONFIDENCE)
+        check_fraction(self.maximum_failed, "maximum_failed")
+
+
 Scenarios = Mapping[tuple[str, str], Scenario]
 """Scenarios by task and configuration."""
-_Drawn = tuple[Rows, Rows | None, str]
-"""The runs of a case over the draws, the first of them again with other noise, and why the first failed."""
 
 
-def drawn_runs(
+class DrawnRuns(NamedTuple):
+    """Runs of a case over the draws, the first of them again with other noise if any is noisy, why the first failed."""
+
+    rows: Rows
+    renoised: Rows | None
+    reason: str
+
+
+def compared(
+    configurations: Sequence[Configuration],
+    baseline: str,
+    overrides: Mapping[str, Sequence[str]],
+    study: Study | None,
+    draws: Draws,
+) -> Compared:
+    """Return configurations side by side on tasks, given by their ``overrides``, and over the values of a study.
+
+    Without a study the noise of the sensors alone is drawn, where there is any. StudyError where too many runs fail,
+    and for a study that draws a value in which the configurations differ.
+    """
+    scenarios = {
+        (task, configuration.name): with_overrides(configuration.scenario, texts)
+        for task, texts in overrides.items()
+        for configuration in configurations
+    }
+    metrics = compared_metrics(scenarios.values())
+    distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
+    uncertainty = distributions.with_noise_of(scenarios.values())
+    seed = draws.seed
+    if seed is None:
+        seed = DEFAULT_SEED if study is None else study.sample.seed
+    drawn = _drawn_runs(scenarios, metrics, study, uncertainty, draws, seed)
+    cases = _cases(scenarios, drawn, draws.threads)
+    comparison = Compared(
+        units="SI: N m, kg, J; fractions from 0 to 1",
+        configurations=[configuration.name for configuration in configurations],
+        baseline=baseline,
+        draws=draws.count if drawn else 0,
+        seed=seed if drawn else 0,
+        remarks=[],
+        varied=[path for path in uncertainty.paths if path != NOISE],
+        confidence=draws.confidence,
+        tasks=[
+            _on_task(task, texts, cases[task], baseline, metrics, draws.confidence) for task, texts in overrides.items()
+        ],
+        metrics=metrics,
+    )
+    return replace(comparison, remarks=remarks_of(comparison))
+
+
+def _drawn_runs(
     scenarios: Scenarios,
     metrics: Sequence[str],
     study: Study | None,
     uncertainty: Uncertainty,
-    draws: int,
+    draws: Draws,
     seed: int,
-    maximum_failed: float,
-    threads: int | None,
-    progress: Report | None,
-) -> dict[tuple[str, str], _Drawn]:
+) -> dict[tuple[str, str], DrawnRuns]:
     """Return the runs of every case, all over the same draws; nothing where nothing is drawn."""
     if not uncertainty.drawn:
         return {}
     if study is not None:
         _check_same(study, scenarios)
-    columns = uncertainty.replicated_columns(0, draws, seed)
-    again = with_new_noise(columns) if uncertainty.has_noise else {}
-    tally = Tally((draws + len(again.get(NOISE, ()))) * len(scenarios), progress)
-    drawn: dict[tuple[str, str], _Drawn] = {}
+    columns = uncertainty.replicated_columns(0, draws.count, seed)
+    renoised = with_new_noise(columns) if uncertainty.has_noise else {}
+    tally = Tally((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
+    drawn: dict[tuple[str, str], DrawnRuns] = {}
     for (task, name), scenario in scenarios.items():
-        runs = Runs(scenario, metrics, tally, uncertainty.gauge, threads)
+        runs = Runs(scenario, metrics, tally, uncertainty.gauge, draws.threads)
         # The noise is in all configurations, whatever a study says of its paths.
-        own = [path for path in columns if study is None or path == NOISE or study.varies(path, name)]
-        rows = runs.run({path: columns[path] for path in own} or unvaried(scenario, draws))
-        runs.check(rows, maximum_failed, f"configuration '{name}', task '{task}'")
+        paths = [path for path in columns if study is None or path == NOISE or study.varies(path, name)]
+        rows = runs.run({path: columns[path] for path in paths} or unvaried(scenario, draws.count))
+        runs.check(rows, draws.maximum_failed, f"configuration '{name}', task '{task}'")
+        # The reason of the draws themselves: the runs with other noise may overwrite it.
         reason = runs.reason
-        drawn[task, name] = rows, runs.run({path: again[path] for path in own}) if again else None, reason
+        again = runs.run({path: renoised[path] for path in paths}) if renoised else None
+        drawn[task, name] = DrawnRuns(rows, again, reason)
     return drawn
+
+
+def _cases(
+    scenarios: Scenarios, drawn: Mapping[tuple[str, str], DrawnRuns], threads: int | None
+) -> dict[str, list[Case]]:
+    """Return the cases of each task: the nominal run of every configuration, beside its runs over the draws."""
+    # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
+    results = simulate_many(list(scenarios.values()), threads)
+    cases: dict[str, list[Case]] = {}
+    for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
+        runs = drawn.get((task, name))
+        cases.setdefault(task, []).append(
+            Case(
+                configuration=name,
+                status=result.status,
+                metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
+                oscillation=result.oscillation if result.status.is_completed else None,
+                failed_draws=0 if runs is None else failures_of(runs.rows),
+                reason="" if runs is None else runs.reason,
+                scenario=scenario,
+                rows=None if runs is None else runs.rows,
+                renoised=None if runs is None else runs.renoised,
+            )
+        )
+    return cases
 
 
 def _check_same(study: Study, scenarios: Scenarios) -> None:
@@ -84,27 +198,55 @@ def _check_same(study: Study, scenarios: Scenarios) -> None:
             )
 
 
-def on_task(
+def _on_task(
     task: str, overrides: Sequence[str], cases: list[Case], baseline: str, metrics: Sequence[str], confidence: float
 ) -> OnTask:
-    """Return the cases of a task with their statistics."""
+    """Return the cases of a task with their statistics: each against the baseline, and which is the best of all."""
     first = next(case for case in cases if case.configuration == baseline)
-    pairs: dict[str, list[Paired]] = {case.configuration: [] for case in cases if case is not first}
-    for other in cases:
-        if other is first or first.rows is None or other.rows is None:
-            continue
-        for name in metrics:
-            again = None
-            if first.renoised is not None and other.renoised is not None:
-                again = (first.renoised[name], other.renoised[name])
-            compared = compare_pairs(name, first.rows[name], other.rows[name], COMPARED[name], confidence, again)
-            pairs[other.configuration] += [] if compared is None else [compared]
-    best: dict[str, dict[str, Interval]] = {}
+    others = [case for case in cases if case is not first]
+    return OnTask(
+        task,
+        list(overrides),
+        cases,
+        front_of(cases),
+        {other.configuration: _pairs(first, other, metrics, confidence) for other in others},
+        _best(cases, metrics, confidence),
+    )
+
+
+def _pairs(baseline: Case, other: Case, metrics: Sequence[str], confidence: float) -> list[Paired]:
+    """Return each metric of a case against the baseline's, draw by draw; none without draws."""
+    if baseline.rows is None or other.rows is None:
+        return []
+    pairs = []
+    for name in metrics:
+        renoised = None
+        if baseline.renoised is not None and other.renoised is not None:
+            renoised = (baseline.renoised[name], other.renoised[name])
+        pair = compare_pairs(name, baseline.rows[name], other.rows[name], COMPARED[name], confidence, renoised)
+        pairs += [] if pair is None else [pair]
+    return pairs
+
+
+def _best(cases: Sequence[Case], metrics: Sequence[str], confidence: float) -> dict[str, dict[str, Interval]]:
+    """Return the probability of each case to be the best, by metric and configuration; nothing without draws.
+
+    One whose torque loop oscillates is not among the best, and a metric may have no end that is better.
+    """
     judged = [case for case in cases if case.oscillation is None]
     rows = [case.rows for case in judged if case.rows is not None]
-    for name in metrics if rows else ():
-        if COMPARED[name]:
-            # All at once: no pair says which of three is the best.
-            shares = best_probabilities([each[name] for each in rows], COMPARED[name], confidence)
-            best[name] = dict(zip([case.configuration for case in judged], shares, strict=False))
-    return OnTask(task, list(overrides), cases, front_of(cases), pairs, best)
+    if not rows:
+        return {}
+    names = [case.configuration for case in judged]
+    # All at once: no pair says which of three is the best.
+    return {
+        metric: dict(
+            zip(
+                names,
+                best_probabilities([row[metric] for row in rows], COMPARED[metric], confidence),
+                strict=True,
+            )
+        )
+        for metric in metrics
+        if COMPARED[metric]
+    }

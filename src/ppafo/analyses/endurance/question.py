@@ -63,8 +63,9 @@ def bottle(
     from dataclasses import replace
 
     from ppafo.analyses.endurance.answer import Endurances, finding_of, finding_of_several
-    from ppafo.analyses.endurance.draw import WALK_FILE, draw_of_numbers, draw_of_recording, read_walk_gas, walk_gas
+    from ppafo.analyses.endurance.draw import draw_of_numbers, draw_of_recording
     from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
+    from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
     from ppafo.report.recording_figure import stated_units

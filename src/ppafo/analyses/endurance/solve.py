@@ -5,12 +5,8 @@ from pathlib import Path
 
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
-from ppafo.analyses.endurance.draw import (
-    Draw,
-    WalkGas,
-    draw_of_walk,
-    walk_gas,
-)
+from ppafo.analyses.endurance.draw import Draw
+from ppafo.analyses.endurance.walk_gas import WalkGas, draw_of_walk, walk_gas
 from ppafo.arguments import checked
 from ppafo.errors import DataError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle
@@ -77,7 +73,7 @@ def endurance_of_walk_gas(
 
 
 def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule) -> Endurance:
-    """Return how long a full bottle lasts."""
+    """Return how long a full bottle lasts at a draw, by the schedule of its use."""
     usable = bottle.mass - smallest_mass_when_warm(bottle, draw)
     return Endurance(
         bottle=bottle,

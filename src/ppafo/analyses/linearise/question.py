@@ -9,7 +9,7 @@ from ppafo.arguments import Overrides, Word, checked, words
 from ppafo.plugins import Plugins, name_plugins
 
 if TYPE_CHECKING:
-    from ppafo.analyses.linearise.answer import LinearModel
+    from ppafo.analyses.linearise.model import LinearModel
     from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
 

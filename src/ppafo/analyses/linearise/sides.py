@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from ppafo.analyses.linearise.answer import ON_THE_EDGE, Edge
+from ppafo.analyses.linearise.model import Edge
 from ppafo.analyses.linearise.plant import VALVE
 from ppafo.analyses.linearise.point import Point, settled
 from ppafo.engine.run import Run
@@ -13,6 +13,8 @@ from ppafo.parameters.joint import Joint
 
 EQUAL = 1.0e-12
 """Two sides that differ by less than this, over the larger one, are equal."""
+ON_THE_EDGE = 1.0e-6
+"""Two sides of a comparison that differ by less than this, over the larger one, lie on an edge of the model."""
 
 
 class Sides:

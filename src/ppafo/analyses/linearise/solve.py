@@ -6,10 +6,10 @@ from numbers import Real
 
 import numpy as np
 
-from ppafo.analyses.linearise.answer import ON_THE_EDGE, Delays, LinearModel, Variable
+from ppafo.analyses.linearise.model import Delays, LinearModel, Variable
 from ppafo.analyses.linearise.plant import UNITS, Plant, opens_in_proportion, plant_of
 from ppafo.analyses.linearise.point import Point, equilibrium, point_at
-from ppafo.analyses.linearise.sides import Sides, sides_of
+from ppafo.analyses.linearise.sides import ON_THE_EDGE, Sides, sides_of
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, UnitError, refused_as

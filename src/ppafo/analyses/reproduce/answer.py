@@ -27,9 +27,9 @@ from ppafo.analyses.reproduce.claim import (
 )
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
+from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH, InterpretationOfU
 from ppafo.analyses.reproduce.publication import ALL, SEED, Study
 from ppafo.analyses.reproduce.step_response import Levels, StepEvents
-from ppafo.analyses.reproduce.torque_task import WITHIN_REACH, InterpretationOfU
 from ppafo.identification.bench.result import figure_3
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set

@@ -259,7 +259,7 @@ class JudgedClaim:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """A publication and its judged claims."""
+    """A publication with the judged claims of it."""
 
     publication: Publication
     claims: tuple[JudgedClaim, ...]

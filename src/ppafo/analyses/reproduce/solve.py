@@ -10,14 +10,11 @@ from ppafo.analyses.reproduce.answer import (
 )
 from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence
 from ppafo.analyses.reproduce.claim import arithmetic_claims, load_reported, not_published_claim, told_claim
+from ppafo.analyses.reproduce.decision_phases import phased_runs
+from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
+from ppafo.analyses.reproduce.other_settings import control_claims
 from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
-from ppafo.analyses.reproduce.torque_task import (
-    control_claims,
-    phased_runs,
-    readings_of_u,
-    torque_task_claims,
-    torque_task_observations,
-)
+from ppafo.analyses.reproduce.torque_task import torque_task_claims, torque_task_observations
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import audit

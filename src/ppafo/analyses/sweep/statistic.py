@@ -96,7 +96,7 @@ class Statistic:
 
 
 def mean_of(unit: str) -> Statistic:
-    """Return the mean of a metric in a unit."""
+    """Return the statistic of a sweep that is the mean of a metric, in the unit of the metric."""
     return Statistic("mean", unit, _mean_interval, True)
 
 

@@ -222,7 +222,7 @@ def finding_of(
 
 
 def verdict(problem: Problem, before: Setting, after: Setting) -> str:
-    """Return the result in a sentence."""
+    """Return the result of a search for gains in a sentence."""
     name = problem.name
     if after.share_without_value:
         failing = percentage(after.share_without_value, 3)

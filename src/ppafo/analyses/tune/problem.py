@@ -88,7 +88,7 @@ class Effort(StrictTable):
 
 
 class TuningFile(StrictTable):
-    """A tuning file, as it is written."""
+    """Layout of a tuning file."""
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]

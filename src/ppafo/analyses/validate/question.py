@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.validate.solve import Validation
     from ppafo.report.finding import Finding
     from ppafo.signals import Recording
-    from ppafo.storage.foreign import ColumnMap
+    from ppafo.storage.column_map import ColumnMap
 
 SetLike = Annotated[str | Path, Word("PARAMETERS")]
 ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
@@ -73,10 +73,11 @@ def validate(
     from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of
     from ppafo.errors import DataError, nearest_name, one_line
     from ppafo.parameters import load_device
-    from ppafo.storage.foreign import column_map_of
+    from ppafo.storage.column_map import column_map_of
     from ppafo.validation.agreement import ReplaySettings, compare_recording
     from ppafo.validation.causes import causes_of
-    from ppafo.validation.measured import Measured, parse_thresholds, read_measured
+    from ppafo.validation.compared import parse_thresholds
+    from ppafo.validation.measured import Measured, read_measured
     from ppafo.validation.replay import MOTIONS, parse_initial
 
     report = progress or report_nothing

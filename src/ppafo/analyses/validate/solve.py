@@ -26,11 +26,7 @@ from ppafo.validation.agreement import (
     measured_values,
 )
 from ppafo.validation.causes import Cause, Causes
-from ppafo.validation.measured import (
-    COMPARED,
-    PRESSURE_1,
-    PRESSURE_2,
-)
+from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 from ppafo.version import __version__
 
 LARGEST_DELAY = 1.0

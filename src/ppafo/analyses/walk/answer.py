@@ -73,7 +73,7 @@ _WEARERS_CAPTION = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wearers:
-    """What many wearers get."""
+    """Result of one walk of many wearers, in the form that is printed and kept."""
 
     population: Population
 
@@ -168,7 +168,7 @@ def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dic
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair:
-    """A walk with the device and without it."""
+    """Result of a walk with the device beside one without it, in the form that is printed and kept."""
 
     comparison: Comparison
 

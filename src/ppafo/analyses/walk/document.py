@@ -35,7 +35,7 @@ def walk_data(name: str, version: int, comparison: Comparison) -> dict[str, Any]
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what computed."""
+    """Return the versions of the packages that computed a result."""
     return {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
 
 

@@ -7,8 +7,8 @@ from ppafo.control.walking.assistance import PEAKS
 from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Part
 from ppafo.report.kind import Kind
-from ppafo.walking.events import event_lines
-from ppafo.walking.figures.over_time import failures, over_time_figure
+from ppafo.walking.events import event_lines, failure_times
+from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 
@@ -67,7 +67,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
 def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
     """Return the walk over time, where something happened in it."""
     # A figure of an even walk shows nothing that the mean stride does not.
-    if not worn.events and not failures(worn.scenario):
+    if not worn.events and not failure_times(worn.scenario):
         return ()
-    draw = partial(over_time_figure, worn)
+    draw = partial(whole_walk_figure, worn)
     return (Part("The walk over time", name="over-time", caption=_OVER_TIME, draw=draw, is_detail=True),)

@@ -16,8 +16,9 @@ from ppafo.report.kind import Kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
+from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.over_time import bottle_figure, peak_torques, task_sequence_figure
+from ppafo.walking.figures.task_sequence import task_sequence_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import SegmentResult
@@ -60,7 +61,7 @@ def bottle_remark(worn: WalkResult) -> str:
 
 
 def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
-    values, peaks, motion = supply.values, peak_torques(worn), walk_of(worn.scenario)
+    values, peaks, motion = supply.values, worn.peak_torques, walk_of(worn.scenario)
     bottle, balance = supply.supply.bottle, supply.balance
     end = {name: float(series[-1]) for name, series in values.items()}
     liquid = f", {_GAS.text(end['liquid_mass'])} of it liquid" if "liquid_mass" in values else ""

@@ -59,7 +59,9 @@ def export_fmu(
     written: step.fmu; next: fmpy simulate step.fmu --show-plot
     """
     from ppafo.cli.output import export, export_file
-    from ppafo.exports.fmu import closed_loop, functional_unit, host_platform, plant_alone
+    from ppafo.exports.fmu.interface import closed_loop, plant_alone
+    from ppafo.exports.fmu.platforms import host_platform
+    from ppafo.exports.fmu.unit import functional_unit
     from ppafo.loading import load_scenario
 
     made = {"loop": closed_loop, "plant": plant_alone}[interface]

@@ -107,7 +107,7 @@ class SlidingModeParameters(NamedTuple):
 
 
 class SlidingModeState(NamedTuple):
-    """Integral of the torque error [N m s]."""
+    """What a sliding mode law remembers: the integral of the torque error [N m s]."""
 
     integral: float
 

@@ -10,19 +10,19 @@ from ppafo.model.sensors import Measurement
 
 
 class ConstantParameters(NamedTuple):
-    """The command [-], -1 to 1."""
+    """Setting of a law that gives one command [-] from -1 to 1 all the time."""
 
     command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 1.0)]
 
 
 class ConstantState(NamedTuple):
-    """The law has no state."""
+    """A constant command remembers nothing."""
 
 
 def constant_update(
     parameters: ConstantParameters, state: ConstantState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, ConstantState]:
-    """Command from -1 to 1: the setting."""
+    """Command [-] from -1 to 1, which is the setting whatever is measured, and the state."""
     return parameters.command, state
 
 
@@ -47,7 +47,7 @@ class OnOffParameters(NamedTuple):
 
 
 class OnOffState(NamedTuple):
-    """The law has no state."""
+    """On/off switching with a dead zone remembers nothing."""
 
 
 def on_off_update(

@@ -128,7 +128,7 @@ class Assessment(NamedTuple):
 
 
 class AssistingParameters(Protocol):
-    """Parameters of every law that assists."""
+    """What the parameters of every law of walking have in which a torque is requested by phases."""
 
     @property
     def assistance(self) -> Assistance:
@@ -148,7 +148,7 @@ class AssistingParameters(Protocol):
 
 
 class AssistingState(Protocol):
-    """State of every law that assists."""
+    """What the state of every law of walking has in which a torque is requested by phases."""
 
     @property
     def phase(self) -> PhaseState:

@@ -190,7 +190,7 @@ def knots_passed(fraction: float, next_knot: float) -> float:
 
 
 def is_learnt(rules: EstimationRules, clock: EstimatedClock) -> bool:
-    """True once the stride was learnt."""
+    """True once enough strides were seen to tell the gait phase from their course."""
     return clock.learnt >= rules.learning_strides
 
 

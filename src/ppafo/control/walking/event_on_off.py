@@ -102,17 +102,17 @@ EVENT_ON_OFF = ControllerKind(
 
 
 class OffParameters(NamedTuple):
-    """Nothing to set."""
+    """A device that is switched off has nothing to set."""
 
 
 class OffState(NamedTuple):
-    """Nothing to remember."""
+    """A device that is switched off remembers nothing."""
 
 
 def off_update(
     parameters: OffParameters, state: OffState, reference: float, measurement: GaitMeasurement, period: float
 ) -> tuple[float, OffState]:
-    """Command [-]: always ``VENT``."""
+    """Command of a device that is switched off: always ``VENT``, and the state."""
     return VENT, state
 
 

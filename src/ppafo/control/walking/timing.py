@@ -54,7 +54,7 @@ class ThresholdRules(NamedTuple):
 
 
 class ThresholdClock(NamedTuple):
-    """Nothing to remember beside the phases."""
+    """What a timing by thresholds of the forces remembers beside the phases: nothing."""
 
 
 def follow_thresholds(

@@ -164,7 +164,7 @@ def direction_of(value: float) -> float:
 
 
 def clamp_angle(plant: PlantParameters, angle: float) -> float:
-    """``angle`` [rad], not beyond the stops."""
+    """The ``angle`` [rad] of a joint, or the stop beyond which it lies."""
     return max(plant.angle_min, min(plant.angle_max, angle))
 
 
@@ -447,7 +447,7 @@ def with_motion(state: PlantState, angle: float, angular_velocity: float) -> Pla
 
 
 def with_gas(state: PlantState, gas: GasChange) -> PlantState:
-    """State with the gas of one step added."""
+    """State of the plant with the gas that came and went in a step added, without motion."""
     vented = gas.supplied - gas.mass_1 - gas.mass_2
     return PlantState(
         angle=state.angle,

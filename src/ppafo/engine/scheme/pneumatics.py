@@ -334,7 +334,7 @@ def second_right_sides(first: Flows, flowing: StageFlows) -> Flows:
 
 
 def both_stages(first: Flows, second: Flows, step: float) -> GasChange:
-    """Changes of mass [kg] in one step [s]."""
+    """Changes of mass [kg] in a step of ``step`` [s], of the mean of both stages."""
     return GasChange(
         # Weights of the method: 3/2 of the first stage and 1/2 of the second.
         mass_1=step * (1.5 * first.mass_1 + 0.5 * second.mass_1),

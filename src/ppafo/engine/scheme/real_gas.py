@@ -45,7 +45,7 @@ def true_mass(content: float, volume: float) -> float:
 
 
 def masses_at_start(plant: PlantParameters, initial: PlantState) -> TrueMasses:
-    """True masses [kg] of the gas in a state."""
+    """True masses [kg] of the gas in both chambers of a state, whose masses are those of an ideal gas."""
     volume_1, volume_2 = chamber_volumes(plant, initial.angle)
     return TrueMasses(true_mass(initial.mass_1, volume_1), true_mass(initial.mass_2, volume_2))
 

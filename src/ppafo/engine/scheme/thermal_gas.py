@@ -459,7 +459,7 @@ def end_pressures(plant: PlantParameters, begun: ThermalGas) -> tuple[float, flo
 
 
 def second_thermal_stage(thermal: ThermalParameters, begun: ThermalGas, flowing: StageFlows) -> ThermalFlows:
-    """Second stage [kg/s] of a step."""
+    """Flows of mass [kg/s] and of energy [W] in the second stage of a step, of gas with an energy balance."""
     flows = thermal_flows(thermal, begun.end, begun.end_masses, begun.ended, flowing.in_1, flowing.in_2, flowing.leak)
     # Right-hand side of ROS2: the flows at the end of the first stage less twice that stage, less the drift.
     right = combine_flows(combine_flows(flows, 1.0, begun.first, -2.0), 1.0, begun.drift, -1.0)

@@ -180,7 +180,7 @@ def begin_walk(
 
 
 def next_angle(plant: PlantParameters, leg: LegParameters, walk: WalkState, begun: WalkStep) -> float:
-    """Angle [rad] to which the volumes run."""
+    """Angle of the ankle [rad] to which the volumes run in a step."""
     is_free = ground.is_free(walk.contact, leg.keeps_gait)
     return clamp_angle(plant, begun.free.free_angle) if is_free else begun.led.angle
 

@@ -22,12 +22,12 @@ IN_SHAPES: Mapping[Any, Any] = {
 
 
 def stage(parts: Program) -> Mapping[str, type]:
-    """What the first stage leaves for later phases."""
+    """Groups of a lane that the first stage sets for later phases, with their classes."""
     return {"thermal_gas": ThermalGas}
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """The first stage."""
+    """Set the first stage of the step: flows and pressures at its begin, and the pressures to which they lead."""
     lane.thermal_gas = thermal_gas.begin_thermal_gas(
         lane.plant, lane.thermal, lane.state, lane.masses, next_angle, lane.flowing, length
     )
@@ -50,19 +50,19 @@ def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
-    """The second stage, and what both change."""
+    """Set the second stage, and the change of mass and energy by both."""
     begun = chambers(parts, lane)
     lane.thermal_second = thermal_gas.second_thermal_stage(lane.thermal, begun, lane.passing)
     lane.thermal_change = thermal_gas.thermal_change(lane.plant, lane.thermal, begun, lane.thermal_second, length)
 
 
 def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
-    """Error of the pressures over what is allowed [-]."""
+    """Error of the chamber pressures in a part of a step, over what is allowed [-]."""
     return thermal_gas.thermal_error(lane.plant, chambers(parts, lane), lane.thermal_second, length)
 
 
 def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
-    """Error of a valve that moves, over what is allowed [-]."""
+    """Error that a moving valve makes in a part of a step, over what is allowed [-]."""
     return thermal_gas.thermal_opening_error(lane.plant, chambers(parts, lane), shift, length)
 
 

@@ -19,12 +19,12 @@ IN_SHAPES: Mapping[Any, Any] = {pneumatics.begin_moving_gas: begin_shaped_gas}
 
 
 def stage(parts: Program) -> Mapping[str, type]:
-    """What the first stage leaves for later phases."""
+    """Groups of a lane that the first stage sets for later phases, with their classes."""
     return {"still_gas": StillGas} if parts.keeps_volumes else {"moving_gas": MovingGas}
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """The first stage, of chambers that stand still or move."""
+    """Set the first stage of the step, of chambers that stand still or move, which run to ``next_angle`` [rad]."""
     if parts.keeps_volumes:
         lane.still_gas = pneumatics.begin_still_gas(lane.state, lane.held, lane.flowing, length)
     else:
@@ -57,7 +57,7 @@ def first_flows(parts: Program, lane: Lane) -> tuple[float, float, float]:
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
-    """The second stage, and what both change."""
+    """Set the second stage, and the change of mass by both."""
     if parts.keeps_volumes:
         lane.second = pneumatics.second_still_stage(lane.still_gas, lane.passing)
         lane.change = pneumatics.still_change(lane.plant, lane.still_gas, lane.second, length)
@@ -72,19 +72,19 @@ def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
 
 
 def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
-    """Error of a valve that moves, over what is allowed [-]."""
+    """Error that a moving valve makes in a part of a step, over what is allowed [-]."""
     return pneumatics.opening_error(lane.plant, still(parts, lane), shift, ahead, length)
 
 
 def add(parts: Program, lane: Lane) -> None:
-    """Set the state with the gas of the step."""
+    """Set the state after the step to the state before it with the gas of the step."""
     lane.fed = with_gas(lane.state, lane.change)
 
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
-    """The vane's motion changes no energy."""
+    """Return the state as it is: motion changes no energy of a gas that keeps its temperature."""
     return state
 
 
 def work(parts: Program, lane: Lane) -> None:
-    """The gas takes no work."""
+    """Count nothing: the work of a gas that keeps its temperature is not followed."""

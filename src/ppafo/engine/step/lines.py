@@ -20,7 +20,7 @@ def stage(parts: Program) -> Mapping[str, type]:
 
 
 def after_first(parts: Program, lane: Lane) -> LineState:
-    """The lines after the first stage."""
+    """Pressures of both lines [Pa] after the first stage."""
     return lane.fed_thermal_gas.lines.after if parts.is_thermal else lane.fed_gas.lines.after
 
 
@@ -35,7 +35,7 @@ def source_ahead(parts: Program, lane: Lane) -> PlantParameters:
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """The first stage of chambers and lines."""
+    """Set the first stage of the step, in which chambers and lines are solved together."""
     if parts.is_thermal:
         lane.fed_thermal_gas = supply_lines.begin_fed_thermal_gas(
             lane.plant,
@@ -55,7 +55,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def ended(parts: Program, lane: Lane, length: float) -> LineState:
-    """The lines at the end of the step."""
+    """Pressures of both lines [Pa] at the end of the step."""
     from_2 = lane.passing.in_2.from_source
     if parts.is_thermal:
         return supply_lines.end_thermal_lines(

@@ -34,7 +34,7 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
 
 
 def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
-    """Temperature [K] of a chamber."""
+    """Temperature of the gas in a chamber [K], of its energy content and its true mass [kg]."""
     return thermal.temperature * (content / mass)
 
 
@@ -89,7 +89,7 @@ def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None
 
 
 def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """How far it has been from there so far."""
+    """Raise how far the reference has been from its origin so far by the sample ``index``."""
     value = reference_at(parts, lane, index * interval * lane.timing.step)
     largest = max(lane.course.largest, abs(value - origin_of(parts, lane)))
     lane.course = lane.course._replace(largest=largest, tolerance=SAME_LEVEL * largest)
@@ -107,13 +107,13 @@ def look_for_hold(parts: Program, lane: Lane, interval: float, index: int) -> No
 
 
 def follow_course(parts: Program, lane: Lane) -> None:
-    """A monotone reference shows on the way where it rests."""
+    """Follow a monotone reference, which shows on the way where it rests."""
     if parts.follows_reference and parts.reference.is_monotone:
         lane.course = advance_course(lane.course, lane.sample)
 
 
 def start(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """Meters begin with the first sample."""
+    """Set every meter to its state at the first sample."""
     make_sample(parts, lane, moment, number, interval)
     follow_course(parts, lane)
     for group, kind in parts.meter_groups.items():
@@ -121,7 +121,7 @@ def start(parts: Program, lane: Lane, moment: float, number: int, interval: floa
 
 
 def update(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
-    """And take a further one. A locked vane never moves: its meters of motion keep what they have."""
+    """Take one more sample in every meter; those of motion wait where a locked vane never moves."""
     make_sample(parts, lane, moment, number, interval)
     follow_course(parts, lane)
     for group, kind in parts.moving_meters.items():
@@ -129,7 +129,7 @@ def update(parts: Program, lane: Lane, moment: float, number: int, interval: flo
 
 
 def trace(parts: Program, lane: Lane, moment: float, number: int, interval: float, slot: int) -> None:
-    """Keep the channels that are traced."""
+    """Write the channels that are traced of the present sample to their ``slot``."""
     make_sample(parts, lane, moment, number, interval)
     for row, path in parts.traced_paths.items():
         lane.trace[slot, row] = lane[path]

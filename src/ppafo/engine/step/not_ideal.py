@@ -22,17 +22,17 @@ error, shift_error = isothermal.error, isothermal.shift_error
 
 
 def stage(parts: Program) -> Mapping[str, type]:
-    """What the first stage leaves for later phases."""
+    """Groups of a lane that the first stage sets for later phases, with their classes."""
     return {"real_gas": RealGas}
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
-    """The first stage."""
+    """Set the first stage of the step: flows and pressures at its begin, and the pressures to which they lead."""
     lane.real_gas = real_gas.begin_real_gas(lane.plant, lane.state, lane.masses, next_angle, lane.flowing, length)
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
-    """The second stage, and what both change."""
+    """Set the second stage, and the change of gas content and true mass by both."""
     lane.second = pneumatics.second_moving_stage(lane.real_gas.moving, lane.passing)
     lane.real_change = real_gas.real_change(lane.plant, lane.state, lane.masses, lane.real_gas, lane.second, length)
 
@@ -48,4 +48,4 @@ def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached:
 
 
 def work(parts: Program, lane: Lane) -> None:
-    """Gas of one temperature counts no work."""
+    """Count nothing: the work of a gas that keeps its temperature is not followed."""

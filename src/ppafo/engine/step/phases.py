@@ -60,7 +60,7 @@ def hold_chambers(parts: Program, lane: Lane) -> None:
 
 
 def begin_step(parts: Program, lane: Lane) -> None:
-    """Nothing of the step is done yet."""
+    """Set how much of the step is done to nothing."""
     lane.before = 0.0
 
 
@@ -167,7 +167,7 @@ def begin_gas(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def angle_ahead(parts: Program, lane: Lane) -> float:
-    """Angle [rad] to which the volumes run."""
+    """Angle of the joint [rad] to which the volumes run in the step."""
     if parts.leg is not None:
         return parts.leg.assumed_angle(parts, lane)
     if parts.angle is None:
@@ -279,7 +279,7 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def end_motion(parts: Program, lane: Lane) -> None:
-    """Set the state at the end of the step."""
+    """Set the state at the end of the step, with the gas at the angle that was reached."""
     if parts.leg is not None:
         # The chambers that the next step finds are those where this one ends.
         parts.leg.end(parts, lane, length_of(parts, lane))

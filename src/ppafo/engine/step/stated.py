@@ -25,13 +25,13 @@ def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vente
 
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> Moment:
-    """The begin of a step, with the flows of its first stage."""
+    """What effects see of the plant at the begin of a step, with the flows of its first stage."""
     supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
     return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)
 
 
 def straight_on(value: float, rate: float, length: float) -> float:
-    """A number after a time [s] at its rate."""
+    """A number after ``length`` [s] at its rate."""
     return value + length * rate
 
 
@@ -48,13 +48,13 @@ def predict(parts: Program, lane: Lane, command: float, length: float) -> None:
 
 
 def restore(parts: Program, lane: Lane) -> None:
-    """The states at the begin of the step again."""
+    """Set the states of effects back to those at the begin of the step."""
     for name in parts.stated_at_ports:
         lane[f"{name}_state"] = lane[f"{name}_state_kept"]
 
 
 def advance(parts: Program, lane: Lane, command: float, length: float) -> None:
-    """States at the end of a step or part."""
+    """Set the states of effects at the end of a step, or of a part of it."""
     # Means over the step: a part without length must not divide by 0.
     span = max(length, SHORTEST)
     supplied = (lane.after.supplied_mass - lane.state.supplied_mass) / span

@@ -29,7 +29,7 @@ from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
 def parameters(parts: Program) -> Mapping[str, type]:
-    """What a leg is made of, and what leads it."""
+    """Groups of parameters of a leg that walks, and of what leads it, with their classes."""
     return {
         "leg": LegParameters,
         "share": DeviceShare,
@@ -76,12 +76,12 @@ def find_place(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def find_measured(parts: Program, lane: Lane) -> None:
-    """What was measured there."""
+    """Set the gait as it was measured, at the place in the stride where the step ends."""
     lane.measured = measured_at(lane.gait, lane.gait_timing, lane.leg, lane.place)
 
 
 def find_gait(parts: Program, lane: Lane) -> None:
-    """The gait at the end of the step."""
+    """Set the gait at the end of the step, for the leg of this wearer."""
     lane.next_gait = gait_of(lane.leg, lane.measured)
 
 
@@ -107,12 +107,12 @@ def begin(parts: Program, lane: Lane) -> None:
 
 
 def assumed_angle(parts: Program, lane: Lane) -> float:
-    """Angle [rad] to which the volumes run."""
+    """Angle of the joint [rad] to which the volumes run in a step of a walk."""
     return walking.next_angle(lane.plant, lane.leg, lane.walk, lane.walk_begun)
 
 
 def hold_ahead(parts: Program, lane: Lane) -> None:
-    """The chambers there."""
+    """Set the chambers at the angle to which the volumes run."""
     lane.ahead = held_chambers(lane.plant, assumed_angle(parts, lane))
 
 
@@ -145,7 +145,7 @@ def depart(parts: Program, lane: Lane) -> None:
 
 
 def end(parts: Program, lane: Lane, length: float) -> None:
-    """Set state and walk after the step."""
+    """Set state and leg at the end of the step."""
     lane.held = lane.ahead
     lane.after, lane.walk_after = walking.end_walk(
         lane.plant,

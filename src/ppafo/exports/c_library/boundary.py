@@ -80,7 +80,7 @@ def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> Shared:
 
 
 def struct_of_numbers(name: str, names: Iterable[str]) -> Shared:
-    """A struct of numbers."""
+    """Return the C declaration of a struct whose members are numbers."""
     return Shared(Row(name, tuple((field, FLOAT) for field in names)))
 
 

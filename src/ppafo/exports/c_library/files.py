@@ -174,7 +174,7 @@ class Library:
 
 
 def c_identifier(name: str) -> str:
-    """A name as C can have it."""
+    """Return a name as C can have it."""
     # A name in C begins with a letter here: those that begin with an underscore belong to compilers.
     identifier = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_").lower()
     return identifier if identifier[:1].isalpha() else f"run_{identifier}"

@@ -1,131 +1,15 @@
-"""The description of a unit: its variables, and modelDescription.xml of FMI 2 and 3."""
+"""modelDescription.xml of FMI 2 and 3: the variables of a unit, their units, and what it can do."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 from xml.etree import ElementTree as Xml
 
-from ppafo.exports.c_library.files import OUTPUTS, Library, Setting
-from ppafo.exports.c_library.plant import Input
-from ppafo.model.controlled import CONTROLLED
+from ppafo.exports.fmu.interface import Interface
+from ppafo.exports.fmu.variables import Variable, variables_of
 from ppafo.units import base_value, dimension
 from ppafo.version import __version__
 
-FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
-"""Settings that the start of a run is made of: they cannot change under way."""
-FIXED_NAMES = ("period", "delay", "seed")
-"""Names of further settings that cannot change under way: they count steps or begin the noise."""
-TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
-"""Settings of the wearer that may change: the weight of a leg stays."""
-REFERENCES = tuple(kind.reference for kind in CONTROLLED.values())
-STEPPED = ("command", *REFERENCES, "strides", "contact", "controller_phase", "safe_state")
-"""Outputs that jump from sample to sample."""
-
-
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """One variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in words of FMI.
-
-    ``start`` None is calculated, limits None are none.
-    """
-
-    name: str
-    number: int
-    unit: str
-    summary: str
-    causality: str
-    variability: str
-    start: float | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Interface:
-    """The interface of a unit: inputs, outputs, metrics, settings that are none of its variables.
-
-    ``templates`` have the C that moves it on, ``words`` what is filled in there. ``time`` says for people how it goes
-    on, ``tuning`` when a changed parameter is taken. ``step`` is the communication step that it takes by default [s],
-    ``is_step_fixed`` true where others must be multiples of it. ``clock`` is what the clock of the controller says.
-    """
-
-    name: str
-    library: Library
-    templates: tuple[str, ...]
-    time: str
-    tuning: str
-    step: float
-    duration: float
-    outputs: tuple[str, ...]
-    shows_metrics: bool
-    is_step_fixed: bool
-    clock: str | None
-    hidden: frozenset[str]
-    inputs: tuple[Input, ...]
-    words: dict[str, str]
-
-
-def change_of(interface: Interface, setting: Setting) -> str:
-    """``h`` for a setting that is no variable, ``t`` for one that may change under way, else ``f``."""
-    if setting.path in interface.hidden:
-        return "h"
-    section, _, name = setting.path.rpartition(".")
-    if section == "wearer" and name in TUNABLE_OF_WEARER:
-        return "t"
-    return "f" if section in FIXED_SECTIONS or name in FIXED_NAMES else "t"
-
-
-def variables_of(interface: Interface) -> tuple[Variable, ...]:
-    """All variables, in the order of their numbers, which are also the C's."""
-    library = interface.library
-    first_metric = len(library.settings) + len(library.program.outputs)
-    first_input = first_metric + len(library.program.metrics)
-    variables = []
-    for number, setting in enumerate(interface.library.settings):
-        change, quantity = change_of(interface, setting), setting.quantity
-        if change == "h":
-            continue
-        # The largest floats stand for no limit; XML would show them as one.
-        low, high = (limit if abs(limit) < 1e308 else None for limit in (quantity.minimum, quantity.maximum))
-        said = quantity.summary or quantity.name
-        kind = "tunable" if change == "t" else "fixed"
-        variables.append(
-            Variable(setting.path, number, quantity.unit, said, "parameter", kind, setting.value, low, high)
-        )
-    return (
-        *variables,
-        *(
-            Variable(name, len(library.settings) + index, *OUTPUTS[name], "output", variability_of(name))
-            for index, name in enumerate(library.program.outputs)
-            if name in interface.outputs
-        ),
-        *(
-            Variable(f"metrics.{kind.name}", first_metric + index, kind.unit, kind.summary, "local", "continuous")
-            for index, kind in enumerate(library.program.metrics if interface.shows_metrics else ())
-        ),
-        *(
-            Variable(
-                variable.name,
-                first_input + index,
-                variable.unit,
-                variable.summary,
-                "input",
-                "continuous",
-                variable.start,
-                variable.minimum,
-                variable.maximum,
-            )
-            for index, variable in enumerate(interface.inputs)
-        ),
-    )
-
-
-def variability_of(name: str) -> str:
-    """Whether an output jumps, ``discrete``, or goes on, ``continuous``."""
-    return "discrete" if name in STEPPED else "continuous"
-
-
-BASE_UNITS = {
+_BASE_UNITS = {
     "[mass]": "kg",
     "[length]": "m",
     "[time]": "s",
@@ -133,7 +17,8 @@ BASE_UNITS = {
     "[substance]": "mol",
     "[angle]": "rad",
 }
-DISPLAY_UNITS = {
+"""Base unit of FMI for each base dimension."""
+_DISPLAY_UNITS = {
     "Pa": "psi",
     "kg": "g",
     "m^2": "mm^2",
@@ -143,14 +28,12 @@ DISPLAY_UNITS = {
     "rad/s": "deg/s",
 }
 """What a tool shows in place of an SI unit, whose values it exchanges: units of the bench, as in the files of ppafo."""
-TOOL = f"ppafo {__version__}"
 
 
 def description_of_fmi2(interface: Interface, identifier: str, token: str) -> bytes:
-    """The description for FMI 2.0."""
+    """Return modelDescription.xml of FMI 2.0; ``identifier`` names the library, ``token`` is that of its sources."""
     variables = variables_of(interface)
-    head = _head("2.0", interface, guid=token)
-    root = Xml.Element("fmiModelDescription", head)
+    root = Xml.Element("fmiModelDescription", _head("2.0", interface, guid=token))
     kind = Xml.SubElement(
         root,
         "CoSimulation",
@@ -180,7 +63,7 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
 
 
 def description_of_fmi3(interface: Interface, identifier: str, token: str) -> bytes:
-    """The description for FMI 3.0."""
+    """Return modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` is that of its sources."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
     has_clock = str(interface.clock is not None).lower()
@@ -218,7 +101,7 @@ def description_of_fmi3(interface: Interface, identifier: str, token: str) -> by
 
 
 def build_description_of_fmi3(identifier: str, flags: str) -> bytes:
-    """How the sources of a unit of FMI 3.0 are built."""
+    """Return buildDescription.xml of FMI 3.0: how the sources are built, with the ``flags`` of a compiler."""
     root = Xml.Element("fmiBuildDescription", fmiVersion="3.0")
     built = Xml.SubElement(root, "BuildConfiguration", modelIdentifier=identifier)
     sources = Xml.SubElement(built, "SourceFileSet", language="C99", compilerOptions=flags)
@@ -234,13 +117,13 @@ def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
         "description": interface.library.description,
         "version": __version__,
         "license": "MIT",
-        "generationTool": TOOL,
+        "generationTool": f"ppafo {__version__}",
         "variableNamingConvention": "structured",
     }
 
 
 def _attributes(variable: Variable) -> tuple[dict[str, str], dict[str, str]]:
-    """Attributes of a variable, and of the number that it is."""
+    """Return the attributes of a variable, and those of the number that it is."""
     initial = {"parameter": {"initial": "exact"}, "input": {}}.get(variable.causality, {"initial": "calculated"})
     of_variable = {
         "name": variable.name,
@@ -253,14 +136,14 @@ def _attributes(variable: Variable) -> tuple[dict[str, str], dict[str, str]]:
     limits = {"min": variable.minimum, "max": variable.maximum, "start": variable.start}
     unit = _shown(variable.unit)
     of_number = {"unit": unit} if unit else {}
-    if unit in DISPLAY_UNITS:
-        of_number["displayUnit"] = DISPLAY_UNITS[unit]
+    if unit in _DISPLAY_UNITS:
+        of_number["displayUnit"] = _DISPLAY_UNITS[unit]
     of_number |= {name: repr(float(value)) for name, value in limits.items() if value is not None}
     return of_variable, of_number
 
 
 def _shown(unit: str) -> str:
-    """A unit of ppafo without the kind of a pressure, which FMI does not distinguish; empty for a plain number."""
+    """Return a unit of ppafo without the kind of a pressure, which FMI does not have; empty for a plain number."""
     bare = unit.removesuffix("_a").removesuffix("_d")
     return "" if bare in ("", "-", "1") else bare
 
@@ -269,12 +152,12 @@ def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables
     """Add what stands between the kind of a unit and its variables, in FMI 2 and 3 alike."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in sorted({_shown(variable.unit) for variable in variables} - {""}):
-        exponents = {BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}
+        exponents = {_BASE_UNITS[base]: str(power) for base, power in dimension(name).items()}
         unit = Xml.SubElement(table, "Unit", name=name)
         Xml.SubElement(unit, "BaseUnit", exponents)
-        if name in DISPLAY_UNITS:
-            factor = 1.0 / base_value(1.0, DISPLAY_UNITS[name]) * base_value(1.0, name)
-            Xml.SubElement(unit, "DisplayUnit", name=DISPLAY_UNITS[name], factor=repr(factor))
+        if name in _DISPLAY_UNITS:
+            factor = 1.0 / base_value(1.0, _DISPLAY_UNITS[name]) * base_value(1.0, name)
+            Xml.SubElement(unit, "DisplayUnit", name=_DISPLAY_UNITS[name], factor=repr(factor))
     categories = Xml.SubElement(root, "LogCategories")
     Xml.SubElement(categories, "Category", name="logStatusError", description="why a call failed")
     times = {"startTime": 0.0, "stopTime": interface.duration, "stepSize": interface.step}

@@ -116,7 +116,7 @@ def counts_per_unit(name: str) -> int:
 
 
 def sample_bytes(sample: Sample) -> bytes:
-    """The packet of a sample."""
+    """Return the packet that carries a sample to the processor."""
     # In order of bits, whatever the order of the mapping: the receiver has only the mask.
     numbers = sorted(_NUMBERS[name] for name in sample.counts)
     mask = sum(1 << number for number in numbers)
@@ -125,7 +125,7 @@ def sample_bytes(sample: Sample) -> bytes:
 
 
 def answer_bytes(answer: Answer) -> bytes:
-    """The packet of an answer."""
+    """Return the packet that carries the processor's answer."""
     return _packet(ANSWER, answer[:4], _WORD.pack(answer.command))
 
 
@@ -138,7 +138,7 @@ def _packet(kind: int, head: tuple[int, int, int, int], payload: bytes) -> bytes
 
 
 def sample_length(channels: int) -> int:
-    """Bytes of a sample with some channels."""
+    """Number of bytes of a packet that carries a sample with these channels."""
     return _SHORTEST + _WORD.size * channels
 
 
@@ -329,7 +329,7 @@ class UdpPort:
 
 @final
 class SerialPort:
-    """A serial device through pyserial."""
+    """A port to a processor on a serial line, by pyserial."""
 
     is_stream = True
     strangers = 0

@@ -81,7 +81,7 @@ class AngleMap(StrictTable):
 
 
 class MomentMap(StrictTable):
-    """Ankle moment, in N m or N m/kg."""
+    """Where a file has the moment of the ankle, and whether it is in N m or N m/kg."""
 
     terms: _Terms
     unit: _Unit = None

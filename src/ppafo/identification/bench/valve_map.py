@@ -9,26 +9,64 @@ pressures of the moment give, so that a supply that sags does not look like a va
 of the gas, gains and zeros of the sensors are tolerances; the zero of the flow meter shows inside the dead band.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought
 from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.residuals import Free
 from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
 PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
+PRESSURES = ("upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
 _MINIMUM_RANGE = 0.5
-_SEEN_BEYOND = 0.02
+"""Range of the command [-] without which dead band and gain are not told apart."""
+_SHUT, _HALF_OPEN = 0.05, 0.5
+"""Shares of the largest area below which the valve is shut, and above which it is neither shut nor fully open."""
+_SATURATES = 0.02
+"""By how much [-] the saturation lies below the highest command where it is seen at all."""
+_CLEAR_COMMAND = 0.1
+"""Size of a command [-] from which on it is one towards its chamber."""
 _SMALL_COMMAND = 0.2
+"""Stands in for the size of a dead band or a play [-] that may be 0."""
 _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve_map.saturation_command"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sweep:
+    """Readings of a valve, each (readings,): command [-], flow [kg/s], pressures [Pa, absolute].
+
+    ``branch`` is 1 where the command rises, -1 where it falls. ``commands`` has the command of each recording, in which
+    a play begins anew.
+    """
+
+    commands: tuple[Floats, ...]
+    command: Floats
+    flow: Floats
+    upstream: Floats
+    downstream: Floats
+    branch: Floats
+
+    @property
+    def highest_command(self) -> float:
+        """Largest size of a command [-]."""
+        return float(np.abs(self.command).max())
+
+    @property
+    def is_two_way(self) -> bool:
+        """True where the command rises and falls, so that a play shows."""
+        return bool((self.branch > 0).any() and (self.branch < 0).any())
 
 
 def valve_map(
@@ -43,74 +81,109 @@ def valve_map(
     ``path`` is the valve's in a set (``valves.main``).
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    names = CHANNELS[2:]
-    areas = _areas(sources, gas)
-    commands = [source.recording["command"] for source in sources]
-    command, flow, upstream, downstream = (pool(sources, name) for name in CHANNELS)
-    branch = np.concatenate([_branch(source) for source in sources])
-    highest, largest = float(np.abs(command).max()), float(np.abs(areas).max())
-    is_two_way = bool((branch > 0).any() and (branch < 0).any())
+    _check_recordings(sources)
+    sweep = _sweep_of(sources)
+    areas = _areas(sources, sweep, gas)
     band = f"{path}.dead_band"
-    # The valve is neither shut nor fully open where it has half of the largest area.
-    half = float(np.abs(command[np.abs(areas) > 0.5 * largest]).min())
+    numbers = (
+        *_sought(sources, sweep, areas, band),
+        *flow_tolerances(gas, tolerances, PRESSURES, float(np.abs(sweep.flow).max())),
+    )
+
+    def law(at: Values) -> Floats:
+        before, behind = (
+            true_pressure(at, name, shown)
+            for name, shown in zip(PRESSURES, (sweep.upstream, sweep.downstream), strict=True)
+        )
+        spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
+        area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION])
+        shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
+        return read_flow(at, gas, area * gas.choked_flow_constant * shape)
+
+    fitted, model = solve(law, _readings(sources, sweep), numbers, confidence)
+    values, residuals = fitted.by_name, sweep.flow - model
+    scatter = np.std(residuals) / np.abs(sweep.flow).max()
+    is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
+    one_way = "only one direction was recorded: whether the other behaves the same is unknown"
+    axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
+    return result_of(
+        PROCEDURE,
+        sources,
+        fitted,
+        _reported(sweep, band, values[_SATURATION]),
+        f"{sweep.command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
+        f"scatter {scatter:.2%} of the largest flow",
+        with_residuals("Valve map", *axes, _marks(sweep, model), sweep.command, residuals),
+        "the opening is not the same in both directions, or not linear in the command",
+        () if is_clear else (one_way,),
+    )
+
+
+def _sweep_of(sources: tuple[Source, ...]) -> Sweep:
+    command, flow, upstream, downstream = (pool(sources, name) for name in CHANNELS)
+    return Sweep(
+        commands=tuple(source.recording["command"] for source in sources),
+        command=command,
+        flow=flow,
+        upstream=upstream,
+        downstream=downstream,
+        branch=np.concatenate([_branch(source) for source in sources]),
+    )
+
+
+def _sought(sources: tuple[Source, ...], sweep: Sweep, areas: Floats, band: str) -> tuple[Free, ...]:
+    """Return what is sought, with first guesses from the effective areas [m^2] of the readings; ``band`` is a path."""
+    size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
+    half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
     if not half > 0.0:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: the valve has more than half of its largest flow at command 0; check the "
             "zero of channel 'command', or leave that reading out"
         )
-    shut = np.abs(command[np.abs(areas) < 0.05 * largest])
+    shut = size[np.abs(areas) < _SHUT * largest]
+    # Inside the bounds, so that the search can go either way.
     start = float(np.clip(np.median(shut) if shut.size else 0.0, 0.01 * half, 0.9 * half))
-    numbers = (
+    return (
         sought(band, start, 0.0, half, highest),
         sought(_GAIN, 0.5 * largest / (half - start), 0.0),
         # Just inside the highest command, beyond which no reading changes with it.
         sought(_SATURATION, 0.02 * half + 0.98 * highest, half, highest * (1.0 + 1e-9), highest),
-        *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if is_two_way else ()),
-        *flow_tolerances(gas, tolerances, names, float(np.abs(flow).max())),
+        *((sought(_PLAY, 0.02, 0.0, 0.5, 0.1),) if sweep.is_two_way else ()),
     )
 
-    def law(at: Values) -> Floats:
-        before, behind = true_pressure(at, names[0], upstream), true_pressure(at, names[1], downstream)
-        drawn = np.concatenate([spool_of(one, at[_PLAY]) for one in commands])
-        area = area_of_command(drawn, at[band], at[_GAIN], at[_SATURATION])
-        shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
-        return read_flow(at, gas, area * gas.choked_flow_constant * shape)
 
+def _readings(sources: tuple[Source, ...], sweep: Sweep) -> Readings:
+    """Return the flow to fit, in groups whose own numbers are compared with those of all."""
     groups = (
-        np.where(branch < 0.0, "falling commands", "rising commands").tolist(),
-        np.where(command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
-        np.where(np.abs(command) > 0.5 * highest, "large commands", "small commands").tolist(),
+        np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
+        np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
+        np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
     )
-    readings = Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), groups)
-    found, model = solve(law, readings, numbers, confidence)
-    values = found.by_name
+    return Readings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
+
+
+def _reported(sweep: Sweep, band: str, saturation: float) -> list[Reported]:
+    """Return the numbers to report: a saturation [-] below the highest command, a play where the command turned."""
     reported = [
         Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
         Reported(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
     ]
-    if values[_SATURATION] < highest - _SEEN_BEYOND:
+    if saturation < sweep.highest_command - _SATURATES:
         reported.append(Reported(_SATURATION, "", "Command from which the valve opens no further"))
-    if is_two_way:
+    if sweep.is_two_way:
         reported.append(Reported(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
+    return reported
+
+
+def _marks(sweep: Sweep, model: Floats) -> list[Mark]:
+    """Return readings and fitted curve over the command, the rising and the falling ones apart."""
     marks = []
     for role, sign in (("rising", 1.0), ("falling", -1.0)):
-        on = branch == sign
+        on = sweep.branch == sign
         if on.any():
-            marks.append(readings_mark(f"command {role}", command[on], flow[on], role))
-            marks.append(curve_mark("fitted" if sign > 0 else "", command[on], model[on]))
-    ways = bool((command > 0.1).any() and (command < -0.1).any())
-    one_way = "only one direction was recorded: whether the other behaves the same is unknown"
-    return result_of(
-        PROCEDURE,
-        sources,
-        found,
-        reported,
-        f"{command.size} readings; dead band {values[band]:.3g}, {values[_GAIN] * 1e6:.4g} mm^2 per command; "
-        f"scatter {np.std(flow - model) / np.abs(flow).max():.2%} of the largest flow",
-        with_residuals("Valve map", Kind("Command"), Kind("Flow", "kg/s", "mass flow"), marks, command, flow - model),
-        "the opening is not the same in both directions, or not linear in the command",
-        () if ways else (one_way,),
-    )
+            marks.append(readings_mark(f"command {role}", sweep.command[on], sweep.flow[on], role))
+            marks.append(curve_mark("fitted" if sign > 0 else "", sweep.command[on], model[on]))
+    return marks
 
 
 def area_of_command(command: Floats, dead_band: float, gain: float, saturation: float) -> Floats:
@@ -123,16 +196,16 @@ def spool_of(command: Floats, width: float) -> Floats:
     """Return the command [-] that a spool with play of a whole ``width`` [-] follows; it begins at the first one."""
     if width <= 0.0:
         return command
-    position, drawn = float(command[0]), []
-    for one in command.tolist():
-        position = spool_position(position, one, width)
-        drawn.append(position)
-    return np.array(drawn)
+    position, positions = float(command[0]), []
+    for requested in command.tolist():
+        position = spool_position(position, requested, width)
+        positions.append(position)
+    return np.array(positions)
 
 
-def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
-    """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it."""
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=CHANNELS[:2], absolute=CHANNELS[2:])
+def _check_recordings(sources: tuple[Source, ...]) -> None:
+    """Refuse recordings that lack a channel or samples, or whose command is no command of a valve."""
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     for source in sources:
         command = source.recording["command"]
         wrong = np.flatnonzero(np.abs(command) > 1.0 + 1e-9)
@@ -141,20 +214,26 @@ def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
                 f"{source.name}: {PROCEDURE}: channel 'command' is {command[wrong[0]]:g} at sample {wrong[0] + 1}; "
                 f"it goes from -1 to 1: scale it in a column map"
             )
-    command, flow, upstream, downstream = (pool(sources, name) for name in CHANNELS)
-    if np.ptp(command) < _MINIMUM_RANGE:
+
+
+def _areas(sources: tuple[Source, ...], sweep: Sweep, gas: GasAt) -> Floats:
+    """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it.
+
+    It is the flow over what the pressures would let pass, so that a supply that sags is no valve that saturates.
+    """
+    span = float(np.ptp(sweep.command))
+    if span < _MINIMUM_RANGE:
         raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {np.ptp(command):.3g}; "
+            f"{sources[0].name}: {PROCEDURE}: the command covers a range of only {span:.3g}; "
             f"{_MINIMUM_RANGE:g} or more is needed to identify dead band and gain"
         )
-    drivers = command, np.concatenate([_branch(source) for source in sources])
-    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(flow.size, dtype=bool))
-    shape = np.abs(orifice_shape(upstream, downstream, gas.heat_capacity_ratio))
+    drivers = sweep.command, sweep.branch
+    check_no_wrong_reading(sources, PROCEDURE, "mass_flow", drivers, np.ones(sweep.flow.size, dtype=bool))
+    shape = np.abs(orifice_shape(sweep.upstream, sweep.downstream, gas.heat_capacity_ratio))
     if not shape.any():
         raise IdentificationError(f"{sources[0].name}: {PROCEDURE}: both pressures are equal throughout")
-    # Over what the pressures would let pass, so that a supply that sags is no valve that saturates.
-    areas = np.where(shape > 0.0, flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
-    if float(command @ areas) <= 0.0:
+    areas = np.where(shape > 0.0, sweep.flow / (gas.choked_flow_constant * np.maximum(shape, 1e-3)), 0.0)
+    if float(sweep.command @ areas) <= 0.0:
         raise IdentificationError(
             f"{sources[0].name}: {PROCEDURE}: flow into chamber 1 falls with the command; "
             f"reverse the sign of one of them"
@@ -163,7 +242,10 @@ def _areas(sources: tuple[Source, ...], gas: GasAt) -> Floats:
 
 
 def _branch(source: Source) -> Floats:
-    """Return the direction of the command: what the recording says, else from the command's own last change."""
+    """Return the direction of the command (readings,), 1, -1 or 0 before it first changes.
+
+    It is what the recording says, else that of the command's own last change.
+    """
     if "direction" in source.recording:
         return source.recording["direction"]
     signs = np.sign(np.diff(source.recording["command"], prepend=source.recording["command"][0]))

@@ -17,21 +17,19 @@ from ppafo.signals import Recording
 from ppafo.simulation import numbers
 from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
 from ppafo.simulation.numbers import other_form
-from ppafo.simulation.recorded import (
+from ppafo.simulation.recorded.channels import (
     ANGLE,
     COMMAND,
     DORSIFLEXION_SUPPLY,
     EXTERNAL_TORQUE,
     SUPPLY,
-    between_stops,
     check_absolute,
     check_command,
     check_gaps,
-    replay_control,
-    supply_paths,
-    value_at_rest,
-    with_highest_supply,
 )
+from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
+from ppafo.simulation.recorded.replay import replay_control
+from ppafo.simulation.recorded.rest import value_at_rest
 from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")

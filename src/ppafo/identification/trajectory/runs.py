@@ -37,14 +37,8 @@ from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import MINIMUM_SAMPLES, is_at_limit, noise_of, plateaus, resolution_of, rounding_of
 from ppafo.simulation.plan import plan_run, plan_runs
-from ppafo.simulation.recorded import (
-    ANGLE,
-    DORSIFLEXION_SUPPLY,
-    SUPPLY,
-    RecordedInputs,
-    step_inputs,
-    with_prescribed_angle,
-)
+from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, SUPPLY
+from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_prescribed_angle
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 Floats = NDArray[np.float64]

@@ -41,15 +41,10 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.progress import Report
 from ppafo.signals import Recording
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.recorded import (
-    ANGLE,
-    COMMAND,
-    LONGEST_STEP,
-    locked_vane,
-    replay_scenario,
-    start_of,
-    with_fixed_volume,
-)
+from ppafo.simulation.recorded.channels import ANGLE, COMMAND
+from ppafo.simulation.recorded.clock import LONGEST_STEP
+from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
+from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.scenario import Scenario
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
@@ -64,7 +59,7 @@ class PriorSection(StrictTable):
 
 
 class ParameterSection(StrictTable):
-    """A number to be fitted."""
+    """Entry of a problem file for a number that is to be fitted."""
 
     path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
     start: Text | None = Field(
@@ -111,7 +106,7 @@ class ExperimentSection(StrictTable):
 
 
 class CandidateSection(StrictTable):
-    """An experiment that could be done next."""
+    """Entry of a problem file for an experiment that could be done next."""
 
     label: _Label
     scenario: Text = Field(description="name of a scenario, or a file relative to this one")
@@ -121,7 +116,7 @@ class CandidateSection(StrictTable):
 
 
 class TrajectorySection(StrictTable):
-    """A trajectory fit, as it is written."""
+    """Section of a problem file for a fit of trajectories."""
 
     parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
     experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")

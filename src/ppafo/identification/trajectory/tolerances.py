@@ -20,7 +20,7 @@ from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
-from ppafo.simulation.recorded import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.scenario import FreeMotion, Scenario
 
 _WIDEST = 12.0

@@ -67,7 +67,7 @@ class Bases(NamedTuple):
 
 
 class Level(NamedTuple):
-    """A volume [m^3] and its slope [m^3/rad]."""
+    """Volume of a chamber [m^3] and its slope over the angle [m^3/rad] at one pressure."""
 
     volume: float
     slope: float
@@ -106,7 +106,7 @@ def bases_at(table: Table, angle: float) -> Bases:
 
 
 def along(curve: Curve, basis: Curve) -> float:
-    """A curve, or its slope, by its basis."""
+    """Value of a curve, or of its slope, at an angle where the basis of the spline is known."""
     a, b, c, d = curve.powers, basis.powers, curve.bends, basis.bends
     smooth = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
     low = (c[0] * d[0] + c[1] * d[1]) + (c[2] * d[2] + c[3] * d[3])
@@ -114,7 +114,7 @@ def along(curve: Curve, basis: Curve) -> float:
 
 
 def level_of(curve: Curve, bases: Bases) -> Level:
-    """Value and slope of a curve."""
+    """Value and slope of a curve over the angle."""
     return Level(along(curve, bases.value), along(curve, bases.slope))
 
 
@@ -144,7 +144,7 @@ def filled_share(rise: Rise, gauge: float) -> float:
 
 
 def volume_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
-    """Volume [m^3] at a gauge pressure [Pa]."""
+    """Volume of a chamber [m^3] at a gauge pressure [Pa]."""
     rises, gains = chamber.rises, levels.gains
     low = gains[0].volume * share_of(rises[0], gauge) + gains[1].volume * share_of(rises[1], gauge)
     high = gains[2].volume * share_of(rises[2], gauge) + gains[3].volume * share_of(rises[3], gauge)
@@ -236,7 +236,7 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
 
 
 class TableSettings(NamedTuple):
-    """What the material does without pressure."""
+    """Settings of an actuator by table: what its material does without pressure."""
 
     passive_stiffness: Annotated[
         float, Number("N m/rad", "torque of the material per angle from rest", 0.0, 0.0, 1.0e4)

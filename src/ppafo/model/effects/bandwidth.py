@@ -25,7 +25,7 @@ class SensorState(NamedTuple):
 
 
 class Bandwidths(NamedTuple):
-    """Bandwidths of the sensors."""
+    """Settings of sensors that follow with a lag: a bandwidth [Hz] for each signal."""
 
     angle_bandwidth: Annotated[
         float, Number("Hz", "bandwidth of the angle sensor, 0 for an instant one", 0.0, 0.0, 1.0e6)
@@ -56,7 +56,7 @@ def as_they_show(
 
 
 def start(_bandwidth: SensorRates, now: Moment) -> SensorState:
-    """Sensors that show what is true."""
+    """State of sensors that show the true values when a run begins."""
     return SensorState(angle=now.angle, pressure_1=now.pressure_1, pressure_2=now.pressure_2)
 
 

@@ -93,7 +93,7 @@ def advance(
 
 
 def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: Moment) -> CoilRises:
-    """Rates of both rises [K/s]."""
+    """Rates [K/s] of the rises in temperature of both coils."""
     on_a, on_b = coil_commands(now.command)
     return CoilRises(
         rise_a=coil_heating.warming * (coil_heating.steady_rise * on_a - coil_heating_state.rise_a),

@@ -22,7 +22,7 @@ class IceState(NamedTuple):
 
 
 class IceSettings(NamedTuple):
-    """How ice grows and melts."""
+    """Settings of ice in the vents: how it grows and melts, and how far it may block them."""
 
     blockage_per_gas: Annotated[float, Number("1/kg", "blockage per gas that leaves, 0 for none", 0.0, 0.0, 1.0e6)]
     melting_time: Annotated[float, Number("s", "time constant with which it melts", 30.0, 1.0e-3, 1.0e6)]
@@ -47,7 +47,7 @@ def advance(ice: Ice, ice_state: IceState, _before: Moment, after: Moment, step:
 
 
 def slopes(ice: Ice, ice_state: IceState, now: Moment) -> IceState:
-    """Rate of the blockage [1/s]."""
+    """Rates [1/s] at which ice blocks the vents."""
     # The same balance as in ``advance``, for the solver in continuous time.
     return IceState(ice.blockage_per_gas * max(now.vented_flow, 0.0) - ice.melting * ice_state.blockage)
 

@@ -16,7 +16,7 @@ class LeakOpening(NamedTuple):
 
 
 class LeakSettings(NamedTuple):
-    """When the leak opens, and how slowly."""
+    """Settings of a leak past the vane that opens in use: when, and how slowly."""
 
     pressure: Annotated[
         float, Number("Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7)

@@ -20,7 +20,7 @@ def behind_silencer(conductance: float, silencer: Silencer) -> float:
 
 
 class SilencerSettings(NamedTuple):
-    """The silencer, as ISO 6358 describes it."""
+    """Settings of a silencer on the vents, which ISO 6358 describes by conductance and critical ratio."""
 
     sonic_conductance: Annotated[
         float, Number("m^3/(s Pa)", "sonic conductance C of the silencer, 0 for none", 0.0, 0.0, 1.0e-4)

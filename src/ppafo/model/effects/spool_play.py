@@ -21,7 +21,7 @@ class SpoolPlace(NamedTuple):
 
 
 class PlaySettings(NamedTuple):
-    """The play between command and spool."""
+    """Setting of the play [-] between command and spool."""
 
     width: Annotated[float, Number("", "whole width of the play over the full command, 0 for none", 0.0, 0.0, 0.5)]
 
@@ -59,7 +59,7 @@ def advance(
 
 
 def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: Moment) -> SpoolPlace:
-    """Rates [1/s]: none between two commands."""
+    """Rate [1/s] of the spool in its play: none, for it moves with the command alone."""
     return SpoolPlace(0.0)
 
 

@@ -272,7 +272,7 @@ def prepare_moving(settings: ProportionalSettings) -> MovingProportional:
 
 
 def dead_time(settings: ProportionalSettings) -> float:
-    """Dead time of the command [s]."""
+    """Time from a command to the first motion of the spool [s]."""
     return settings.delay
 
 

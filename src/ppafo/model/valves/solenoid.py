@@ -24,7 +24,7 @@ SwitchingInterval = Annotated[float, Number("s", "shortest time between two swit
 
 
 class IdealSolenoid(NamedTuple):
-    """An ideal pair has no parameters."""
+    """An ideal pair of solenoid valves has no parameters."""
 
 
 class PairPositions(NamedTuple):
@@ -55,7 +55,7 @@ class Coil(NamedTuple):
 
 
 class PairState(NamedTuple):
-    """Both coils."""
+    """State of a pair of valves: one coil for each chamber."""
 
     coil_a: Coil = Coil()
     coil_b: Coil = Coil()

@@ -179,7 +179,7 @@ MODEL = ValveModel(
 
 
 def choose(_settings: RecyclingSettings) -> ValveModel:
-    """The one model there is."""
+    """Return the model of this valve, of which there is one."""
     return MODEL
 
 

@@ -47,7 +47,7 @@ def advance_ideal(
 
 
 def connect_ideal(plant: PlantParameters, shown: VentedOpening) -> tuple[SinglePort, SinglePort]:
-    """Ports of both chambers. Equation (8)."""
+    """Ports of both chambers, by equation (8), with the vent valve open or shut."""
     port_1, port_2 = single_ports(plant, shown.opening)
     vents = shown.vents > 0.5
     full, room = plant.valve_conductance, plant.atmospheric_pressure
@@ -91,7 +91,7 @@ def instant_moving(valve: MovingProportional, state: SpoolState, command: float)
 
 
 def rates_moving(valve: MovingProportional, state: SpoolState, command: float) -> SpoolState:
-    """Rates [1/s] of the spool."""
+    """Rates [1/s] of the spool; the vent valve has no state."""
     return proportional.rates_moving(valve, state, spool_command(command))
 
 

@@ -90,7 +90,7 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """Read access to a set for the checks."""
+    """A parameter set as the checks of an audit read it."""
 
     parameter_set: ParameterSet
     declared: Mapping[str, Quantity]

@@ -199,7 +199,7 @@ WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quant
 
 @functools.cache
 def bottle_file() -> type[BaseModel]:
-    """Return the layout of a file of a bottle."""
+    """Return the layout of the file of a bottle."""
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(pattern=NAME)),

@@ -1,5 +1,6 @@
 """The catalogue of parts: layout of its file, real parts with figures of data sheets, and how it is read."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import resources
@@ -133,6 +134,14 @@ class Part:
         orifice = {quantity.name: self.values[quantity.name] for quantity in ORIFICE if quantity.name in self.values}
         own = {name: self.values[name] for name in settings if name in self.values}
         return {f"valve.{name}": number for name, number in (orifice | settings | own).items()}
+
+
+def rated_pressure(*parts: Part) -> float:
+    """Return the highest pressure [Pa, absolute] that each of some parts is rated for; infinity where none states one.
+
+    A part whose maker states none sets no limit.
+    """
+    return min(part.values.get(RATING.name, math.inf) for part in parts)
 
 
 _TITLES = {

@@ -49,7 +49,7 @@ class ClaimEntry(StrictTable):
 
 
 class PublicationFile(StrictTable):
-    """The file of a publication."""
+    """Layout of the file of a publication."""
 
     schema_version: Literal[1] = Field(description="version of this layout")
     name: str = Field(pattern=NAME)

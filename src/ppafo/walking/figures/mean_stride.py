@@ -38,7 +38,7 @@ _CHANNELS = {
 
 
 class Strides(Protocol):
-    """What is drawn of a walk."""
+    """A walk as its figure of the mean stride needs it."""
 
     @property
     def scenario(self) -> Scenario:

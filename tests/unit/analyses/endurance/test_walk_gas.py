@@ -10,15 +10,10 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.endurance.answer import Endurance
-from ppafo.analyses.endurance.draw import (
-    WalkGas,
-    draw_of_walk,
-    largest_flow,
-    read_walk_gas,
-    walk_gas,
-)
+from ppafo.analyses.endurance.draw import largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.solve import endurance_of_walk
+from ppafo.analyses.endurance.walk_gas import WalkGas, draw_of_walk, read_walk_gas, walk_gas
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE

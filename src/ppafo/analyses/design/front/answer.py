@@ -14,7 +14,7 @@ from ppafo.analyses.design.front.problem import GAS, OBJECTIVES, DesignProblem
 from ppafo.analyses.design.front.search import PATIENCE
 from ppafo.analyses.design.looks import COLOURS, RING
 from ppafo.analyses.design.trials import STREAMS
-from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
+from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
 from ppafo.parameters.parts import Part
 from ppafo.report import finding
 from ppafo.report.display_units import quantity_of_unit

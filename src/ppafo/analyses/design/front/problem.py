@@ -196,14 +196,14 @@ class PartsTable(StrictTable):
 
 
 class ConstraintTable(StrictTable):
-    """What a design has to keep, in each task."""
+    """Entry of a design file: a limit that a design has to keep in each task."""
 
     least: Annotated[str | None, Field(description="smallest value allowed, with its unit")] = None
     most: Annotated[str | None, Field(description="largest value allowed, with its unit")] = None
 
 
 class DesignFile(StrictTable):
-    """A design file, as it is written."""
+    """Layout of a design file."""
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
@@ -232,7 +232,7 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Combination:
-    """A valve with an actuator."""
+    """A choice of parts that a design is made of: a valve and an actuator."""
 
     valve: Part
     actuator: Part

@@ -208,7 +208,7 @@ LARGEST_SEED = 2**32 - 1
 
 
 class SearchTable(StrictTable):
-    """How long to search."""
+    """Section of a design file: how long to search, and when to stop."""
 
     screening: Annotated[
         int, Field(ge=16, le=100_000, description="number of evenly spread designs in the first generation")

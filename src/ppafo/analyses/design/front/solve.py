@@ -29,11 +29,11 @@ from ppafo.analyses.design.front.search import (
     search_front,
 )
 from ppafo.analyses.design.trials import STREAMS, run_trials
-from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.errors import ScenarioError, StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.graph import ATMOSPHERE_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.overrides import over
+from ppafo.parameters.parts import rated_pressure
 from ppafo.progress import Report, report_nothing
 from ppafo.running import simulate
 from ppafo.signals.recording import Floats

@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.analyses.design.looks import COLOURS, RING
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import LIMITS, Limit
-from ppafo.analyses.parts.solve import doubts_data, part_titles, parts_to_check
+from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.parameters.parts import Part
 from ppafo.report import finding

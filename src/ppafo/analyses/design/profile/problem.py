@@ -157,7 +157,7 @@ _LARGEST_DENOMINATOR = 10**6
 
 
 class UseTable(StrictTable):
-    """How much is done with one bottle."""
+    """Section of a sizing file: how much is done with one bottle."""
 
     repetitions: Annotated[
         int | None, Field(gt=0, description="number of repetitions of the profile, such as steps")
@@ -169,13 +169,13 @@ class UseTable(StrictTable):
 
 
 class LimitsTable(StrictTable):
-    """What must be kept."""
+    """Section of a sizing file: how large the error may be."""
 
     rms_error: Annotated[Text, Field(description="largest RMS torque error: '0.5 N m', or '5 %' of the largest torque")]
 
 
 class SizingPartsTable(StrictTable):
-    """Names of parts in the catalogue."""
+    """Section of a sizing file: the parts to choose from, by their names in the catalogue."""
 
     valves: Annotated[_Names, Field(description="valves to choose from, of the kind that the scenario has")]
     bottles: Annotated[_Names, Field(description="bottles to choose from")]
@@ -191,7 +191,7 @@ class PressureTable(StrictTable):
 
 
 class SizingFile(StrictTable):
-    """A design file with a profile, as it is written."""
+    """Layout of a sizing file: a design that follows a torque profile."""
 
     schema_version: Annotated[Literal[1], Field(description="version of this layout")]
     name: Annotated[str, Field(pattern=NAME, max_length=100)]

@@ -14,12 +14,11 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.trials import STREAMS, run_trials
-from ppafo.analyses.parts.solve import rated_pressure
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import PROPORTIONAL_GAIN
 from ppafo.errors import StudyError
-from ppafo.parameters.parts import Part
+from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.torque_loop import IN_SCENARIO, loop_terms

@@ -14,13 +14,13 @@ from ppafo.analyses.design.wearer.wish import (
     WearerSizing,
     Wish,
 )
-from ppafo.analyses.parts.solve import part_titles, parts_to_check
+from ppafo.analyses.parts.sections import part_titles, parts_to_check
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.oscillation import gains_of
 from ppafo.walking.bottle import minutes_text
-from ppafo.walking.figures.over_time import bottle_figure, peak_torques
+from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import SCALED_MASS, who_walks
@@ -85,7 +85,7 @@ def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
     short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
     wanted, lasts = f"{wish.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
-    last = TORQUE.text(float(peak_torques(walked)[-1]))
+    last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
         ("lasts", f"{lasts}, of {wanted}"),

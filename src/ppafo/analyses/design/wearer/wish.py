@@ -7,13 +7,15 @@ from typing import Any
 
 from ppafo.analyses.design.wearer.electrical import Electrical
 from ppafo.analyses.endurance.answer import Endurance
-from ppafo.analyses.parts.solve import doubts_data
+from ppafo.analyses.parts.sections import doubts_data
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.report.kind import Kind
 from ppafo.version import __version__
+from ppafo.walking.motion import LONGEST_MINUTES
 from ppafo.walking.result import WalkResult
-from ppafo.walking.wearer import STATURES
+from ppafo.walking.wearer import STATURES, WEARER
 
 WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regulators"}
 """The walk, with its controller, of each kind of valve."""
@@ -21,6 +23,10 @@ BODY_MASS_INDEX = 22.0
 """Body mass over the square of the stature [kg/m^2] of a wearer of whom the mass alone is known."""
 TOES = 0.01
 """Clearance of the toes [m] that is wanted where none is given, unless the healthy gait itself has less."""
+SHORTEST = 6.0
+"""Time [s] that a walk on a bottle takes at least."""
+_HIGHEST_TOES = 0.2
+"""Clearance [m] above which a wish is a slip of the pen."""
 TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass"), Kind("", "m", "length", ".1f")
 
 
@@ -62,6 +68,38 @@ class Wish:
         pressure = Kind("", "Pa_a", "pressure").text(self.pressure)
         toes = f"toes {CLEARANCE.text(self.clearance)} over the ground"
         return f"{TORQUE.text(self.torque)} at {pressure} for {self.seconds / 60.0:.4g} min, {toes}"
+
+
+def check_wish(wish: Wish) -> None:
+    """Raise StudyError for a wish that no device can be sized for, with the argument and what is allowed."""
+    low, high = STATURES
+    mass = next(quantity for quantity in WEARER if quantity.name == "body_mass")
+    if not mass.minimum <= wish.mass <= mass.maximum:
+        raise StudyError(
+            f"--mass: {wish.mass:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg"
+        )
+    if not wish.pressure > STANDARD_ATMOSPHERE:
+        raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
+    if not 0.0 < wish.torque < 100.0:
+        raise StudyError(f"--torque: {wish.torque:g} N m: must be above 0 and below 100 N m")
+    if not SHORTEST <= wish.seconds <= 60.0 * LONGEST_MINUTES:
+        raise StudyError(
+            f"--minutes: {wish.seconds / 60.0:g} min: a walk on a bottle is followed for 0.1 to {LONGEST_MINUTES:g} min"
+        )
+    if wish.toes is not None and not 0.0 <= wish.toes <= _HIGHEST_TOES:
+        raise StudyError(
+            f"--toes: {1000.0 * wish.toes:g} mm: must be at least 0 mm and at most {1000.0 * _HIGHEST_TOES:g} mm"
+        )
+    if wish.stature is not None and not low <= wish.stature <= high:
+        raise StudyError(
+            f"--stature: {wish.stature:g} m: segments are known of adults of {low:g} to {high:g} m; take a gait and "
+            "a wearer of your own in a walk file"
+        )
+
+
+def shown_clearance(toes: float) -> float:
+    """Return a clearance [m] rounded down to the tenth of a millimetre that is shown, which a few strides then have."""
+    return math.floor(1.0e4 * toes) / 1.0e4
 
 
 @dataclass(frozen=True, slots=True, eq=False)

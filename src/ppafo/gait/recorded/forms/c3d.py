@@ -51,7 +51,7 @@ def read_c3d(path: str | Path) -> MotionTable:
     if read_bytes(path)[1:2] != _MARK:
         raise DataError(f"{path}: is not a C3D file")
     # A damaged file ends ezc3d with a crash: another process tries it first.
-    check_can_be_read(Path(path), __name__, "open_c3d", "ezc3d")
+    check_can_be_read(Path(path), open_c3d, "ezc3d")
     content = open_c3d(path)
     parameters: Any = content["parameters"]
     rates = np.atleast_1d(parameters["POINT"]["RATE"]["value"])

@@ -12,10 +12,11 @@ from ppafo.errors import DataError, one_line, refused_as
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map
 from ppafo.gait.recorded.table import MotionTable
+from ppafo.storage.column_map import ColumnMap, MappedChannel
 from ppafo.storage.comma_separated import kind_of_comments, read_csv
 from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
 from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import ColumnMap, MappedChannel, read_foreign
+from ppafo.storage.foreign import read_foreign
 
 _DELIMITERS: dict[str, Literal["comma", "semicolon", "tab"]] = {",": "comma", ";": "semicolon", "\t": "tab"}
 

@@ -13,7 +13,7 @@ from ppafo.gait.recorded.mapping import AngleMap, Axis, ForceMap, GaitMap, KneeM
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
-from ppafo.storage.opensim import read_trc
+from ppafo.storage.trc import read_trc
 
 PLATE = "force plate "
 """Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: the plate's force in the axes of the laboratory."""

@@ -11,9 +11,13 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.design.wearer import solve as wearer
+from ppafo.analyses.design.wearer import shelf as shelves
 from ppafo.analyses.design.wearer.answer import finding_of
+from ppafo.analyses.design.wearer.bottle import lightest_on_bottle
 from ppafo.analyses.design.wearer.electrical import electrical_of, valve_power
+from ppafo.analyses.design.wearer.offers import offers_instead
+from ppafo.analyses.design.wearer.shelf import shelf_of
+from ppafo.analyses.design.wearer.strides import few_strides
 from ppafo.analyses.design.wearer.wish import Device, WearerSizing, Wish
 from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, StudyError
@@ -48,7 +52,7 @@ def few() -> Catalogue:
 
 @pytest.fixture
 def little(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(wearer, "load_catalogue", lambda _catalogue="parts": few())
+    monkeypatch.setattr(shelves, "load_catalogue", lambda _catalogue="parts": few())
 
 
 def sized(torque: float, minutes: float, pressure: float = 50.0, toes: float | None = None) -> WearerSizing:
@@ -129,22 +133,20 @@ def test_where_nothing_does_it_what_is_offered_is_granted_when_it_is_asked_for()
 
 
 def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_granted() -> None:
-    shelf = wearer.shelf_of("parts")
-    valve, actuator, bottle = (
-        shelf.groups["valves"]["enfield-ls-v05s"],
-        shelf.groups["actuators"]["smc-crb2bw40-90d"],
-        shelf.groups["bottles"]["co2-3_5oz"],
-    )
+    whole = shelf_of("parts")
+    valve, actuator = whole.groups["valves"]["enfield-ls-v05s"], whole.groups["actuators"]["smc-crb2bw40-90d"]
+    bottles = {"co2-3_5oz": whole.groups["bottles"]["co2-3_5oz"]}
+    shelf = replace(whole, groups={**whole.groups, "bottles": bottles})
     wish = Wish(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 144.0, 0.001)
-    tried = wearer._few_strides(wish, valve, actuator)
+    tried = few_strides(wish, valve, actuator)
     assert tried[0].has(wish)
-    assert wearer._lightest(wish, tried, [bottle], shelf, report_nothing) is None
-    (offer, *_) = wearer._instead(wish, tried, [bottle], shelf, report_nothing)
+    assert lightest_on_bottle(wish, tried, shelf, report_nothing) is None
+    (offer, *_) = offers_instead(wish, tried, shelf, report_nothing)
     words = re.fullmatch(r"less pressure" + OFFER, offer.text(wish))
     assert words is not None, offer.text(wish)
     asked = replace(wish, pressure=101325.0 + float(words[2]) * PSI)
-    strides = wearer._few_strides(asked, valve, actuator)
-    assert wearer._lightest(asked, strides, [bottle], shelf, report_nothing) is not None
+    strides = few_strides(asked, valve, actuator)
+    assert lightest_on_bottle(asked, strides, shelf, report_nothing) is not None
 
 
 def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assumed_is_said() -> None:
@@ -154,7 +156,7 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
         catalogue.part("actuators", "smc-crb2bw40-90d"),
     )
     wish = Wish(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
-    found = wearer._few_strides(wish, valve, actuator)
+    found = few_strides(wish, valve, actuator)
     assert found[0].torque >= 5.0
     assert wish.height == pytest.approx(math.sqrt(60.0 / 22.0))
     said = text_of(finding_of(WearerSizing(wish, 0.0052, tuple(found), None, ())))

@@ -1,0 +1,81 @@
+"""Walks of pairs of parts on a bottle, and the lightest pair and bottle that last."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from ppafo.analyses.design.wearer.shelf import Shelf
+from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
+from ppafo.errors import ScenarioError
+from ppafo.parameters.parts import Part
+from ppafo.progress import Progress, Report
+from ppafo.walking.bottle import WALKED
+from ppafo.walking.loading import load_walk
+from ppafo.walking.result import WalkResult
+from ppafo.walking.walk import walk
+
+_KEPT = 0.9
+"""Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
+_ALLOWANCE = 1.15
+"""Gas that a pair may need over what another got out of a bottle, to be tried on it as well."""
+
+
+class OnBottle(NamedTuple):
+    """A pair of parts with a bottle, and its walk on it."""
+
+    pair: Tried
+    bottle: Part
+    walked: WalkResult
+
+
+def lightest_on_bottle(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Report) -> OnBottle | None:
+    """Return the lightest pair and bottle whose walk does what is wanted, with that walk; None if none does.
+
+    No pair whose gas might do is left out, so that what is offered is found when it is asked for.
+    """
+    # Heaviest first: of pairs with the same overrides the lightest replaces the others.
+    able = {pair.overrides: pair for pair in sorted(tried, key=lambda pair: -pair.mass) if pair.has(wish)}
+    choices = [(pair, bottle) for pair in able.values() for bottle in shelf.bottles]
+    too_thirsty: dict[str, float] = {}
+    for pair, bottle in sorted(choices, key=lambda choice: choice[0].mass + choice[1].full_mass):
+        largest_flow = min(bottle.values["content"] / wish.seconds, too_thirsty.get(bottle.name, math.inf))
+        if pair.flow > largest_flow:
+            continue
+        report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
+        walked = walk_on_bottle(pair, shelf.bottle_name(bottle), wish.seconds)
+        if walked is None or walking_time(walked) < wish.seconds:
+            too_thirsty[bottle.name] = lasting_flow(pair, walking_time(walked), wish.seconds)
+        elif keeps(walked, wish):
+            return OnBottle(pair, bottle, walked)
+    return None
+
+
+def walk_on_bottle(pair: Tried, bottle: str, seconds: float) -> WalkResult | None:
+    """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
+    try:
+        return walk(load_walk(WALKS[pair.valve.kind], pair.overrides, bottle=bottle), minutes=seconds / 60.0)
+    except ScenarioError:
+        return None
+
+
+def walking_time(walked: WalkResult | None) -> float:
+    """Return how long a walk on a bottle lasts [s], infinite where its bottle did not end it; 0 for none."""
+    if walked is None or walked.supply is None or not walked.status.is_completed:
+        return 0.0
+    return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
+
+
+def lasting_flow(pair: Tried, lasted: float, seconds: float) -> float:
+    """Return the flow [kg/s] above which no pair lasts on a bottle, with some allowance.
+
+    It follows from one that ``lasted`` less than ``seconds`` [s] there.
+    """
+    return pair.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
+
+
+def keeps(walked: WalkResult, wish: Wish) -> bool:
+    """Return whether the mean stride of a walk on a bottle has most of the torque, and the clearance."""
+    if not walked.averages or walked.oscillation:
+        return False
+    torque = walked.averages["torque"].mean.max()
+    return bool(torque >= _KEPT * wish.torque and walked.metrics["lowest_toes"].value >= wish.clearance)

@@ -1,0 +1,146 @@
+"""What would have to be given up where no device does what is wanted: each offer walked on the largest bottle."""
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+from ppafo.analyses.design.wearer.bottle import keeps, lasting_flow, walk_on_bottle, walking_time
+from ppafo.analyses.design.wearer.shelf import Shelf
+from ppafo.analyses.design.wearer.strides import few_strides
+from ppafo.analyses.design.wearer.wish import SHORTEST, Offer, Tried, Wish, shown_clearance
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.parameters.parts import Part
+from ppafo.parameters.parts.catalogue import rated_pressure
+from ppafo.progress import Progress, Report
+
+_MORE_PRESSURE = (1.1, 1.25, 1.5, 1.8, 2.2)
+"""Times the gauge pressure that are tried where no torque suffices."""
+_LESS_PRESSURE = tuple(0.95 - 0.05 * step for step in range(12))
+"""Times the gauge pressure that are tried where no bottle lasts."""
+_MOST_PAIRS = 5
+"""Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
+_MOST_WALKED = 4
+"""Pairs and pressures, from the least gas, that are walked on a bottle for an offer."""
+_USABLE = 0.8
+"""Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
+_SHOWN_TIME = 0.6
+"""A hundredth of a minute [s], to which a command line is told a time."""
+_SHOWN_TORQUE = 100.0
+"""Parts of a newton metre to which a command line is told a torque."""
+
+
+class _Candidate(NamedTuple):
+    """A pair of parts as it walked a few strides, and the wish with the pressure of that walk."""
+
+    wish: Wish
+    pair: Tried
+
+
+def offers_instead(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Report) -> Iterator[Offer]:
+    """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
+    bottle = max(shelf.bottles, key=lambda bottle: bottle.values["content"])
+    candidates = [_Candidate(wish, pair) for pair in tried]
+    candidates += _at_less_pressure(wish, tried, report)
+    able = sorted((at for at in candidates if at.pair.has(wish)), key=lambda at: at.pair.flow)
+    # A device whose toes drag is no offer.
+    weak = sorted(
+        (at for at in candidates if at.pair.toes >= wish.clearance and at.pair.torque < wish.torque),
+        key=lambda at: -at.pair.torque,
+    )
+    low = sorted(
+        (at for at in candidates if at.pair.torque >= wish.torque and 0.0 <= at.pair.toes < wish.clearance),
+        key=lambda at: -at.pair.toes,
+    )
+    report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
+    nearest = [] if able else [_offered(lesser[0], bottle, shelf) for lesser in (weak, low) if lesser]
+    offers = [offer for offer in (_thriftiest(able, bottle, shelf), *nearest) if offer is not None]
+    yield from offers
+    if not able:
+        stronger = (_offered(candidate, bottle, shelf) for candidate in _at_more_pressure(wish, tried))
+        first = next((offer for offer in stronger if offer is not None), None)
+        yield from [] if first is None else [first]
+    # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
+    if all(offer.wish.seconds < wish.seconds for offer in offers):
+        lasting = _lasting(wish, weak, bottle, shelf)
+        yield from [] if lasting is None else [lasting]
+
+
+def _at_less_pressure(wish: Wish, tried: Sequence[Tried], report: Report) -> list[_Candidate]:
+    """Return the pairs that have the most torque for their gas, at pressures below the wanted one."""
+    thrifty = sorted((pair for pair in tried if pair.flow > 0.0), key=lambda pair: -pair.torque / pair.flow)
+    # Actuators of the same numbers walk alike: one of them is enough.
+    unlike = {(pair.valve.name, pair.torque, pair.flow): pair for pair in thrifty}
+    candidates = []
+    for number, factor in enumerate(_LESS_PRESSURE):
+        report(Progress("walking at less pressure", number, len(_LESS_PRESSURE), noun="pressures"))
+        lower = wish.at_gauge(factor)
+        if STANDARD_ATMOSPHERE < lower.pressure < wish.pressure:
+            for pair in list(unlike.values())[:_MOST_PAIRS]:
+                candidates += [_Candidate(lower, again) for again in few_strides(lower, pair.valve, pair.actuator)]
+    return candidates
+
+
+def _at_more_pressure(wish: Wish, tried: Sequence[Tried]) -> Iterator[_Candidate]:
+    """Yield what does it at more pressure, the lowest first: of each kind of valve the strongest and the highest."""
+    best: list[Tried] = []
+    for kind in dict.fromkeys(pair.valve.kind for pair in tried):
+        of_kind = [pair for pair in tried if pair.valve.kind == kind]
+        strongest, highest = max(of_kind, key=lambda pair: pair.torque), max(of_kind, key=lambda pair: pair.toes)
+        best += {(pair.valve.name, pair.actuator.name): pair for pair in (strongest, highest)}.values()
+    for factor in _MORE_PRESSURE:
+        higher = wish.at_gauge(factor)
+        for pair in best:
+            if rated_pressure(pair.valve, pair.actuator) >= higher.pressure:
+                again = few_strides(higher, pair.valve, pair.actuator)
+                yield from (_Candidate(higher, strides) for strides in again if strides.has(wish))
+
+
+def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: Shelf) -> Offer | None:
+    """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
+    first: Offer | None = None
+    for candidate in able[:_MOST_WALKED]:
+        offer = _offered(candidate, bottle, shelf)
+        if offer is not None and offer.wish.clearance >= candidate.wish.clearance:
+            return offer
+        first = offer if first is None else first
+    return first
+
+
+def _lasting(wish: Wish, weak: Sequence[_Candidate], bottle: Part, shelf: Shelf) -> Offer | None:
+    """Return what walks on a bottle for all of the time, of pairs with the most torque first; None if none does."""
+    largest_flow = _USABLE * bottle.values["content"] / wish.seconds
+    for candidate in weak:
+        if candidate.pair.flow > largest_flow:
+            continue
+        offer = _offered(candidate, bottle, shelf)
+        if offer is not None and offer.wish.seconds == wish.seconds:
+            return offer
+        lasted = 0.0 if offer is None else offer.wish.seconds
+        largest_flow = lasting_flow(candidate.pair, lasted, wish.seconds)
+    return None
+
+
+def _offered(candidate: _Candidate, bottle: Part, shelf: Shelf) -> Offer | None:
+    """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
+    lesser, pair = candidate
+    if pair.torque < lesser.torque:
+        lesser = replace(lesser, torque=math.floor(_SHOWN_TORQUE * pair.torque) / _SHOWN_TORQUE)
+    if pair.toes < lesser.clearance:
+        lesser = replace(lesser, toes=shown_clearance(pair.toes))
+    again = next((strides for strides in few_strides(lesser, pair.valve, pair.actuator) if strides.has(lesser)), None)
+    walked = None if again is None else walk_on_bottle(again, shelf.bottle_name(bottle), lesser.seconds)
+    if again is None or walked is None or not walked.averages:
+        return None
+    toes = walked.metrics["lowest_toes"].value
+    if toes < lesser.clearance:
+        # The toes come down a little as the pressure falls: what is offered is what they then have.
+        lesser = replace(lesser, toes=shown_clearance(toes))
+        if [strides.overrides for strides in few_strides(lesser, pair.valve, pair.actuator)] != [again.overrides]:
+            return None
+    lasted = walking_time(walked)
+    # Rounded down to what a command line can say, so that a run from that line still meets the offer.
+    shown_time = _SHOWN_TIME * math.floor(min(lasted, lesser.seconds) / _SHOWN_TIME)
+    seconds = lesser.seconds if lasted >= lesser.seconds else shown_time
+    helps = lesser.torque > 0.0 and lesser.clearance >= 0.0 and keeps(walked, lesser)
+    return Offer(replace(lesser, seconds=seconds), again, bottle) if helps and seconds >= SHORTEST else None

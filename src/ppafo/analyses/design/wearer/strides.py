@@ -1,0 +1,118 @@
+"""A few strides with a valve and an actuator at a constant supply: which torque, clearance and gas they have.
+
+A torque controller is told the lowest request that gives the torque, and lifts the foot earlier and harder where the
+toes would not clear the ground.
+"""
+
+from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
+from ppafo.model.catalog import VALVES
+from ppafo.model.shut_off import SHUT_OFF
+from ppafo.parameters.declaration import ACTUATOR, ORIFICE
+from ppafo.parameters.parts import Part
+from ppafo.walking.loading import load_walk
+from ppafo.walking.motion import walk_of
+from ppafo.walking.walk import walk
+
+_REQUESTS = (1.0, 1.3, 1.7)
+"""Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
+_ABOVE = 1.1
+"""Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
+_LIMIT = next(quantity.default or 0.0 for quantity in ASSISTANCE_QUANTITIES if quantity.name == "largest_torque")
+"""Torque [N m] above which a controller of walking requests no more, unless it is told."""
+_MINUTES = 0.15
+"""Minutes of the walks that are compared at a constant supply: a few strides after those that settle."""
+_DORSIFLEXION = 0.9
+"""Gauge pressure of dorsiflexion over plantarflexion's, of the walks with regulators: 45 of 50 psi."""
+_EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.1", "controller.swing_fall_time=0.2")
+"""A lift that begins at toe-off, when the toes come down late with the walk's own; with all the torque there is."""
+_OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
+"""Numbers of an actuator in the catalogue that a walk is told."""
+_PROPORTIONAL = "proportional"
+"""The kind of valve whose controller follows a torque; that of a pair of solenoid valves only has a limit."""
+SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
+"""Numbers of the shut-off valve of every device [SI]: the usual ones, and an area that does not throttle the supply."""
+
+
+def of_wearer(wish: Wish) -> tuple[str, ...]:
+    """Return the overrides of a walk that make its wearer the one of a wish."""
+    return f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={wish.height:.6g} m"
+
+
+def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
+    """Return a few strides with a pair of parts that have the torque and the clearance, else those that come nearest.
+
+    Nearest are the most torque, and the highest toes with enough of it: one or two, none where no walk has help.
+    """
+    common = _common_overrides(wish, valve, actuator)
+    strides: list[Tried] = []
+    for request in _requests(wish, valve, actuator):
+        for lift in _lifts(request, wish, valve, actuator):
+            tried = _strides_of(valve, actuator, (*common, *_request_overrides(request, valve), *lift))
+            if tried is None:
+                break
+            if tried.has(wish):
+                return [tried]
+            strides.append(tried)
+            # Another lift gives no more torque.
+            if tried.torque < wish.torque:
+                break
+    if not strides:
+        return []
+    strongest = max(strides, key=lambda tried: tried.torque)
+    highest = max(strides, key=lambda tried: (min(tried.torque, wish.torque), tried.toes))
+    return [strongest] if highest is strongest else [strongest, highest]
+
+
+def _common_overrides(wish: Wish, valve: Part, actuator: Part) -> tuple[str, ...]:
+    """Return the overrides of all walks with a pair: wearer, supply, numbers of the parts, shut-off valve."""
+    dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (wish.pressure - STANDARD_ATMOSPHERE)
+    units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
+    numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
+    return (
+        *of_wearer(wish),
+        f"supply.pressure={wish.pressure:.7g} Pa_a",
+        f"supply.dorsiflexion_pressure={dorsiflexion:.7g} Pa_a",
+        *(f"{path}={number:.6g} {units[path.partition('.')[2]]}".strip() for path, number in numbers.items()),
+        f"shut_off.area={SHUT_OFF_PARTS['area']:g} m^2",
+    )
+
+
+def _requests(wish: Wish, valve: Part, actuator: Part) -> list[float]:
+    """Return the torques [N m] that are requested one after the other, from the lowest."""
+    if valve.kind != _PROPORTIONAL:
+        return [_ABOVE * wish.torque]
+    # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
+    held = actuator.values["torque_constant"] * (wish.pressure - STANDARD_ATMOSPHERE)
+    return list(dict.fromkeys(min(factor * wish.torque, held) for factor in _REQUESTS))
+
+
+def _request_overrides(request: float, valve: Part) -> tuple[str, ...]:
+    """Return the overrides of a request [N m], and of the limit that has to follow it."""
+    peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
+    limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
+    return (*peak, *limit)
+
+
+def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
+    """Return overrides of the lift in the swing: the walk's own, then one that begins at toe-off, with all torque.
+
+    A pair of solenoid valves has its own alone.
+    """
+    if valve.kind != _PROPORTIONAL:
+        return [()]
+    held = actuator.values["torque_constant"] * _DORSIFLEXION * (wish.pressure - STANDARD_ATMOSPHERE)
+    # The limit as the controller is told it, with four digits.
+    torque = min(held, max(float(f"{request:.4g}"), _LIMIT))
+    return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
+
+
+def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
+    """Return a few strides with some overrides; None where they lack help, or the torque loop oscillates."""
+    result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
+    if not result.status.is_completed or not result.is_helped or not result.averages or result.oscillation:
+        return None
+    flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
+    torque = float(result.averages["torque"].mean.max())
+    return Tried(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)

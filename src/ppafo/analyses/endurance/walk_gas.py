@@ -1,0 +1,145 @@
+"""The gas that a walk takes: of a walk at hand, or read from the folder that one was written into."""
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ppafo.analyses.endurance.draw import Draw, draw_of_numbers, largest_flow
+from ppafo.errors import DataError, PpafoError, nearest_name, refused_as
+from ppafo.signals import Recording
+from ppafo.simulation.loading import ScenarioRequest, scenario_of
+from ppafo.simulation.scenario import Scenario
+from ppafo.storage.result_folder import read_json, read_recording
+from ppafo.walking import WalkResult
+from ppafo.walking.loading import WALKING
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WALK_FORMAT
+
+WALK_FILE = "walk.json"
+"""The file of a folder that a walk was written into, which says what was walked."""
+_LEAST_GAS = -1.0e-12
+"""Gas [kg] above which a walk that takes none may come out below 0: rounding of its totals."""
+
+
+@dataclass(frozen=True, slots=True)
+class WalkGas:
+    """A walk as far as its gas goes: name, recording, gas [kg] and time [s] of a stride.
+
+    ``gas_per_stride`` is the mean of the strides with help at the set pressure, 0 where the walk took none. A walk on a
+    ``task_sequence``, "" without one, is repeated as a whole: gas and time are then the whole's. ``scenario`` is what
+    was walked.
+    """
+
+    name: str
+    recording: Recording
+    gas_per_stride: float
+    stride_time: float
+    task_sequence: str = ""
+    scenario: Scenario | None = None
+
+
+def walk_gas(result: WalkResult) -> WalkGas:
+    """Return the gas that a walk takes in a stride, or in its task sequence, with the recording of it."""
+    configuration, sequence = result.scenario, walk_of(result.scenario).task_sequence
+    gas = result.metrics.get("gas" if sequence is None else "task_sequence_gas")
+    time = None if sequence is None else result.metrics.get("task_sequence_time")
+    return WalkGas(
+        configuration.name,
+        result.recording,
+        0.0 if gas is None else gas.value,
+        walk_of(configuration).gait.stride_time if time is None else time.value,
+        task_sequence="" if sequence is None else sequence.name,
+        scenario=configuration,
+    )
+
+
+def draw_of_walk(walk: WalkGas) -> Draw:
+    """Return the gas use of a walk that continues: a stride is one of the leg with the device."""
+    if walk.gas_per_stride <= 0.0:
+        raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
+    # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
+    peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
+    draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
+    along = f" in task sequence '{walk.task_sequence}'" if walk.task_sequence else ""
+    return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")
+
+
+def read_walk_gas(folder: Path) -> WalkGas:
+    """Return the gas of a walk from the folder that ``ppafo walk`` wrote; DataError where it says too little."""
+    file = _read_walk_file(folder / WALK_FILE)
+    configuration = file.table("configuration")
+    sequence = None if configuration.get("task_sequence") is None else file.table("configuration.task_sequence")
+    metric = "gas" if sequence is None else "task_sequence_gas"
+    time = "configuration.gait.stride_time" if sequence is None else "metrics.task_sequence_time.value"
+    # A walk without help has no gas among its metrics.
+    has_gas = metric in file.table("metrics")
+    gas = file.number(f"metrics.{metric}.value", above=_LEAST_GAS) if has_gas else 0.0
+    stride_time = file.number(time, above=0.0)
+    recording = read_recording(folder)
+    if "supplied_mass" not in recording:
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; write the walk again")
+    return WalkGas(
+        str(configuration.get("name", folder.name)),
+        recording,
+        gas,
+        stride_time,
+        task_sequence="" if sequence is None else str(sequence.get("name", "task sequence")),
+        scenario=_walked(configuration, file.path),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _WalkFile:
+    """What stands in the file of a walk, as plain data by dotted names."""
+
+    path: Path
+    content: Mapping[str, Any]
+
+    def table(self, name: str) -> Mapping[str, Any]:
+        """Return a table, {} where there is none; DataError where there is something else."""
+        node = self.content
+        for part in name.split("."):
+            node = node.get(part, {})
+            if not isinstance(node, Mapping):
+                raise DataError(f"{self.path}: '{part}' is not a table of names and values; write the walk again")
+        return node
+
+    def number(self, name: str, above: float) -> float:
+        """Return a number [SI]; DataError where there is none, or where it is not above what a walk may have."""
+        node: Any = self.content
+        for part in name.split("."):
+            node = node.get(part) if isinstance(node, Mapping) else None
+        if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
+            raise DataError(f"{self.path}: has no number at '{name}'; write the walk again")
+        if node <= above:
+            raise DataError(f"{self.path}: '{name}' is {node:g}, which is impossible for a walk; write the walk again")
+        return float(node)
+
+
+def _read_walk_file(path: Path) -> _WalkFile:
+    """Return the file of a walk; DataError for one that is none, of a walk that failed, or of an earlier version."""
+    document = read_json(path)
+    if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
+        raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
+    file = _WalkFile(path, document)
+    status = file.table("status").get("kind", "completed")
+    if status != "completed":
+        raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
+    if file.table("configuration").get("course") is not None:
+        raise DataError(f"{path}: 'course'{nearest_name('course', ('task_sequence',))}; write the walk again")
+    return file
+
+
+def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
+    """Return the walk that a folder is of, by what its file says; None for a folder of an earlier version."""
+    content, overrides = configuration.get("content"), configuration.get("overrides", [])
+    if content is None:
+        return None
+    source, name = configuration.get("file"), str(configuration.get("name", "walk"))
+    with refused_as(DataError, f"{file}: its walk cannot be repeated", PpafoError):
+        if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(source, str | None)):
+            raise DataError("'configuration' says no walk")
+        folder = Path() if source is None else Path(source).parent
+        return scenario_of(ScenarioRequest(name, source, folder, content, tuple(map(str, overrides))), WALKING)

@@ -1,0 +1,147 @@
+"""The linear model of a plant near one point: matrices, what they stand for, poles and frequency response."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.errors import ScenarioError, nearest_name, one_line
+from ppafo.simulation.scenario import Scenario
+from ppafo.version import __version__
+
+MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
+_SINGULAR = 1.0e13
+"""Condition number of a scaled matrix from which its solution has no correct digit left (64-bit floats: 1e16)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """A state, input or output: its name, unit in SI, and value at the point."""
+
+    name: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A comparison whose two numbers are equal at the point: where it stands, and whether it counts as true.
+
+    On the other side of it the plant may have another linear model.
+    """
+
+    place: str
+    is_true: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Delays:
+    """What the linear model leaves out [s]: dead time of the valve, age of measurements, sample period."""
+
+    command: float
+    signals: float
+    period: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LinearModel:
+    """The plant of a scenario near one point, x' = A x + B u, y = C x + D u, for differences from the point in SI.
+
+    ``a`` (states, states), ``b`` (states, inputs), ``c`` (outputs, states), ``d`` (outputs, inputs); ``rates``
+    (states,) are x' at the point itself, 0 in a steady state. ``time`` [s] is None for a steady state. ``sides`` say in
+    words which side of each limit of the plant was taken, ``edges`` where the point lies on one.
+    """
+
+    scenario: Scenario
+    time: float | None
+    states: tuple[Variable, ...]
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    a: Floats
+    b: Floats
+    c: Floats
+    d: Floats
+    rates: Floats
+    sides: Mapping[str, str]
+    edges: tuple[Edge, ...]
+    delays: Delays
+
+    @property
+    def is_steady(self) -> bool:
+        """True for a model about a steady state."""
+        return self.time is None
+
+    @property
+    def poles(self) -> "np.ndarray[Any, np.dtype[np.complex128]]":
+        """Poles [1/s], the slowest first."""
+        eigenvalues = np.linalg.eigvals(self.a).astype(np.complex128)
+        return eigenvalues[np.argsort(np.abs(eigenvalues))]
+
+    def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
+        """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
+
+        ScenarioError for a name that is no output or input, and for a frequency at which the model has a pole.
+        """
+        row, column = _index_of(output, self.outputs, "output"), _index_of(source, self.inputs, "input")
+        eye, responses = np.eye(len(self.states)), []
+        for frequency in np.asarray(frequencies, dtype=np.float64).ravel().tolist():
+            matrix = scaled = 2.0j * np.pi * frequency * eye - self.a
+            # States and their rates differ by powers of ten in SI: rank is taken with rows and columns of one size.
+            for axis in (1, 0):
+                largest = np.max(np.abs(scaled), axis=axis, keepdims=True, initial=0.0)
+                scaled = scaled / np.where(largest > 0.0, largest, 1.0)
+            if np.linalg.cond(scaled) > _SINGULAR:
+                raise ScenarioError(
+                    f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response has no "
+                    "end; give another frequency"
+                )
+            responses.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
+        return np.array(responses)
+
+    def json_document(self) -> dict[str, Any]:
+        """Return point, matrices, poles and sides as plain data in SI."""
+        rates = self.rates.tolist()
+        return {
+            "format": "ppafo linear model",
+            "schema_version": 1,
+            "ppafo": __version__,
+            "scenario": self.scenario.name,
+            "overrides": list(self.scenario.origin.overrides),
+            "at": "equilibrium" if self.time is None else self.time,
+            "states": [{**asdict(variable), "rate": rate} for variable, rate in zip(self.states, rates, strict=True)],
+            "inputs": [asdict(variable) for variable in self.inputs],
+            "outputs": [asdict(variable) for variable in self.outputs],
+            "A": self.a.tolist(),
+            "B": self.b.tolist(),
+            "C": self.c.tolist(),
+            "D": self.d.tolist(),
+            "poles": [{"real": pole.real, "imaginary": pole.imag} for pole in self.poles.tolist()],
+            "sides": dict(self.sides),
+            "edges": [asdict(edge) for edge in self.edges],
+            "left_out": {
+                "command_delay": self.delays.command,
+                "signal_delay": self.delays.signals,
+                "sample_period": self.delays.period,
+            },
+        }
+
+    def to_control(self) -> Any:
+        """Return the model as a ``control.StateSpace`` with its names; ScenarioError without the extra ``control``."""
+        if find_spec("control") is None:
+            raise ScenarioError(MISSING_CONTROL)
+        import control
+
+        names = {kind: [variable.name for variable in getattr(self, kind)] for kind in ("states", "inputs", "outputs")}
+        return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
+
+
+def _index_of(name: str, variables: Sequence[Variable], kind: str) -> int:
+    """Index of a variable by its name, whose ``kind`` is a word for the error; ScenarioError where there is none."""
+    names = [variable.name for variable in variables]
+    if name not in names:
+        hint = nearest_name(name, names)
+        raise ScenarioError(f"the linear model has no {kind} '{one_line(name)}'{hint}; there are: {', '.join(names)}")
+    return names.index(name)

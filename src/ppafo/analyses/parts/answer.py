@@ -1,0 +1,87 @@
+"""A catalogue of parts, or one part of it, in words, tables and plain data, with the origin of every figure."""
+
+import textwrap
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.parameters.parts import Catalogue, Part
+from ppafo.report import finding
+from ppafo.report.finding import Finding, columns_of
+from ppafo.report.kind import Kind
+
+_WIDTH = 110
+"""Characters of a line of the notes of a catalogue."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parts:
+    """Parts of a catalogue: one, or all where ``part`` is None."""
+
+    catalogue: Catalogue
+    part: Part | None
+
+    def json_document(self) -> dict[str, Any]:
+        """Return every figure of the parts, with its origin and source, as plain data."""
+        chosen = self.catalogue.parts if self.part is None else (self.part,)
+        return {
+            "catalogue": self.catalogue.name,
+            "parts": [
+                {
+                    "name": part.name,
+                    "group": part.group,
+                    "kind": part.kind or None,
+                    "maker": part.maker,
+                    "model": part.model,
+                    "document": part.document,
+                    "note": part.note,
+                    "figures": {name: figure.model_dump(mode="json") for name, figure in part.figures.items()},
+                    "values": dict(part.values),
+                    "unknown": list(part.unknown),
+                }
+                for part in chosen
+            ],
+        }
+
+
+def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
+    """Return a table for each group of a catalogue: each part with its mass, and with what is doubtful or not known."""
+    # Notes are written over several lines of a file: how they were broken there means nothing.
+    notes = "\n".join(textwrap.wrap(" ".join(catalogue.notes.split()), _WIDTH))
+    head = ("part", "maker and model", ("mass", Kind(quantity="part mass")), "figures to check", "not known")
+    tables = []
+    for group, members in catalogue.groups.items():
+        rows = [
+            (part.name, part.title, part.full_mass, ", ".join(part.doubtful) or "-", ", ".join(part.unknown) or "-")
+            for part in members.values()
+        ]
+        tables.append(finding.Part(group.capitalize(), columns_of(head, rows), left=len(head)))
+    return Finding(
+        name="parts",
+        kicker="Parts",
+        title=catalogue.title,
+        said=[f"{catalogue.name}: {catalogue.title}", *([notes] if notes else [])],
+        parts=tables,
+        found=Parts(catalogue, None),
+        kind="measured",
+    )
+
+
+def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
+    """Return a table of all figures of one part of a catalogue, each as it was given, with its origin and source."""
+    kind = f", {part.kind}" if part.kind else ""
+    figures = [
+        (name, f"{figure.value:.4g} {figure.unit}".rstrip(), figure.origin, figure.source)
+        for name, figure in part.figures.items()
+    ]
+    remarks = [f"{name}: {figure.note}" for name, figure in part.figures.items() if figure.note]
+    remarks += [f"not known: {', '.join(part.unknown)}"] if part.unknown else []
+    head = ("figure", "value", "origin", "source")
+    return Finding(
+        name="parts",
+        kicker="Parts",
+        title=part.title,
+        said=[f"{part.name}: {part.title} ({part.group}{kind})", *filter(None, (part.document, part.note))],
+        parts=[finding.Part(columns=columns_of(head, figures), remarks=remarks, left=len(head))],
+        found=Parts(catalogue, part),
+        kind="measured",
+    )

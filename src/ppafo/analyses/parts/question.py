@@ -1,0 +1,42 @@
+"""The question what a device can be built from: its arguments."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ppafo.arguments import Word, checked
+
+if TYPE_CHECKING:
+    from ppafo.analyses.parts.answer import Parts
+    from ppafo.report.finding import Finding
+
+
+@checked("part", "catalogue")
+def parts(
+    part: Annotated[str, Word("PART")] | None = None, *, catalogue: Annotated[str | Path, Word("FILE")] = "parts"
+) -> Finding[Parts]:
+    """List real parts with the origin of every figure.
+
+    ParameterError for bad input.
+
+    part: name of a part, for all its figures and their sources
+    catalogue: a .toml file; default: the catalogue of the package
+
+    >>> import ppafo
+    >>> ppafo.parts("festo-mpye-5-m5-010-b").said[0]
+    'festo-mpye-5-m5-010-b: Festo MPYE-5-M5-010-B (valves, proportional)'
+    """
+    from ppafo.analyses.parts.answer import finding_of_catalogue, finding_of_part
+    from ppafo.errors import ParameterError, nearest_name
+    from ppafo.parameters.parts import load_catalogue
+
+    loaded = load_catalogue(catalogue)
+    if part is None:
+        return finding_of_catalogue(loaded)
+    by_name = {known.name: known for known in loaded.parts}
+    if part not in by_name:
+        raise ParameterError(
+            f"{loaded.file}: there is no part '{part}'{nearest_name(part, by_name)}; available: {', '.join(by_name)}"
+        )
+    return finding_of_part(loaded, by_name[part])

@@ -1,0 +1,46 @@
+"""What the findings of other analyses say of the parts of a device: which they are, and which figures to check.
+
+A doubtful figure is a pair of a part and the name of a figure of it that is quoted or assumed.
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+from ppafo.parameters.parts import Part
+from ppafo.report import finding
+from ppafo.report.finding import facts
+
+
+def part_titles(parts: Iterable[Part]) -> finding.Part:
+    """Return maker and model of parts, each once, for the page."""
+    return finding.Part("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
+
+
+def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Part]:
+    """Return what to check before buying, a row for each part, and for the page the reason of each doubtful figure."""
+    pairs = tuple(doubtful)
+    if not pairs:
+        return []
+    # A row for each part, since a person orders parts; a reason for each figure, since each has its own.
+    figures_by_part: dict[str, list[str]] = {}
+    reasons = []
+    for part, name in pairs:
+        figure, words = part.figures[name], name.replace("_", " ")
+        figures_by_part.setdefault(part.name, []).append(f"{words} ({figure.origin})")
+        value = f"{figure.value:g} {figure.unit}".rstrip()
+        reasons.append(f"{part.name}: {words} {value} is {figure.origin}: {figure.note or figure.source}")
+    rows = facts((name, ", ".join(figures)) for name, figures in figures_by_part.items())
+    meaning = (
+        "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
+    )
+    return [
+        finding.Part("Check before buying", rows, [meaning]),
+        finding.Part("Why these figures are uncertain", remarks=reasons, is_detail=True),
+    ]
+
+
+def doubts_data(doubtful: Iterable[tuple[Part, str]]) -> list[dict[str, Any]]:
+    """Return doubtful figures as plain data: part, name, and the figure as it was given."""
+    return [
+        {"part": part.name, "figure": name, **part.figures[name].model_dump(mode="json")} for part, name in doubtful
+    ]

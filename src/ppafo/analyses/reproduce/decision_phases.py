@@ -1,0 +1,107 @@
+"""The solenoid pair's torque task over the unknown phase of its decisions.
+
+The task starts in a tie: the error is exactly 0, and the decisions have an unknown phase. So the pair runs once for
+each phase, with either valve first.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.signals.recording import Floats
+from ppafo.simulation.scenario import Initial, PrescribedMotion, Scenario
+from ppafo.simulation.simulate import Result, simulate
+
+PHASES = 20
+"""Phases of the decisions, evenly over one period; each with valve A and with valve B first."""
+_TIE = 1.0e-3
+"""A reference [N m] this far from 0 decides the tie at the start."""
+_STEP = 0.5e-3
+"""Step of the engine and time between two samples [s], which divide every phase."""
+
+
+@dataclass(frozen=True, slots=True)
+class PhasedRuns:
+    """The pair's RMS torque error [N m] and gas from the supply [g] for each phase of its decisions, A or B first.
+
+    Both are (runs,). Run number ``PHASES``, a whole period with A first, is the run as its scenario has it.
+    """
+
+    errors: Floats
+    gas: Floats
+
+
+class _Run(NamedTuple):
+    """RMS torque error [N m] and gas from the supply [g] of one run."""
+
+    error: float
+    gas: float
+
+
+def phased_runs(solenoid: Result) -> PhasedRuns:
+    """Return the pair's task with its decisions at each phase; its own run alone where the task has no such phase."""
+    scenario = solenoid.scenario
+    if _has_phase(scenario):
+        fine = replace(scenario, run=replace(scenario.run, step=_STEP, output_interval=_STEP))
+        runs = [run for tie in (_TIE, -_TIE) for run in _runs_with_first_valve(fine, tie)]
+    else:
+        gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
+        runs = [_Run(solenoid.metrics["rms_error"].value, gas)]
+    return PhasedRuns(np.array([run.error for run in runs]), np.array([run.gas for run in runs]))
+
+
+def _has_phase(scenario: Scenario) -> bool:
+    """True where the task starts in a tie, and a run can be joined from two."""
+    # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
+    # without lines; and a tie is only where reference and torque both begin at 0.
+    reference, period = scenario.reference, scenario.controller.period
+    return (
+        scenario.controller.kind == "on_off"
+        and isinstance(scenario.motion, PrescribedMotion)
+        and scenario.motion.kind == "locked"
+        and scenario.gas_model is None
+        and scenario.supply_lines is None
+        and reference.kind == "ramp_hold"
+        and reference.ramp_start == 0.0
+        and reference.start_level == 0.0
+        and reference.ramp_time > period
+        and scenario.run.duration > period
+    )
+
+
+def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[_Run]:
+    """Yield the run for each phase, in which the valve that a reference ``tie`` [N m] calls is held on until then.
+
+    What follows the first decision is the task from that time on, from the pressures of that time.
+    """
+    period, duration = scenario.controller.period, scenario.run.duration
+    ramp = scenario.reference.settings
+    slope = ramp["level"] / ramp["ramp_time"]
+    # A constant reference just off 0 calls one valve at once and holds it on.
+    constant = _with_reference(scenario, start_level=tie, level=tie)
+    held = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
+    for number in range(1, PHASES + 1):
+        phase = period * number / PHASES
+        last = round(phase / _STEP)
+        onward = _with_reference(scenario, start_level=slope * phase, ramp_time=ramp["ramp_time"] - phase)
+        rest = simulate(
+            replace(
+                onward,
+                run=replace(scenario.run, duration=duration - phase),
+                initial=Initial(float(held["pressure_1"][last]), float(held["pressure_2"][last])),
+            )
+        )
+        error_before = slope * held.time[: last + 1] - held["torque"][: last + 1]
+        # Mean squares of both parts, each with its time.
+        square = phase * float(np.mean(error_before**2)) + (duration - phase) * rest.metrics["rms_error"].value ** 2
+        gas = float(held["supplied_mass"][last]) + rest.metrics["gas_supplied"].value
+        yield _Run(float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas)
+
+
+def _with_reference(scenario: Scenario, **settings: float) -> Scenario:
+    """Return a scenario with other settings [SI] of its reference."""
+    reference = scenario.reference
+    return replace(scenario, reference=replace(reference, settings={**reference.settings, **settings}))

@@ -1,0 +1,58 @@
+"""What U of equation (13), the command of the proportional valve, may mean, and what each meaning makes of the task."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ppafo.metrics import Metric
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.simulate import Result, simulate
+
+READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
+"""What U of equation (13) may be, and the U that opens the proportional valve fully."""
+WITHIN_REACH = 4.0
+"""A level [N m] that the supply can hold."""
+_GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
+
+
+@dataclass(frozen=True, slots=True)
+class InterpretationOfU:
+    """One meaning of U: by how much the proportional valve lowers RMS error and gas [%], and the error within reach."""
+
+    name: str
+    error: float
+    gas: float
+    error_within_reach: float
+
+
+def readings_of_u(solenoid: Result, proportional: Result) -> tuple[InterpretationOfU, ...]:
+    """Return what each meaning of U makes of the comparison; none where another law or reference runs."""
+    pair, spool = solenoid.scenario, proportional.scenario
+    if spool.controller.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
+        return ()
+    against, against_within_reach = (simulate(run).metrics for run in (pair, _to_level(pair, WITHIN_REACH)))
+    readings = []
+    for name, full in READINGS_OF_U:
+        # Volts times a gain for volts give the same opening.
+        gains = {gain: spool.controller.settings[gain] / full for gain in _GAINS}
+        read = replace(spool, controller=replace(spool.controller, settings={**spool.controller.settings, **gains}))
+        metrics, within_reach = (simulate(run).metrics for run in (read, _to_level(read, WITHIN_REACH)))
+        readings.append(
+            InterpretationOfU(
+                name,
+                error=_less(metrics, against, "rms_error"),
+                gas=_less(metrics, against, "gas_supplied"),
+                error_within_reach=_less(within_reach, against_within_reach, "rms_error"),
+            )
+        )
+    return tuple(readings)
+
+
+def _to_level(scenario: Scenario, level: float) -> Scenario:
+    """Return the task to another level [N m] of its ramp."""
+    reference = scenario.reference
+    return replace(scenario, reference=replace(reference, settings={**reference.settings, "level": level}))
+
+
+def _less(metrics: Mapping[str, Metric], against: Mapping[str, Metric], name: str) -> float:
+    """Return by how much a metric is less than another run's [%]."""
+    return 100.0 * (1.0 - metrics[name].value / against[name].value)

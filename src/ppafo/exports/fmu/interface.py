@@ -1,0 +1,107 @@
+"""What a unit shows of a scenario: the closed loop without inputs, or the plant alone, whose inputs a tool gives."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.files import Library
+from ppafo.exports.c_library.plant import Input, follow_lines, plant_of, surfaced
+from ppafo.simulation.scenario import Scenario
+
+_LOOP_TIME = (
+    "The unit goes from sample to sample, <code>run.output_interval</code> apart, and shows the last one that is due. "
+    "Any communication step is taken. The run ends at <code>run.duration</code>: a longer one is set before the start."
+)
+"""How the closed loop goes on, for the page of the unit."""
+_LOOP_TUNING = (
+    "The controller takes them at its next sample, the plant one step of the engine later. Of a reference that changes "
+    "under way, metrics of ramp and hold keep the times of the first one."
+)
+"""When the closed loop takes a changed parameter, for the page of the unit."""
+_PLANT_TIME = (
+    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
+    "divides it further where its error asks for that. {motion} There is no end."
+)
+"""How the plant goes on, for the page of the unit; ``motion`` is what its vane does."""
+_PLANT_TUNING = "They are taken at the next communication step."
+"""When the plant takes a changed parameter, for the page of the unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interface:
+    """The interface of a unit: the settings and outputs of its library that are its variables, and its inputs.
+
+    ``templates`` are the files of C that move it on, and ``words`` what is filled in there by name. ``hidden`` are the
+    paths of settings that are no variables. ``time`` tells people how the unit goes on, ``tuning`` when it takes a
+    changed parameter; both are HTML. ``step`` [s] is the usual communication step; where ``is_step_fixed``, others must
+    be multiples of it. ``duration`` [s] is that of the usual experiment. ``clock`` says when the clock of the
+    controller ticks, None for a unit without one.
+    """
+
+    name: str
+    library: Library
+    templates: tuple[str, ...]
+    time: str
+    tuning: str
+    step: float
+    duration: float
+    outputs: tuple[str, ...]
+    shows_metrics: bool
+    is_step_fixed: bool
+    clock: str | None
+    hidden: frozenset[str]
+    inputs: tuple[Input, ...]
+    words: Mapping[str, str]
+
+
+def closed_loop(scenario: Scenario) -> Interface:
+    """Return the whole scenario or walk, its controller within: no inputs."""
+    library = library_of(scenario)
+    times = {setting.path: setting.value for setting in library.settings}
+    return Interface(
+        name=scenario.name,
+        library=library,
+        templates=("stepped.c", "closed_loop.c"),
+        time=_LOOP_TIME,
+        tuning=_LOOP_TUNING,
+        step=times["run.output_interval"],
+        duration=times["run.duration"],
+        outputs=library.program.outputs,
+        shows_metrics=True,
+        is_step_fixed=False,
+        clock="ticks when the controller decides, every controller.period",
+        hidden=frozenset(),
+        inputs=(),
+        words={},
+    )
+
+
+def plant_alone(scenario: Scenario) -> Interface:
+    """Return the plant; an unconstrained vane takes an external torque, one with a prescribed angle angle and rate.
+
+    For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
+    """
+    alone = surfaced(plant_of(scenario))
+    library = alone.library
+    inputs = ", ".join(f"inputs[{index}]" for index in range(len(alone.inputs)))
+    numbers = {variable.name: f"inputs[{index}]" for index, variable in enumerate(alone.inputs)}
+    return Interface(
+        name=library.title,
+        library=library,
+        templates=("stepped.c", "plant_inputs.c", "plant.c"),
+        time=_PLANT_TIME.format(motion=alone.motion),
+        tuning=_PLANT_TUNING,
+        step=alone.step,
+        duration=scenario.run.duration,
+        outputs=library.program.outputs,
+        shows_metrics=False,
+        is_step_fixed=True,
+        clock=None,
+        hidden=alone.hidden,
+        inputs=alone.inputs,
+        words={
+            "inputs": inputs,
+            "follow": follow_lines(alone, "settings", numbers),
+            "checked": "the limits of the inputs, inertia, volumes and areas",
+        },
+    )

@@ -1,0 +1,95 @@
+"""Kinds of computers that a unit has a library for, and the compiler that builds it."""
+
+import importlib.util
+import platform
+import shutil
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ppafo.errors import ProgramError
+from ppafo.translation.compiling import asked, complaint
+
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
+"""Flags of the compiler with which a unit has the bits of the package."""
+HIDDEN = ("-shared", "-fPIC", "-fvisibility=hidden")
+"""Flags of a library that shows the functions of FMI alone."""
+_ANOTHER = "install gcc, clang or 'pip install ppafo[native]' anew"
+"""Remedy where a compiler does not answer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Platform:
+    """A kind of computer: its folder in a unit of FMI 2 (None: there is none) and of FMI 3, and how it is built for.
+
+    ``tried`` says what the binary of this platform was run on by the authors.
+    """
+
+    folder_2: str | None
+    folder_3: str
+    target: str
+    suffix: str
+    tried: str
+
+
+PLATFORMS = {
+    "linux64": Platform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "run in the tests"),
+    "win64": Platform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", "run under Wine"),
+    "linux-aarch64": Platform(None, "aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "run under qemu"),
+}
+"""Platforms by the names under which they are requested."""
+
+
+def host_platform() -> str | None:
+    """Return the platform of this computer, None where a unit has none for it."""
+    machine = {"x86_64": "64", "amd64": "64", "aarch64": "-aarch64", "arm64": "-aarch64"}.get(
+        platform.machine().lower()
+    )
+    system = {"Linux": "linux", "Windows": "win"}.get(platform.system())
+    name = f"{system}{machine}"
+    return name if name in PLATFORMS else None
+
+
+def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
+    """Return the library of a unit for a platform, of C ``sources`` by name, ``main`` the one that is compiled.
+
+    ProgramError where no compiler is there for it, or it refuses.
+    """
+    # No -march: a unit runs on processors that nobody here has seen.
+    command = [*compiler_for(name), *FLAGS, *HIDDEN]
+    with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
+        for file, content in sources.items():
+            (Path(folder) / file).write_bytes(content)
+        library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
+        # Windows has the mathematics in its C library.
+        mathematics = [] if name == "win64" else ["-lm"]
+        done = asked([*command, main, "-o", library.name, *mathematics], _ANOTHER, folder, Path(folder))
+        if done.returncode != 0:
+            raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
+        if not library.is_file():
+            raise ProgramError(f"{command[0]} says that all is well, but made no library for {name}; {_ANOTHER}")
+        return library.read_bytes()
+
+
+def compiler_for(name: str) -> Sequence[str]:
+    """Return the words of a compiler for a platform. ProgramError where there is none."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [
+            sys.executable,
+            "-m",
+            "ziglang",
+            "cc",
+            "-target",
+            PLATFORMS[name].target,
+            "-s",
+            # zig turns undefined behaviour into traps in what it calls a debug build.
+            "-fno-sanitize=undefined",
+        ]
+    compiler = next(filter(None, map(shutil.which, ("gcc", "clang"))), None)
+    # A library of this system's gcc runs on systems that are at least as new; zig links against an old one.
+    if name == host_platform() == "linux64" and compiler is not None:
+        return [compiler, "-s"]
+    needed = "gcc, clang or the package ziglang" if name == "linux64" else "the package ziglang"
+    raise ProgramError(f"platform {name} needs {needed} (pip install 'ppafo[native]')")

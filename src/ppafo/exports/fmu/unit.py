@@ -1,0 +1,121 @@
+"""A unit as a file: description, page, sources, and the libraries of the platforms that it is for."""
+
+import hashlib
+import html
+import io
+import zipfile
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+
+from ppafo.errors import ScenarioError, nearest_name
+from ppafo.exports import filled, template
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
+from ppafo.exports.fmu.interface import Interface
+from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, Platform, build
+from ppafo.exports.fmu.variables import tuning_of, variability_of
+from ppafo.version import __version__
+
+_FIRST_DAY = (1980, 1, 1, 0, 0, 0)
+"""The earliest date of a zip file: a unit does not depend on the day on which it was made."""
+_HEADERS = {
+    2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
+    3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
+}
+_DESCRIBED = {2: description_of_fmi2, 3: description_of_fmi3}
+_CALLS = {2: ("fmi2.c", "fmi2_steps.c"), 3: ("fmi3.c",)}
+"""Templates of the functions of FMI, by version."""
+
+
+def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
+    """Return the bytes of a unit by the name of its file; ``fmi`` is the version, 2 or 3.
+
+    ScenarioError for a platform that is none, ProgramError for what cannot be translated or built.
+    """
+    # Before anything is built: a misspelt platform should not cost a compilation.
+    chosen = {name: _platform(name, fmi) for name in platforms}
+    identifier = interface.library.name
+    sources = _sources(interface, fmi)
+    token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
+    # The token is the hash of the sources before it stands in them.
+    sources = {name: content.replace(b"@token@", token.encode()) for name, content in sources.items()}
+    main = f"fmi{fmi}.c"
+    tried = "".join(f"<tr><td>{name}</td><td>{platform.tried}</td></tr>" for name, platform in chosen.items())
+    words = {
+        "title": html.escape(interface.name),
+        "description": html.escape(interface.library.description),
+        "version": __version__,
+        "time": interface.time,
+        "tuning": interface.tuning,
+        "binaries": tried or "<tr><td>none</td><td></td></tr>",
+        "main": main,
+        "flags": " ".join(FLAGS),
+    }
+    contents = {
+        "modelDescription.xml": _DESCRIBED[fmi](interface, identifier, token),
+        "documentation/index.html": filled(template("ppafo.exports.fmu", "index.html"), words).encode(),
+        "documentation/licenses/license.txt": template("ppafo.exports.c_library", "LICENSE").encode(),
+        **{f"sources/{name}": content for name, content in sources.items()},
+    }
+    if fmi == 3:
+        contents["sources/buildDescription.xml"] = build_description_of_fmi3(identifier, " ".join(FLAGS[1:]))
+    for name, platform in chosen.items():
+        folder = platform.folder_2 if fmi == 2 else platform.folder_3
+        contents[f"binaries/{folder}/{identifier}{platform.suffix}"] = build(name, sources, main)
+    return {f"{identifier}.fmu": _archive(contents)}
+
+
+def _platform(name: str, fmi: int) -> Platform:
+    """Return a platform; ScenarioError for a name that is none, or that a version of FMI has no folder for."""
+    platform = PLATFORMS.get(name)
+    if platform is None:
+        hint = nearest_name(name, PLATFORMS)
+        raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
+    if fmi == 2 and platform.folder_2 is None:
+        raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
+    return platform
+
+
+def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
+    """Return the sources by name, with a mark where the token will be."""
+    library = interface.library
+    name = library.name
+    written = library_files(library)
+    paths = "\n".join(f'    "{setting.path}",' for setting in library.settings)
+    words = {
+        "name": name,
+        "NAME": name.upper(),
+        "title": library.title,
+        "version": __version__,
+        "input_count": str(len(interface.inputs)),
+        "paths": paths,
+        "changes": "".join(tuning_of(interface, setting)[0] for setting in library.settings),
+        "first_inputs": ", ".join([*(repr(variable.start) for variable in interface.inputs), "0.0"]),
+        "output_changes": "".join(variability_of(name)[0] for name in library.program.outputs),
+        "token": "@token@",
+        "has_clock": "true" if interface.clock else "false",
+        "checked": "inertia, volumes and areas",
+        **interface.words,
+    }
+    unit = "\n".join(filled(template("ppafo.exports.fmu", file), words) for file in ("unit.c", *interface.templates))
+    headers = files("ppafo.exports.fmu").joinpath("headers")
+    return {
+        f"{name}.h": written[f"{name}.h"],
+        f"{name}.c": written[f"{name}.c"],
+        "unit.c": unit.encode(),
+        f"fmi{fmi}.c": "".join(filled(template("ppafo.exports.fmu", file), words) for file in _CALLS[fmi]).encode(),
+        **{file: headers.joinpath(file).read_bytes() for file in _HEADERS[fmi]},
+    }
+
+
+def _archive(contents: Mapping[str, bytes]) -> bytes:
+    """Return a zip file of these files, the same bytes on every day."""
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, _FIRST_DAY)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            # Permissions of Unix in the upper half; a library must be executable for some tools.
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(entry, content)
+    return target.getvalue()

@@ -1,0 +1,130 @@
+"""Variables of a unit, and what of it may change under way."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from ppafo.exports.c_library.files import OUTPUTS, Setting
+from ppafo.exports.fmu.interface import Interface
+from ppafo.model.controlled import CONTROLLED
+
+Tuning = Literal["hidden", "tunable", "fixed"]
+"""Whether a setting is no variable, a parameter that may change under way, or one that may not."""
+Variability = Literal["discrete", "continuous"]
+"""Whether an output jumps from sample to sample or goes on in between, in words of FMI."""
+
+FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
+"""Settings that the start of a run is made of: they cannot change under way."""
+FIXED_NAMES = ("period", "delay", "seed")
+"""Names of further settings that cannot change under way: they count steps or begin the noise."""
+TUNABLE_OF_WEARER = ("residual_share", "ankle_stiffness", "ankle_rest_angle", "ankle_damping")
+"""Settings of the wearer that may change: the weight of a leg stays."""
+STEPPED = (
+    "command",
+    *(kind.reference for kind in CONTROLLED.values()),
+    "strides",
+    "contact",
+    "controller_phase",
+    "safe_state",
+)
+"""Outputs that jump from sample to sample."""
+_LARGEST_LIMIT = 1.0e308
+"""Size of a limit from which on it stands for none: XML would show the largest floats as limits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in words of FMI.
+
+    A ``start`` of None is calculated, limits of None are none; all three are in ``unit``.
+    """
+
+    name: str
+    number: int
+    unit: str
+    summary: str
+    causality: str
+    variability: str
+    start: float | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+
+
+def tuning_of(interface: Interface, setting: Setting) -> Tuning:
+    """Return whether a setting is a variable of a unit, and if so whether it may change under way."""
+    if setting.path in interface.hidden:
+        return "hidden"
+    section, _, name = setting.path.rpartition(".")
+    if section == "wearer" and name in TUNABLE_OF_WEARER:
+        return "tunable"
+    return "fixed" if section in FIXED_SECTIONS or name in FIXED_NAMES else "tunable"
+
+
+def variability_of(output: str) -> Variability:
+    """Return whether an output jumps from sample to sample or goes on in between."""
+    return "discrete" if output in STEPPED else "continuous"
+
+
+def variables_of(interface: Interface) -> tuple[Variable, ...]:
+    """Return all variables, in the order of their numbers: settings, outputs, metrics, inputs.
+
+    The numbers are also those of the C, which counts what is no variable of the unit too.
+    """
+    library = interface.library
+    first_output = len(library.settings)
+    first_metric = first_output + len(library.program.outputs)
+    first_input = first_metric + len(library.program.metrics)
+    return (
+        *_parameters(interface),
+        *_outputs(interface, first_output),
+        *(_metrics(interface, first_metric) if interface.shows_metrics else ()),
+        *_inputs(interface, first_input),
+    )
+
+
+def _parameters(interface: Interface) -> Iterator[Variable]:
+    for number, setting in enumerate(interface.library.settings):
+        tuning, quantity = tuning_of(interface, setting), setting.quantity
+        if tuning != "hidden":
+            yield Variable(
+                setting.path,
+                number,
+                quantity.unit,
+                quantity.summary or quantity.name,
+                "parameter",
+                tuning,
+                setting.value,
+                _shown_limit(quantity.minimum),
+                _shown_limit(quantity.maximum),
+            )
+
+
+def _shown_limit(limit: float) -> float | None:
+    return limit if abs(limit) < _LARGEST_LIMIT else None
+
+
+def _outputs(interface: Interface, first: int) -> Iterator[Variable]:
+    for number, name in enumerate(interface.library.program.outputs, start=first):
+        if name in interface.outputs:
+            unit, summary = OUTPUTS[name]
+            yield Variable(name, number, unit, summary, "output", variability_of(name))
+
+
+def _metrics(interface: Interface, first: int) -> Iterator[Variable]:
+    for number, metric in enumerate(interface.library.program.metrics, start=first):
+        yield Variable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
+
+
+def _inputs(interface: Interface, first: int) -> Iterator[Variable]:
+    for number, given in enumerate(interface.inputs, start=first):
+        yield Variable(
+            given.name,
+            number,
+            given.unit,
+            given.summary,
+            "input",
+            "continuous",
+            given.start,
+            given.minimum,
+            given.maximum,
+        )

@@ -1,0 +1,227 @@
+"""The file of a measured actuator: one line for each angle and pressure, with the volumes of its chambers.
+
+    angle [deg],pressure [kPa_g],volume_1 [mL],volume_2 [mL]
+
+Columns and lines may stand in any order, and a line that begins with # is a comment. Without a column ``volume_2`` the
+actuator has one chamber, and chamber 2 is nothing but its dead volume.
+"""
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
+from ppafo.documents.toml_text import label
+from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason, refused_as, said_missing
+from ppafo.model.actuators.table import MOST_ANGLES, MOST_PRESSURES
+from ppafo.signals.recording import Floats
+from ppafo.units import number_text, to_si
+
+
+class Column(NamedTuple):
+    """A column that the file may have: its SI unit, the size [SI] beyond which a number is a slip, a unit to write."""
+
+    unit: str
+    largest: float
+    example: str
+
+
+COLUMNS = {
+    "angle": Column("rad", 10.0, "deg"),
+    "pressure": Column("Pa_a", 1.0e7, "kPa_g"),
+    "volume_1": Column("m^3", 1.0, "mL"),
+    "volume_2": Column("m^3", 1.0, "mL"),
+}
+_NEEDED = ("angle", "pressure", "volume_1")
+_NEAREST_ANGLES = 0.01
+"""Angles nearer to each other than this share of their range make a spline swing."""
+_NEAREST_PRESSURES = 1.0
+"""Pressures [Pa] nearer to each other than this are one that was written twice."""
+_LONGEST = 40
+"""Characters of a cell that a message shows; a longer text is no number that anybody wrote either."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeasuredVolumes:
+    """Volumes of the chambers [m^3], each (angles, pressures), at every pair of an angle and a pressure.
+
+    ``angles`` [rad] and ``pressures`` [Pa, gauge] grow. ``volume_2`` is None of an actuator with one chamber.
+    """
+
+    angles: Floats
+    pressures: Floats
+    volume_1: Floats
+    volume_2: Floats | None
+
+
+def read_measured_volumes(path: Path) -> MeasuredVolumes:
+    """Return what the file of a measured actuator says; ParameterError, with file and line, for what cannot be used."""
+    file = label(str(path))
+    try:
+        text = decoded(read_regular_file(path, MAXIMUM_BYTES_TYPED))
+    except UnicodeDecodeError as error:
+        raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
+    except (OSError, ValueError) as error:
+        raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
+    columns = _columns(text, file)
+    angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
+    _check_grid(columns["angle"], columns["pressure"], file)
+    order = np.lexsort((columns["pressure"], columns["angle"]))
+    volumes = {
+        name: column[order].reshape(angles.size, pressures.size)
+        for name, column in columns.items()
+        if name.startswith("volume")
+    }
+    for name in sorted(volumes):
+        _check_volume(name, volumes[name], angles, pressures, file)
+    return MeasuredVolumes(angles, pressures, volumes["volume_1"], volumes.get("volume_2"))
+
+
+class _Line(NamedTuple):
+    number: int
+    cells: list[str]
+
+
+def _lines(text: str, file: str) -> list[_Line]:
+    """Return the lines of a file that are neither empty nor comments, the header first."""
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
+    if not lines:
+        raise ParameterError(f"{file}: is empty; its header is 'angle [deg],pressure [kPa_g],volume_1 [mL]'")
+    header = lines[0][1]
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if separator in header and "," not in header:
+            raise ParameterError(f"{file}: its columns are separated by {name}; commas are needed")
+    return [_Line(number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines]
+
+
+def _columns(text: str, file: str) -> dict[str, Floats]:
+    """Return the columns of a file by name, each (lines,), in SI units; pressures are above the atmosphere."""
+    header, *lines = _lines(text, file)
+    units = _units(header.cells, file)
+    rows = [_numbers(line, tuple(units), file) for line in lines]
+    if not rows:
+        raise ParameterError(f"{file}: has a header and no line of numbers")
+    columns: dict[str, Floats] = {}
+    for index, (name, unit) in enumerate(units.items()):
+        declared = COLUMNS[name]
+        # Over a vacuum a gauge pressure is its own SI value.
+        column = np.array([to_si(row[index], unit, declared.unit, 0.0) for row in rows])
+        worst = int(np.argmax(np.abs(column)))
+        if abs(column[worst]) > declared.largest:
+            raise ParameterError(
+                f"{file}, line {lines[worst].number}: {name} = {rows[worst][index]:g} {unit} is beyond "
+                f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
+            )
+        columns[name] = column
+    return columns
+
+
+def _units(header: Sequence[str], file: str) -> dict[str, str]:
+    """Return the unit of each column by its name, in the order of the file."""
+    units: dict[str, str] = {}
+    for cell in header:
+        name, bracket, unit = (part.strip() for part in cell.strip().removesuffix("]").partition("["))
+        if name not in COLUMNS:
+            shown, hint = one_line(name)[:_LONGEST], nearest_name(name, COLUMNS)
+            raise ParameterError(f"{file}: unknown column '{shown}'{hint}; allowed: {', '.join(COLUMNS)}")
+        if name in units:
+            raise ParameterError(f"{file}: there are two columns '{name}'")
+        if not bracket:
+            example = f"{name} [{COLUMNS[name].example}]"
+            raise ParameterError(f"{file}: column '{name}' has no unit; write for example '{example}'")
+        if name == "pressure" and not unit.endswith("_g"):
+            shown = one_line(unit)[:_LONGEST]
+            raise ParameterError(f"{file}: column 'pressure' is in '{shown}'; give gauge, as in kPa_g")
+        with refused_as(ParameterError, f"{file}: column '{name}'", UnitError):
+            to_si(1.0, unit, COLUMNS[name].unit, 0.0)
+        units[name] = unit
+    missing = [name for name in _NEEDED if name not in units]
+    if missing:
+        raise ParameterError(f"{file}: column{'s' * (len(missing) > 1)} {said_missing(missing)}")
+    return units
+
+
+def _numbers(line: _Line, names: Sequence[str], file: str) -> list[float]:
+    """Return the numbers of a line, as they are written, in the order of the columns ``names``."""
+    if len(line.cells) != len(names):
+        raise ParameterError(f"{file}, line {line.number}: has {len(line.cells)} values, the header has {len(names)}")
+    numbers = []
+    for name, cell in zip(names, line.cells, strict=True):
+        try:
+            number = float(number_text(cell)) if len(cell) <= _LONGEST else math.nan
+        except ValueError:
+            number = math.nan
+        if not math.isfinite(number):
+            shown = one_line(cell)[:_LONGEST]
+            raise ParameterError(f"{file}, line {line.number}: {name} = '{shown}' is not a finite number")
+        numbers.append(number)
+    return numbers
+
+
+def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
+    """Refuse columns (lines,) of angles [rad] and gauge pressures [Pa] in which not every pair occurs once.
+
+    An actuator has room for a fixed number of each, and needs its volumes without pressure.
+    """
+    angles, pressures = np.unique(angle), np.unique(pressure)
+    if angles.size < 2:
+        raise ParameterError(f"{file}: has one angle only, at least 2 are needed")
+    if pressures[0] < 0.0:
+        raise ParameterError(f"{file}: pressure = {pressures[0]:g} Pa_g is below the atmosphere")
+    if pressures.size > 1 and pressures[0] > 0.0:
+        raise ParameterError(
+            f"{file}: the lowest pressure is {pressures[0] / 1e3:.4g} kPa_g; volumes at 0 kPa_g, vented, are needed too"
+        )
+    _check_spacing("angle", angles, MOST_ANGLES, _NEAREST_ANGLES * float(np.ptp(angles)), file)
+    _check_spacing("pressure", pressures, MOST_PRESSURES, _NEAREST_PRESSURES, file)
+    lines = Counter(zip(angle.tolist(), pressure.tolist(), strict=True))
+    repeated = next((pair for pair, count in lines.items() if count > 1), None)
+    if repeated is not None:
+        raise ParameterError(f"{file}: there is more than one line for {_point_text(*repeated)}")
+    for pair in product(angles.tolist(), pressures.tolist()):
+        if pair not in lines:
+            raise ParameterError(f"{file}: there is no line for {_point_text(*pair)}; every angle needs every pressure")
+
+
+def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file: str) -> None:
+    """Refuse more than ``maximum`` values of a column, and two of them nearer to each other than ``nearest`` [SI]."""
+    if values.size > maximum:
+        raise ParameterError(f"{file}: has {values.size} values of {name}, at most {maximum} are taken: leave some out")
+    if values.size > 1 and float(np.diff(values).min()) < nearest:
+        raise ParameterError(f"{file}: two values of {name} are almost equal; merge or round them")
+
+
+def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, file: str) -> None:
+    """Refuse volumes [m^3] (angles, pressures) that no chamber has.
+
+    They are negative, fall as the pressure grows, or at the highest pressure do not grow with the angle (chamber 1) or
+    shrink with it (chamber 2).
+    """
+    if volume.min() < 0.0:
+        row, column = np.unravel_index(int(np.argmin(volume)), volume.shape)
+        point = _point_text(angles[row], pressures[column])
+        raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL at {point} is negative")
+    falls = np.argwhere(np.diff(volume, axis=1) < 0.0)
+    if falls.size:
+        row, column = falls[0]
+        raise ParameterError(
+            f"{file}: {name} falls with the pressure at {_point_text(angles[row], pressures[column + 1])}"
+        )
+    sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
+    wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= 0.0)
+    if wrong.size:
+        raise ParameterError(
+            f"{file}: {name} must {direction} with the angle at the highest pressure, and does not at "
+            f"{math.degrees(angles[wrong[0] + 1]):.6g} deg"
+        )
+
+
+def _point_text(angle: float, pressure: float) -> str:
+    """Return an angle [rad] and a gauge pressure [Pa] as a message shows them."""
+    return f"{math.degrees(angle):.6g} deg and {pressure / 1e3:.6g} kPa_g"

@@ -1,0 +1,7 @@
+"""The integer controllers, by the names that scenarios give them. To add one: a module beside this, and one word."""
+
+from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.processor.torque_laws.on_off import DEAD_ZONE, ON_OFF
+from ppafo.processor.torque_laws.pid import PID
+
+FIXED_LAWS: dict[str, FixedLaw] = {law.kind.name: law for law in (PID, ON_OFF, DEAD_ZONE)}

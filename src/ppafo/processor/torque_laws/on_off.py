@@ -1,0 +1,160 @@
+"""On/off control on whole numbers: equation (14), and its second form, with a dead zone and hysteresis.
+
+Errors are in counts of the converter, commands in steps of 1/1000.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ppafo.control.controllers.switching import ON_OFF as FLOAT_ON_OFF
+from ppafo.control.controllers.switching import ON_OFF_DEAD_ZONE as FLOAT_DEAD_ZONE
+from ppafo.engine.source_text import each
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+from ppafo.processor.fixed_point import (
+    COMMAND_STEPS,
+    LARGEST_READING,
+    OF_LIMITS,
+    OF_STEPS,
+    Limits,
+    Readings,
+    Steps,
+    converter_with,
+    error_of,
+    read,
+    still_sound,
+)
+from ppafo.processor.planning import Numbers, fixed_point_kind
+from ppafo.processor.torque_laws.law import FixedLaw
+
+
+class OnOffNumbers(NamedTuple):
+    """Limits of the readings."""
+
+    limits: Limits
+
+
+class OnOffCounts(NamedTuple):
+    """1 while all readings have been sound."""
+
+    sound: int
+
+
+class OnOffRows(NamedTuple):
+    """Steps of the converter, and what ``on_off_sample`` is given."""
+
+    steps: Steps
+    numbers: OnOffNumbers
+
+
+def on_off_sample(numbers: OnOffNumbers, state: OnOffCounts, readings: Readings) -> tuple[int, OnOffCounts]:
+    """Command in steps: 1000 where the error is 0 or more, else -1000; 0, for good, after a reading at an end."""
+    sound = still_sound(state.sound, readings, numbers.limits)
+    command = COMMAND_STEPS if error_of(readings, numbers.limits) >= 0 else -COMMAND_STEPS
+    return (command if sound == 1 else 0), OnOffCounts(sound)
+
+
+def on_off_update(
+    parameters: OnOffRows, state: OnOffCounts, reference: float, measurement: Measurement, period: float
+) -> tuple[float, OnOffCounts]:
+    """Command from -1 to 1 that ``on_off_sample`` gives for what the converter shows."""
+    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    command, after = on_off_sample(each(int, parameters.numbers), each(int, state), readings)
+    return float(command) / COMMAND_STEPS, each(float, after)
+
+
+ON_OFF_FIXED_POINT = fixed_point_kind(
+    FLOAT_ON_OFF,
+    OnOffRows,
+    each(float, OnOffCounts(1)),
+    on_off_update,
+    Numbers("on_off_fixed_point", (*OF_STEPS, *OF_LIMITS)),
+)
+ON_OFF = FixedLaw(
+    kind=ON_OFF_FIXED_POINT,
+    sample=on_off_sample,
+    numbers=OnOffNumbers,
+    number_quantities=OF_LIMITS,
+    begins=OnOffCounts(1),
+    state_ranges={"sound": (0, 1)},
+)
+
+
+class DeadZoneNumbers(NamedTuple):
+    """Limits of the readings; errors at which the valve opens and closes again [counts]; opening [steps]."""
+
+    limits: Limits
+    dead_zone: int
+    release: int
+    opening: int
+
+
+class DeadZoneCounts(NamedTuple):
+    """Direction in which the valve is open, 1, 0 or -1; 1 while all readings have been sound."""
+
+    direction: int
+    sound: int
+
+
+class DeadZoneRows(NamedTuple):
+    """Steps of the converter, and what ``dead_zone_sample`` is given."""
+
+    steps: Steps
+    numbers: DeadZoneNumbers
+
+
+def dead_zone_sample(numbers: DeadZoneNumbers, state: DeadZoneCounts, readings: Readings) -> tuple[int, DeadZoneCounts]:
+    """Command in steps: the opening, towards the reference, beyond the dead zone; 0, for good, after a bad reading."""
+    sound = still_sound(state.sound, readings, numbers.limits)
+    error = error_of(readings, numbers.limits)
+    # Hysteresis: the valve closes at the release, nearer to the reference than where it opens.
+    limit_up = numbers.release if state.direction > 0 else numbers.dead_zone
+    limit_down = numbers.release if state.direction < 0 else numbers.dead_zone
+    direction = 1 if error > limit_up else (-1 if error < -limit_down else 0)
+    opening = numbers.opening if direction > 0 else (-numbers.opening if direction < 0 else 0)
+    return (opening if sound == 1 else 0), DeadZoneCounts(direction=direction, sound=sound)
+
+
+def dead_zone_update(
+    parameters: DeadZoneRows, state: DeadZoneCounts, reference: float, measurement: Measurement, period: float
+) -> tuple[float, DeadZoneCounts]:
+    """Command from -1 to 1 that ``dead_zone_sample`` gives for what the converter shows."""
+    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    command, after = dead_zone_sample(each(int, parameters.numbers), each(int, state), readings)
+    return float(command) / COMMAND_STEPS, each(float, after)
+
+
+def prepare_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
+    """Numbers of ``DeadZoneNumbers`` after the limits, for settings in SI units and a torque per count [N m]."""
+    # A release beyond the dead zone would close the valve before it opens.
+    zone, release = settings["dead_zone"], min(settings["release"], settings["dead_zone"])
+    counts = [float(min(LARGEST_READING, int(torque / torque_step + 0.5))) for torque in (zone, release)]
+    return (*counts, float(int(settings["opening"] * COMMAND_STEPS + 0.5)))
+
+
+def largest_dead_zone(settings: Mapping[str, float], period: float, torque_step: float) -> float:
+    """The dead zone over what its number can hold [-]."""
+    return settings["dead_zone"] / torque_step / LARGEST_READING
+
+
+_DEAD_ZONE_NUMBERS = (
+    *OF_LIMITS,
+    Quantity("dead_zone", "", "error at which the valve opens, in counts", None, 0.0, float(LARGEST_READING)),
+    Quantity("release", "", "error at which it closes again, in counts", None, 0.0, float(LARGEST_READING)),
+    Quantity("opening", "", "command while it is open, in steps", None, 0.0, float(COMMAND_STEPS)),
+)
+DEAD_ZONE_FIXED_POINT = fixed_point_kind(
+    FLOAT_DEAD_ZONE,
+    DeadZoneRows,
+    each(float, DeadZoneCounts(0, 1)),
+    dead_zone_update,
+    Numbers("on_off_dead_zone_fixed_point", (*OF_STEPS, *_DEAD_ZONE_NUMBERS), prepare_dead_zone, largest_dead_zone),
+)
+DEAD_ZONE = FixedLaw(
+    kind=DEAD_ZONE_FIXED_POINT,
+    sample=dead_zone_sample,
+    numbers=DeadZoneNumbers,
+    number_quantities=_DEAD_ZONE_NUMBERS,
+    begins=DeadZoneCounts(0, 1),
+    state_ranges={"direction": (-1, 1), "sound": (0, 1)},
+)

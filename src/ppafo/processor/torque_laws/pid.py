@@ -1,0 +1,213 @@
+"""PID on whole numbers: equation (13), with anti-windup and derivative filter as options.
+
+Commands are in 64 parts of a step while they are summed, the integral in 256 parts of these, the error in counts and
+its slope in 1/65536 counts a sample. What the float form has no limit for is limited far out: the integral at 32 full
+commands, the slope at 8191 counts a sample, what anti-windup pulls back by at 32 full commands.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from ppafo.control.controllers.feedback import PID as FLOAT_PID
+from ppafo.engine.source_text import each
+from ppafo.model.declaration import Quantity
+from ppafo.model.sensors import Measurement
+from ppafo.processor.fixed_point import (
+    COMMAND_STEPS,
+    FRACTION_BITS,
+    LARGEST_FRACTION,
+    LARGEST_READING,
+    MOST_PLACES,
+    OF_LIMITS,
+    OF_STEPS,
+    Limits,
+    Readings,
+    Steps,
+    converter_with,
+    error_of,
+    fraction_of,
+    gain_of,
+    limited,
+    read,
+    shifted,
+    still_sound,
+)
+from ppafo.processor.planning import Numbers, fixed_point_kind
+from ppafo.processor.torque_laws.law import FixedLaw
+
+PART_BITS = 6
+HALF_STEP = 2 ** (PART_BITS - 1)
+"""Half a step of the command, in parts of a step."""
+FULL = COMMAND_STEPS * 2**PART_BITS
+"""A command of 1 while it is summed, in parts of a step."""
+FINE_BITS = 8
+FINE = 2**FINE_BITS
+"""Parts of a part that the integral is kept in."""
+WIDE = 2**FRACTION_BITS
+"""What the error is multiplied by, so that ``fraction_of`` keeps all bits of its product with a gain."""
+SLOPE_UNIT = 65536
+"""Parts of a count that the slope is kept in."""
+LARGEST_CHANGE = 8191
+"""Largest change of the error [counts]: 8191 * 65536 is below 2^30, the largest value that ``fraction_of`` takes."""
+LARGEST_SLOPE = LARGEST_CHANGE * SLOPE_UNIT
+LARGEST_EXCESS = 32 * FULL
+"""Largest excess that anti-windup pulls back by, in parts of a step: with its fine parts it is below 2^30."""
+LARGEST_INTEGRAL = 32 * FULL * FINE
+"""Largest integral, in fine parts: below 2^30."""
+SHARE = float(2**FRACTION_BITS)
+"""A share of 1."""
+
+
+class PidNumbers(NamedTuple):
+    """Limits of the readings, gains as fractions of 15 bits and places, shares of filter and anti-windup in 1/2^15."""
+
+    limits: Limits
+    proportional: int
+    proportional_places: int
+    integral: int
+    integral_places: int
+    derivative: int
+    derivative_places: int
+    filter_share: int
+    anti_windup: int
+
+
+class PidCounts(NamedTuple):
+    """Integral [1/256 parts], last error [counts], slope [1/65536 counts], 1 once begun, 1 while readings are sound."""
+
+    integral: int
+    error: int
+    slope: int
+    started: int
+    sound: int
+
+
+class PidRows(NamedTuple):
+    """Steps of the converter, and what ``pid_sample`` is given."""
+
+    steps: Steps
+    numbers: PidNumbers
+
+
+def pid_sample(numbers: PidNumbers, state: PidCounts, readings: Readings) -> tuple[int, PidCounts]:
+    """Command in steps from -1000 to 1000 at a sample; 0, for good, once a reading was at an end of its range."""
+    sound = still_sound(state.sound, readings, numbers.limits)
+    error = error_of(readings, numbers.limits)
+    # Without a last error there is no change: no derivative kick at the first sample.
+    change = limited(error - state.error, LARGEST_CHANGE) if state.started == 1 else 0
+    slope = limited(
+        state.slope + fraction_of(change * SLOPE_UNIT - state.slope, numbers.filter_share),
+        LARGEST_SLOPE,
+    )
+    # Gains have 15 bits behind the point: an error of one count would be rounded away without as many of its own.
+    wide_error = error * WIDE
+    # The integral has 256 parts of a part: what a small error adds in one period is less than a part.
+    integral = state.integral + shifted(fraction_of(wide_error, numbers.integral), numbers.integral_places)
+    proportional = shifted(fraction_of(wide_error, numbers.proportional), numbers.proportional_places)
+    derivative = shifted(fraction_of(slope, numbers.derivative), numbers.derivative_places)
+    # Shifts and not divisions: both round down, in C of any compiler as in Python.
+    unlimited = proportional + (integral >> FINE_BITS) + derivative
+    command = limited(unlimited, FULL)
+    # Back-calculation, after the command: the integral of the next sample has it, as in equation (13) with floats.
+    excess = limited(command - unlimited, LARGEST_EXCESS)
+    integral = limited(integral + fraction_of(excess * FINE, numbers.anti_windup), LARGEST_INTEGRAL)
+    after = PidCounts(integral=integral, error=error, slope=slope, started=1, sound=sound)
+    # A half first: the shift rounds down.
+    return ((command + HALF_STEP) >> PART_BITS if sound == 1 else 0), after
+
+
+def pid_update(
+    parameters: PidRows, state: PidCounts, reference: float, measurement: Measurement, period: float
+) -> tuple[float, PidCounts]:
+    """Command from -1 to 1 that ``pid_sample`` gives for what the converter shows, once every ``period`` [s]."""
+    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    command, after = pid_sample(each(int, parameters.numbers), each(int, state), readings)
+    return float(command) / COMMAND_STEPS, each(float, after)
+
+
+class PidFactors(NamedTuple):
+    """What the law multiplies by: the error, in parts of a step a count, and in fine parts for the integral of it.
+
+    The slope, in parts of a step for 1/65536 count a sample times 2^15; and the shares [-] of a change that the slope
+    takes at once, and of the excess that the integral gives back at a sample.
+    """
+
+    proportional: float
+    integral: float
+    derivative: float
+    filter_share: float
+    anti_windup: float
+
+    @property
+    def gains(self) -> tuple[float, float, float]:
+        """The factors that are held as a fraction and places; the others are shares."""
+        return self.proportional, self.integral, self.derivative
+
+
+def pid_factors(settings: Mapping[str, float], period: float, torque_step: float) -> PidFactors:
+    """Return the factors for settings in SI units, a sample period [s] and a torque per count [N m]."""
+    # Gains of a torque [N m] and of seconds become gains of counts and samples.
+    count = torque_step * FULL
+    return PidFactors(
+        proportional=settings["proportional_gain"] * count,
+        integral=settings["integral_gain"] * period * count * FINE,
+        derivative=settings["derivative_gain"] / period * count * (WIDE / SLOPE_UNIT),
+        filter_share=period / (period + settings["derivative_filter"]),
+        anti_windup=settings["anti_windup"] * period,
+    )
+
+
+def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float) -> tuple[float, ...]:
+    """Return the numbers of ``PidNumbers`` after the limits: for settings in SI units, a period [s], a count [N m]."""
+    factors = pid_factors(settings, period, torque_step)
+    scaled = [number for gain in factors.gains for number in gain_of(gain)]
+    shares = [
+        float(min(LARGEST_FRACTION, int(share * SHARE + 0.5))) for share in (factors.filter_share, factors.anti_windup)
+    ]
+    return (*scaled, *shares)
+
+
+def largest_pid(settings: Mapping[str, float], period: float, torque_step: float) -> float:
+    """Return the largest factor over what its number can hold [-]; above 1 the settings are refused."""
+    factors = pid_factors(settings, period, torque_step)
+    return max(*factors.gains, factors.anti_windup * LARGEST_FRACTION) / LARGEST_FRACTION
+
+
+_MOST_OF_FRACTION, _MOST_PLACES = float(LARGEST_FRACTION), float(MOST_PLACES)
+_PID_NUMBERS = (
+    *OF_LIMITS,
+    Quantity("proportional", "", "k_p: part of a step for a count of the error", None, 0.0, _MOST_OF_FRACTION),
+    Quantity("proportional_places", "", "and the places it is shifted right by", None, 0.0, _MOST_PLACES),
+    Quantity("integral", "", "k_i: fine parts for a count of the error at each sample", None, 0.0, _MOST_OF_FRACTION),
+    Quantity("integral_places", "", "and the places it is shifted right by", None, 0.0, _MOST_PLACES),
+    Quantity("derivative", "", "k_d: part of a step for a change of the error", None, 0.0, _MOST_OF_FRACTION),
+    Quantity("derivative_places", "", "and the places it is shifted right by", None, 0.0, _MOST_PLACES),
+    Quantity(
+        "filter_share", "", "share of a change that the slope takes at once, in 1/2^15", None, 0.0, _MOST_OF_FRACTION
+    ),
+    Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
+)
+_PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
+_LARGEST_ERROR = 2 * LARGEST_READING
+"""In counts: reference from its middle and difference of the pressures are a whole range each at most."""
+PID_FIXED_POINT = fixed_point_kind(
+    FLOAT_PID,
+    PidRows,
+    each(float, _PID_BEGINS),
+    pid_update,
+    Numbers("pid_fixed_point", (*OF_STEPS, *_PID_NUMBERS), prepare_pid, largest_pid),
+)
+PID = FixedLaw(
+    kind=PID_FIXED_POINT,
+    sample=pid_sample,
+    numbers=PidNumbers,
+    number_quantities=_PID_NUMBERS,
+    begins=_PID_BEGINS,
+    state_ranges={
+        "integral": (-LARGEST_INTEGRAL, LARGEST_INTEGRAL),
+        "error": (-_LARGEST_ERROR, _LARGEST_ERROR),
+        "slope": (-LARGEST_SLOPE, LARGEST_SLOPE),
+        "started": (0, 1),
+        "sound": (0, 1),
+    },
+)

@@ -1,0 +1,119 @@
+"""Inputs of a run from a recording: command, supply pressures, external torque and angle, step by step."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ppafo.engine.lanes import RECORDED_ANGLE, StepInputs
+from ppafo.engine.run import Run
+from ppafo.errors import DataError
+from ppafo.parameters.device import Device
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats, between_samples
+from ppafo.simulation.recorded.channels import ANGLE, COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.clock import LONGEST_STEP
+
+_BEYOND_STOPS = 0.05
+"""Fraction of the range by which a measured angle may exceed a stop; up to there it is set to the stop."""
+_SUPPLY_PATH, _DORSIFLEXION_PATH = "plant.supply_pressure", "plant.dorsiflexion_pressure"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedInputs:
+    """Channels ``names`` of a recording that a run follows; ``start`` [s] of the recording is time 0 of the run."""
+
+    recording: Recording
+    names: tuple[str, ...]
+    start: float
+
+    def has(self, name: str) -> bool:
+        """Return whether the run follows this channel."""
+        return name in self.names
+
+
+def supply_paths(device: Device) -> tuple[str, ...]:
+    """Return the parameters that follow a recorded supply: both regulators, unless they have two pressures."""
+    return (_SUPPLY_PATH, _DORSIFLEXION_PATH) if device.supply.has_one_pressure else (_SUPPLY_PATH,)
+
+
+def with_highest_supply(device: Device, recording: Recording, followed: Collection[str]) -> Device:
+    """Return the device with the highest supply of the channels followed, for which the steps must be fine enough."""
+    supply = device.supply
+    recorded = {name: float(recording[name].max()) for name in (SUPPLY, DORSIFLEXION_SUPPLY) if name in followed}
+    highest = max(supply.pressure, recorded.get(SUPPLY, 0.0))
+    own_dorsiflexion = highest if supply.has_one_pressure else supply.dorsiflexion_pressure
+    highest_dorsiflexion = max(own_dorsiflexion, recorded.get(DORSIFLEXION_SUPPLY, 0.0))
+    return replace(device, supply=replace(supply, pressure=highest, dorsiflexion_pressure=highest_dorsiflexion))
+
+
+def step_inputs(inputs: RecordedInputs, device: Device, run: Run) -> StepInputs:
+    """Return what a run follows at each of its steps; ``device`` says which regulators follow the supply.
+
+    A run that follows the angle is one of ``with_prescribed_angle``. DataError for angles far beyond the stops.
+    """
+    command = _values_at_steps(inputs, COMMAND, run) if inputs.has(COMMAND) else None
+    # The parameters that follow a recording [SI], for every step.
+    followed: dict[str, Floats] = {}
+    if inputs.has(SUPPLY):
+        followed |= dict.fromkeys(supply_paths(device), _values_at_steps(inputs, SUPPLY, run))
+    if inputs.has(DORSIFLEXION_SUPPLY):
+        followed[_DORSIFLEXION_PATH] = _values_at_steps(inputs, DORSIFLEXION_SUPPLY, run)
+    if inputs.has(EXTERNAL_TORQUE):
+        followed["plant.external_torque"] = _values_at_steps(inputs, EXTERNAL_TORQUE, run)
+    if inputs.has(ANGLE):
+        followed |= _angle_path_at_steps(inputs, device, run)
+    return StepInputs(command, followed)
+
+
+def _values_at_steps(inputs: RecordedInputs, name: str, run: Run) -> Floats:
+    """Return an input [SI] at each step (steps,), as its recording declares it.
+
+    A change of a held one falls on the nearest step. One on a line is a mean over a step or, so that there are fewer
+    changes, a millisecond; a command over a step, as a valve answers within less.
+    """
+    if inputs.recording.is_held(name):
+        middle = run.step * np.arange(run.step_count, dtype=np.float64) + 0.5 * run.step
+    else:
+        together = 1 if name == COMMAND else max(1, min(run.steps_per_sample, round(LONGEST_STEP / run.step)))
+        first = (np.arange(run.step_count) // together * together).astype(np.float64)
+        middle = run.step * (first + 0.5 * together)
+    return between_samples(inputs.recording, name, middle, inputs.start)
+
+
+def _angle_path_at_steps(inputs: RecordedInputs, device: Device, run: Run) -> dict[str, Floats]:
+    """Return the straight piece of the angle that holds at each step: where it starts [s], level [rad], rate [rad/s].
+
+    After the last sample the vane stands still.
+    """
+    time = inputs.recording.time - inputs.start
+    angles = between_stops(inputs.recording[ANGLE], device, inputs.recording.label)
+    rates = np.append(np.diff(angles) / np.diff(time), 0.0)
+    begins = run.step * np.arange(run.step_count, dtype=np.float64)
+    # By the middle of a step: rounding may put a sample a little behind the step that begins with it.
+    piece = np.maximum(np.searchsorted(time, begins + 0.5 * run.step, side="right") - 1, 0)
+    return {"path.start": time[piece], "path.level": angles[piece], "path.rate": rates[piece]}
+
+
+def with_prescribed_angle(run: Run, angle: float) -> Run:
+    """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
+    program = replace(run.program, angle=RECORDED_ANGLE)
+    return replace(run, program=program, path=(0.0, angle, 0.0), needs_parts=True)
+
+
+def between_stops(angles: Floats, device: Device, file: str) -> Floats:
+    """Return angles [rad] as they are or, slightly beyond a stop, as the stop; DataError for those far beyond.
+
+    Its message begins with ``file``.
+    """
+    lowest, highest = device.actuator.angle_min, device.actuator.angle_max
+    margin = _BEYOND_STOPS * (highest - lowest)
+    worst = angles[int(np.argmax(np.maximum(lowest - angles, angles - highest)))]
+    if not lowest - margin <= worst <= highest + margin:
+        shown, low, high = np.degrees([worst, lowest, highest])
+        is_negative = lowest - margin <= float(-angles.max()) and float(-angles.min()) <= highest + margin
+        hint = "; with the other sign all angles would lie between them" if is_negative else ""
+        raise DataError(
+            f"{file}: 'angle' is {shown:.4g} deg, beyond the stops of {device.name}, {low:g} to {high:g} deg{hint}"
+        )
+    return np.clip(angles, lowest, highest)

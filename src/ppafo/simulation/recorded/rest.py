@@ -1,0 +1,96 @@
+"""Where a replay starts: angle and pressures that the samples before the first command show, noise averaged out."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.parameters.device import Device
+from ppafo.signals import Recording
+from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.channels import ANGLE, COMMAND
+from ppafo.simulation.recorded.inputs import between_stops
+
+REST_WINDOW = 0.05
+"""Seconds before the first command over which the start is averaged; short, so that no leak shows in it."""
+_FEWEST_ON_LINE = 8
+"""Samples below which no slope is told from noise: the first or last of them is taken."""
+_SEEN_SLOPE = 4.0
+"""Standard errors from which something moves: white noise at rest is that far off once in 16,000 times."""
+_ROUNDING = 1.0e-9
+"""Fraction of the largest value below which a slope is rounding of the least squares."""
+_DEVIATION_OF_MEDIAN = 1.4826
+"""Standard deviation over the median size of normal noise: 1 over the 0.75 quantile of the standard normal."""
+_LEAST_RANK = 1.0e-6
+"""Singular value over the largest from which powers of time count as independent of each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Angle [rad], angular velocity [rad/s] and pressures [Pa absolute] at the first sample."""
+
+    angle: float
+    angular_velocity: float
+    pressure_1: float
+    pressure_2: float
+
+
+def samples_at_rest(recording: Recording) -> int:
+    """Return the samples before the first command, at most 50 ms of them; 1 where the valve is open from the start."""
+    command, time = recording[COMMAND], recording.time
+    if command[0] != 0.0:
+        return 1
+    quiet = command.size if not command.any() else int(np.argmax(command != 0.0))
+    return max(1, min(quiet, int((time < time[0] + REST_WINDOW).sum())))
+
+
+def start_of(
+    recording: Recording, device: Device, known: Mapping[str, float], file: str, remedies: Mapping[str, str]
+) -> Start:
+    """Return where the replay of a recording starts: ``known`` values [SI] go before what its samples at rest show.
+
+    DataError, which begins with ``file``, for a channel that is not there, with the remedy for it.
+    """
+    count, values = samples_at_rest(recording), dict(known)
+    for name in (ANGLE, "pressure_1", "pressure_2", "angular_velocity"):
+        if name not in values and name in recording:
+            values[name] = value_at_rest(recording.time[:count], recording[name][:count])
+        elif name in remedies and name not in values:
+            raise DataError(f"{file}: there is no channel '{name}' to start from; {remedies[name]}")
+    angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
+    return Start(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
+
+
+def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:
+    """Return the value [SI] with which a stretch at rest begins, or ends: the mean of its samples if they do not move.
+
+    A chamber that leaks does move while valve and vane rest. Where a straight line has a slope that is seen, the value
+    is the line's; where the samples are seen to bend, the same of the half that is nearer.
+    """
+    while values.size >= _FEWEST_ON_LINE:
+        fraction = (time - (time[-1] if at_end else time[0])) / (time[-1] - time[0])
+        line, parabola = np.vander(fraction, 2), np.vander(fraction, 3)
+        if not _is_seen(line, values):
+            return float(np.mean(values))
+        if not _is_seen(parabola, values):
+            return float(np.linalg.lstsq(line, values)[0][-1])
+        nearer_half = slice(values.size // 2, None) if at_end else slice(None, values.size // 2)
+        time, values = time[nearer_half], values[nearer_half]
+    return float(values[-1 if at_end else 0])
+
+
+def _is_seen(columns: Floats, values: Floats) -> bool:
+    """Return whether the coefficient of the first column is far from 0 for the noise from sample to sample.
+
+    By the median of second differences, which neither a slope nor a jump changes.
+    """
+    # Samples that lie together in time, but for one, tell no bend from a slope.
+    if np.linalg.matrix_rank(columns, rtol=_LEAST_RANK) < columns.shape[1]:
+        return False
+    coefficients = np.linalg.lstsq(columns, values)[0]
+    # A second difference of white noise has the square root of 6 times its standard deviation: 1 + 4 + 1.
+    noise = _DEVIATION_OF_MEDIAN * float(np.median(np.abs(np.diff(values, n=2)))) / math.sqrt(6.0)
+    error = noise * math.sqrt(float(np.linalg.inv(columns.T @ columns)[0, 0]))
+    return bool(abs(coefficients[0]) > _SEEN_SLOPE * error + _ROUNDING * float(np.abs(values).max()))

@@ -1,0 +1,190 @@
+"""Column maps: which columns of a table from elsewhere are which channels, in which units and with which signs.
+
+A map is part of a TOML file, ``[columns.NAME]``. ``foreign.py`` reads a recording through one; ``mapped_text.py`` and
+``mapped_matlab.py`` take out of a file what a map asks for.
+"""
+
+from collections.abc import Collection, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from importlib import resources
+from itertools import islice
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ppafo.documents.models import StrictTable, Text, make_schema, read_model
+from ppafo.documents.toml_text import TomlKind
+from ppafo.errors import DataError, nearest_name, one_line, refused_as
+from ppafo.signals import RecordingKind
+from ppafo.signals.recording import TIME, Between, Floats
+from ppafo.storage.clock import ClockForm, DateOrder
+
+Thousands = Literal["point", "comma", "apostrophe", "blank"]
+
+
+class MappedChannel(StrictTable):
+    """Where one channel comes from: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
+
+    column: Annotated[
+        Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
+    ] = None
+    constant: Annotated[Text | None, Field(description="instead of a column: one value, such as '1 bar_a'")] = None
+    unit: Annotated[str, Field(description="unit of the value, such as 'bar_g'; '-' for a plain number")] = "-"
+    sign: Annotated[Literal[1, -1], Field(description="-1 where the file has the opposite sign")] = 1
+    factor: Annotated[float, Field(description="unit per number, for a sensor's volts")] = 1.0
+    offset: Annotated[float, Field(description="added after the factor, in unit")] = 0.0
+    times: Annotated[Text | None, Field(description="a quantity to multiply by, such as a lever arm '0.13 m'")] = None
+    thousands: Annotated[Thousands | None, Field(description="mark between groups of digits")] = None
+    between: Annotated[
+        Between | None,
+        Field(description="between two samples: 'hold' the earlier value, or 'linear'; left out, a command holds"),
+    ] = None
+    words: Annotated[
+        dict[str, float] | None,
+        Field(description="numbers for words in the column; direction knows up, down, auf, ab and others"),
+    ] = None
+    at: Annotated[
+        Text | None,
+        Field(description="reference condition of a volume flow: 'ANR', 'DIN 1343' or '0 degC, 1.01325 bar_a'"),
+    ] = None
+    gas: Annotated[
+        Text | None, Field(description="gas of a volume flow, such as 'air' or '0.044 kg/mol'; default: the set's")
+    ] = None
+    rate: Annotated[
+        Text | None, Field(description="of time alone, instead of a column: rows per second, such as '100 Hz'")
+    ] = None
+    date: Annotated[
+        Annotated[int, Field(ge=1)] | Text | None,
+        Field(description="of time alone: column of the date beside a time of day"),
+    ] = None
+    date_order: Annotated[
+        DateOrder | None, Field(description="of time alone: what comes first in a date such as 03/04/2026")
+    ] = None
+    clock: Annotated[ClockForm | None, Field(description="of time alone: what a time of day such as 08:10 is")] = None
+
+
+class MappedDirection(StrictTable):
+    """Direction (1 or -1, 0 for neither) from how fast a channel moves; sweeps one way are counted as repetitions."""
+
+    of: Annotated[Text, Field(description="channel whose rate decides")]
+    threshold: Annotated[Text, Field(description="slowest rate that counts, such as '2 mm/s'")]
+    window: Annotated[Text, Field(description="time over which the channel is smoothed, such as '0.2 s'")]
+    sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
+
+
+class ColumnMap(StrictTable):
+    """How a file is written and what its columns are."""
+
+    delimiter: Annotated[
+        Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
+    ] = "comma"
+    decimal: Annotated[Literal["point", "comma"], Field(description="decimal mark")] = "point"
+    encoding: Annotated[Literal["utf-8", "latin-1"], Field(description="encoding of the text")] = "utf-8"
+    header: Annotated[bool, Field(description="whether a line names the columns")] = True
+    skip_lines: Annotated[int, Field(ge=0, description="lines before the header, or before the first row")] = 0
+    skip_rows: Annotated[
+        int, Field(ge=0, description="rows below the header to leave out: a line of units, or numbers")
+    ] = 0
+    channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
+    direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
+
+
+class ColumnMaps(BaseModel):
+    """Column maps by name, as a file has them; a problem file of ``ppafo identify`` has more beside them."""
+
+    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
+
+    columns: Annotated[dict[str, ColumnMap], Field(min_length=1, description="column maps by name")]
+
+
+_FILE = TomlKind("file of column maps", "columns", resources.files("ppafo.storage"), DataError)
+
+
+def load_column_map(path: str | Path, name: str | None = None) -> ColumnMap:
+    """Return a column map of a TOML file by its name; without a name the file's only one.
+
+    DataError where it has no such map, or several and no name is given.
+    """
+    parsed, file = read_model(_FILE, ColumnMaps, path)
+    maps = parsed.columns
+    known = ", ".join(maps)
+    if name is None and len(maps) > 1:
+        raise DataError(f"{file}: has several column maps; name one as {file}:NAME; available: {known}")
+    if name is not None and name not in maps:
+        raise DataError(f"{file}: there is no column map '{name}'{nearest_name(name, maps)}; available: {known}")
+    return maps[name or next(iter(maps))]
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a file of column maps."""
+    return make_schema(ColumnMaps, "ppafo column maps")
+
+
+def column_map_of(columns: ColumnMap | str | Path) -> tuple[ColumnMap, str]:
+    """Return a map and what messages call it: one given as a file, ``logger.toml:bench``, has that name, others none.
+
+    DataError where the file has no such map.
+    """
+    if isinstance(columns, ColumnMap):
+        return columns, ""
+    text = str(columns)
+    path, separator, name = text.rpartition(".toml:")
+    return load_column_map(f"{path}.toml", name) if separator and name else load_column_map(text), text
+
+
+def in_map(map_name: str) -> AbstractContextManager[None]:
+    """Name the map in the DataErrors of a ``with`` block, if it has a name."""
+    return refused_as(DataError, f"column map {one_line(map_name)}", DataError) if map_name else nullcontext()
+
+
+_KEYS_OF_TIME = ("rate", "date", "date_order", "clock")
+
+
+def check_sources(columns: ColumnMap) -> None:
+    """Refuse a map without a time, a channel that comes from nowhere or from two places, and keys that mean nothing.
+
+    DataError names the key.
+    """
+    if TIME not in columns.channels:
+        raise DataError(f'has no channels.{TIME}; give a column, or {TIME} = {{ rate = "100 Hz" }}')
+    for name, mapped in columns.channels.items():
+        for key in () if name == TIME else _KEYS_OF_TIME:
+            if getattr(mapped, key) is not None:
+                raise DataError(f"channels.{name}.{key} is a key of channels.{TIME} alone")
+        sources = [key for key in ("column", "constant", "rate") if getattr(mapped, key) is not None]
+        if not sources:
+            allowed = "column, constant or rate" if name == TIME else "column or constant"
+            raise DataError(f"channels.{name} gives no {allowed}; give one of them")
+        if len(sources) > 1:
+            several = "both" if len(sources) == 2 else "all of"
+            raise DataError(f"channels.{name} gives {several} a {' and a '.join(sources)}; give one of them")
+
+
+class MappedTable(NamedTuple):
+    """What a map takes of a file.
+
+    ``numbers`` are the columns by channel, as the file has them. A time of day has its cells in ``clock``, and in
+    ``dates`` those of a column beside it. ``rows`` say where each sample stands in the file, as a number of what
+    ``noun`` calls it; ``kind`` is what the file says of its origin.
+    """
+
+    size: int
+    numbers: dict[str, Floats]
+    clock: list[str] | None
+    dates: list[str] | None
+    rows: Sequence[int]
+    noun: str
+    kind: RecordingKind
+
+
+LONGEST_SHOWN = 40
+"""Characters of a name or a cell that a message repeats."""
+_MOST_SHOWN = 20
+"""Names that a message lists."""
+
+
+def shown_names(names: Collection[str]) -> str:
+    """Return names as a message lists them: the first twenty, each in one short line."""
+    shown = ", ".join(one_line(name)[:LONGEST_SHOWN] for name in islice(names, _MOST_SHOWN))
+    return f"{shown}, ..." if len(names) > _MOST_SHOWN else shown

@@ -1,0 +1,307 @@
+"""What a column map takes of a table of text: cells become numbers, in the file's own units, row by row.
+
+Every refusal names line and column of the file, or the key of the map, and says how to go on.
+"""
+
+import csv
+import math
+import re
+from array import array
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import chain, islice
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.signals.recording import TIME
+from ppafo.storage.clock import is_clock
+from ppafo.storage.column_map import LONGEST_SHOWN, ColumnMap, MappedTable, in_map, shown_names
+from ppafo.storage.comma_separated import SPLIT_NUMBERS, kind_of_comments
+from ppafo.storage.files import text_of
+
+_DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
+_MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}
+"""Decimal marks, and marks between groups of digits, by their name in a map."""
+_COMMENT = "#"
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+_GROUPED = {
+    name: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(mark)}\d{{3}})+(?![\d{mark}])", re.ASCII)
+    for name, mark in _MARKS.items()
+}
+"""The whole part of a number with groups of three digits, by the name of the mark between them."""
+
+_SERIAL_MONITOR = re.compile(r"(\d{1,2}:\d{2}:\d{2}[.,]\d{3}) -> ")
+"""What the serial monitor of the Arduino IDE puts before each line."""
+_STAMP = "timestamp"
+"""Name of the column that its times become."""
+_STAMP_OF_HEADER = re.compile(r"^\d{1,2}:\d{2}:\d{2}\.\d{3}")
+_HEADER_WITHIN = 200
+"""Lines in which a header is looked for that is not where the map has it."""
+
+_DIRECTION = "direction"
+_UPWARDS = (
+    *("up", "rising", "rise", "increasing", "loading", "forward", "auf", "aufwärts", "steigend", "belastung"),
+    *("+", "↑"),
+)
+_DOWNWARDS = (
+    *("down", "falling", "fall", "decreasing", "unloading", "backward", "ab", "abwärts", "fallend", "entlastung"),
+    *("-", "\u2212", "↓"),
+)
+_WORDS_OF_DIRECTION = {
+    **dict.fromkeys(_UPWARDS, 1.0),
+    **dict.fromkeys(_DOWNWARDS, -1.0),
+    **dict.fromkeys(("none", "hold", "0"), 0.0),
+}
+"""What people write for directions; ``-`` alone and ``+`` too."""
+
+Rows = Iterator[tuple[int, list[str]]]
+"""Cells of a row, each with the line of the file in which it stands."""
+
+
+def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> MappedTable:
+    """Return what a map takes of a table of text, numbers in the file's own units.
+
+    DataError names line and column of a cell that is not usable; of a fault in the map its key, and the map where
+    ``map_name`` says which.
+    """
+    lines = text_of(content, columns.encoding, remedy='; give encoding = "latin-1" if it is that').splitlines()
+    if any(map(_SERIAL_MONITOR.match, lines)):
+        lines = _with_stamps_as_column(lines, columns)
+    with in_map(map_name):
+        table = _begin(lines, columns)
+        indices = _indices(table, columns, lines)
+        date = columns.channels[TIME].date
+        date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table, lines)
+    time_index = indices.get(TIME)
+    # A first row that is too short is refused with the others, below.
+    is_time_of_day = (
+        time_index is not None and time_index < len(table.first_row) and is_clock(table.first_row[time_index])
+    )
+    numbers = [
+        _numbers_of(name, index, table.title(index), columns)
+        for name, index in indices.items()
+        if not (name == TIME and is_time_of_day)
+    ]
+    clock: list[str] = []
+    dates: list[str] = []
+    last_index = max((*indices.values(), date_index or 0), default=0)
+    stamps = array("q")
+    # Row by row, so that no cell of a large file is kept as a text.
+    for line, row in table.rows:
+        _check_width(row, line, table, last_index, columns)
+        stamps.append(line)
+        for column in numbers:
+            column.values.append(column.number_in(row[column.index], line))
+        if is_time_of_day and time_index is not None:
+            clock.append(row[time_index])
+            if date_index is not None:
+                dates.append(row[date_index])
+    return MappedTable(
+        size=len(stamps),
+        numbers={column.channel: np.array(column.values) for column in numbers},
+        clock=clock if is_time_of_day else None,
+        dates=dates if is_time_of_day and date_index is not None else None,
+        rows=stamps,
+        noun="line",
+        kind=kind_of_comments(line for line in lines if line.startswith(_COMMENT)),
+    )
+
+
+def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
+    """Return the lines of a serial monitor with the time before each as a first column, called ``timestamp``."""
+    delimiter = _DELIMITERS.get(columns.delimiter, " ")
+    # A time that has a comma must not be two cells.
+    stamped = [_SERIAL_MONITOR.sub(lambda match: f"{match[1].replace(',', '.')}{delimiter}", line) for line in lines]
+    if not columns.header:
+        return stamped
+    for number in range(columns.skip_lines, len(stamped)):
+        if stamped[number].strip() and not stamped[number].startswith(_COMMENT):
+            stamped[number] = _STAMP_OF_HEADER.sub(_STAMP, stamped[number])
+            break
+    return stamped
+
+
+class _Table(NamedTuple):
+    """A table that was begun: names of the columns (none without a header), first row of numbers, and all rows."""
+
+    names: list[str]
+    first_row: list[str]
+    rows: Rows
+
+    def title(self, index: int) -> str:
+        """Return what messages call a column: its name, or its number from 1."""
+        return self.names[index] if self.names else str(index + 1)
+
+
+def _begin(lines: list[str], columns: ColumnMap) -> _Table:
+    """Return the table in the lines of a file; DataError where it has no header or no row of numbers."""
+    rows = _split(lines, columns)
+    head = next(rows, None)
+    if head is None:
+        skipped = f"after the {columns.skip_lines} of skip_lines = {columns.skip_lines}" if columns.skip_lines else ""
+        raise DataError(f"has no rows {skipped}".rstrip())
+    names = [name.strip() for name in head[1]] if columns.header else []
+    rows = islice(rows if columns.header else chain([head], rows), columns.skip_rows, None)
+    first = next(rows, None)
+    if first is None:
+        remedy = ": header = false, if the first line is one of numbers" if columns.header else ""
+        raise DataError(f"has no rows of numbers{remedy}")
+    return _Table(names, first[1], chain([first], rows))
+
+
+def _split(lines: list[str], columns: ColumnMap) -> Rows:
+    """Yield the cells of every line behind ``skip_lines`` that is neither blank nor a comment."""
+    for number, line in islice(enumerate(lines, start=1), columns.skip_lines, None):
+        if not line.strip() or line.startswith(_COMMENT):
+            continue
+        cells = _cells(line, number, columns)
+        if cells:
+            yield number, cells
+
+
+def _cells(line: str, number: int, columns: ColumnMap) -> list[str]:
+    """Return the cells of a line; DataError where its quotation marks do not fit."""
+    if columns.delimiter == "whitespace":
+        return line.split()
+    try:
+        return next(csv.reader([line], delimiter=_DELIMITERS[columns.delimiter], strict=True))
+    except csv.Error as error:
+        raise DataError(f"line {number} cannot be read: {error}") from error
+
+
+def _indices(table: _Table, columns: ColumnMap, lines: list[str]) -> dict[str, int]:
+    """Return the index of the column of each channel that has one."""
+    return {
+        name: _index_of(f"channels.{name}.column", mapped.column, table, lines)
+        for name, mapped in columns.channels.items()
+        if mapped.column is not None
+    }
+
+
+def _index_of(key: str, column: int | str, table: _Table, lines: list[str]) -> int:
+    """Return the index of a column, from 0, that the map has at ``key`` as a number from 1 or as a name."""
+    names = table.names
+    if isinstance(column, int):
+        count = len(names or table.first_row)
+        if column > count:
+            remedy = _other_delimiter(names or table.first_row, lambda cells: len(cells) >= column)
+            raise DataError(f"{key} = {column}: the file has {count} columns{remedy}")
+        return column - 1
+    if not names:
+        raise DataError(f"{key} = {column!r} names a column, but the file has no header; give its number")
+    numbers = [number for number, name in enumerate(names, start=1) if name == column]
+    if not numbers:
+        remedy = _other_delimiter(names, lambda cells: column in cells) or _other_line(lines, names, column)
+        hint = "" if remedy else nearest_name(column, names)
+        raise DataError(f"{key} = {column!r}: there is no such column{hint}; the file has {shown_names(names)}{remedy}")
+    if len(numbers) > 1:
+        shown = " and ".join(map(str, numbers))
+        raise DataError(f"{key}: columns {shown} are both called {column!r}; give the number of one")
+    return numbers[0] - 1
+
+
+def _other_delimiter(cells: list[str], is_there: Callable[[list[str]], bool]) -> str:
+    """Return the remedy where the first line with another delimiter would have what is missing, else nothing."""
+    for name, mark in _DELIMITERS.items():
+        split_again = [part.strip() for cell in cells for part in cell.split(mark)]
+        if split_again != cells and is_there(split_again):
+            return f'; give delimiter = "{name}"'
+    return ""
+
+
+def _other_line(lines: list[str], names: list[str], column: str) -> str:
+    """Return how many lines to skip where a line further down is the header, else nothing."""
+    for number, line in enumerate(lines[:_HEADER_WITHIN]):
+        for name, mark in _DELIMITERS.items():
+            cells = [cell.strip() for cell in line.split(mark)]
+            if column in cells and cells != names:
+                return f'; line {number + 1} has it: give skip_lines = {number} and delimiter = "{name}"'
+    return ""
+
+
+def _check_width(row: list[str], line: int, table: _Table, last_index: int, columns: ColumnMap) -> None:
+    """Refuse a row that has not as many cells as the header or the first row, beside empty ones at its end."""
+    width, first_width = len(row), len(table.first_row)
+    expected = len(table.names) or first_width
+    while width > expected and not row[width - 1].strip():
+        width -= 1
+    # A header may name columns at its end that no row has.
+    if width == expected or (width == first_width and first_width < expected and last_index < width):
+        return
+    is_split = columns.delimiter == "comma" and width == 2 * expected
+    remedy = f"; {SPLIT_NUMBERS}" if is_split else ""
+    if line <= columns.skip_lines + 2 and not is_split:
+        remedy = "; where the table begins further down, give skip_lines"
+    raise DataError(f"line {line} has {len(row)} values for {expected} columns{remedy}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Numbers:
+    """A column of numbers: its channel, its index, what messages call it, how its cells are written, and the values."""
+
+    channel: str
+    index: int
+    title: str
+    decimal: str
+    thousands: str | None
+    words: Mapping[str, float]
+    values: "array[float]" = field(default_factory=lambda: array("d"))
+
+    def number_in(self, cell: str, line: int) -> float:
+        """Return the number in a cell, or the one for a word that the channel knows; DataError for anything else."""
+        text = cell.strip()
+        for word, value in self.words.items():
+            if word.lower() == text.lower():
+                return value
+        text = self._with_point(self._without_groups(text, line))
+        value = float(text) if _NUMBER.fullmatch(text) else math.nan
+        if not math.isfinite(value):
+            raise self._refusal(line, f"{_shown(cell)} is not a finite number", self._remedy(cell))
+        return value
+
+    def _without_groups(self, text: str, line: int) -> str:
+        """Return a number without the marks between its groups of digits: without its mark 1.5 would be 15."""
+        if self.thousands is None or _MARKS[self.thousands] not in text:
+            return text
+        grouped = _GROUPED[self.thousands].match(text)
+        if grouped is None:
+            fault = f'does not have groups of three digits, as thousands = "{self.thousands}" says'
+            raise self._refusal(line, f"{_shown(text)} {fault}")
+        return grouped.group().replace(_MARKS[self.thousands], "") + text[grouped.end() :]
+
+    def _with_point(self, text: str) -> str:
+        """Return a number with a decimal point; a point that is no mark of the file makes the text no number."""
+        return text if self.decimal == "point" else text.replace(".", "?").replace(_MARKS[self.decimal], ".")
+
+    def _remedy(self, cell: str) -> str:
+        """Return what to do about a cell that is no number, as the end of a message."""
+        if self.words:
+            return f"; known words: {shown_names(self.words)}; others in channels.{self.channel}.words"
+        if self.decimal == "point" and "," in cell and _NUMBER.fullmatch(cell.strip().replace(",", ".")):
+            return '; give decimal = "comma"'
+        return "; it is a time of day" if is_clock(cell) and self.channel != TIME else ""
+
+    def _refusal(self, line: int, fault: str, remedy: str = "") -> DataError:
+        return DataError(f"line {line}, column {self.title!r}: {fault} (channels.{self.channel}.column){remedy}")
+
+
+def _numbers_of(channel: str, index: int, title: str, columns: ColumnMap) -> _Numbers:
+    """Return the column of a channel, still empty; of words, a direction knows the usual ones."""
+    mapped = columns.channels[channel]
+    words = mapped.words
+    if words is None:
+        words = _WORDS_OF_DIRECTION if channel == _DIRECTION else {}
+    return _Numbers(
+        channel=channel,
+        index=index,
+        title=title,
+        decimal=columns.decimal,
+        thousands=mapped.thousands,
+        words=words,
+    )
+
+
+def _shown(cell: str) -> str:
+    return repr(one_line(cell)[:LONGEST_SHOWN])

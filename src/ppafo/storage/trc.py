@@ -1,0 +1,92 @@
+"""Tables of markers over time, ``.trc``, as systems of motion capture and OpenSim write them.
+
+Lines 1 to 3 are ``PathFileType 4 (X/Y/Z) NAME``, names of the header's values, and these. Line 4 has ``Frame#``,
+``Time`` and a name for every three columns, line 5 ``X1 Y1 Z1 ...``; then come the rows. A marker that was not seen
+leaves its cells empty, or has ``nan``.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.errors import DataError, one_line
+from ppafo.signals.recording import TIME, Floats
+from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
+from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, text_lines
+
+_FIRST_WORD = "PathFileType"
+_HEAD_LINES = 5
+_UNITS = ("mm", "cm", "m")
+_UNSEEN = ("", "nan")
+"""What stands for the coordinates of a marker that was not seen."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MarkerTable:
+    """Markers over time [s]: coordinates (3, frames) by name in ``unit``; NaN where a marker was not seen.
+
+    ``remarks`` say which have the names of others in the file.
+    """
+
+    time: Floats
+    markers: Mapping[str, Floats]
+    unit: str
+    remarks: tuple[str, ...] = ()
+
+
+def read_trc(path: str | Path) -> MarkerTable:
+    """Return the markers in a ``.trc`` file; DataError names file, line and what is wrong."""
+    try:
+        lines = text_lines(path)
+        if not lines[0].startswith(_FIRST_WORD) or len(lines) <= _HEAD_LINES:
+            raise DataError(
+                f"is not a .trc file: its first line begins with '{_FIRST_WORD}', and five lines come before rows"
+            )
+        unit = dict(zip(lines[1].split(), lines[2].split(), strict=False)).get("Units", "")
+        if unit not in _UNITS:
+            shown = one_line(unit)[:LONGEST_SHOWN]
+            raise DataError(f"line 3: Units is {shown!r}; allowed are {', '.join(_UNITS)}")
+        written = _names(lines[3])
+        names = told_apart(written)
+        time, coordinates = _rows(lines, names)
+    except DataError as error:
+        raise DataError(f"{path}: {error}".replace(f"{path}: {path}:", f"{path}:")) from error
+    twins = doubled(written, names)
+    markers = without_copies(dict(zip(names, coordinates, strict=True)), twins)
+    return MarkerTable(time, markers, unit, tuple(said_of_doubled(twins, markers, "markers")))
+
+
+def _names(line: str) -> list[str]:
+    """Return the names of the markers in line 4, which come after the names of frame and time."""
+    cells = [cell.strip() for cell in line.split("\t")]
+    if len(cells) < 3 or cells[1].lower() != "time":
+        raise DataError("line 4: must begin with 'Frame#', 'Time' and the names of markers, separated by tabs")
+    names = [name for name in cells[2:] if name]
+    if not names:
+        raise DataError("line 4: names no marker; every marker needs a name of its own")
+    return names
+
+
+def _rows(lines: list[str], names: list[str]) -> tuple[Floats, list[Floats]]:
+    """Return the time [s] of the frames, and the coordinates (3, frames) of each marker in the file's unit."""
+    labels = [f"{axis} of {name}" for name in names for axis in "XYZ"]
+    width = 2 + len(labels)
+    numbers = [number for number, line in enumerate(lines, 1) if number > _HEAD_LINES and line.strip()]
+    rows = []
+    for number in numbers:
+        line = lines[number - 1]
+        cells = [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
+        if len(cells) > width and any(cells[width:]):
+            raise DataError(f"line {number} has {len(cells)} values for {width} columns")
+        # Cells that are not there belong to markers that were not seen.
+        cells = [*cells, *[""] * (width - len(cells))][:width]
+        time = number_in(cells[1], number, TIME)
+        coordinates = [number_in(cell, number, label, _UNSEEN) for cell, label in zip(cells[2:], labels, strict=True)]
+        rows.append([time, *coordinates])
+    if not rows:
+        raise DataError("has no rows")
+    values = np.array(rows)
+    check_growing(values[:, 0], numbers)
+    return values[:, 0], [values[:, 1 + 3 * index : 4 + 3 * index].T for index in range(len(names))]

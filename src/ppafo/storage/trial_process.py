@@ -1,0 +1,55 @@
+"""The process that reads a file first, with little memory; ``trial_reading.py`` starts it.
+
+It is ``python -m ppafo.storage.trial_process READER LIBRARY PATH``. READER is a function of the package,
+``MODULE:NAME``, and LIBRARY the module of C code that it uses.
+"""
+
+import os
+import pkgutil
+import sys
+from importlib import import_module
+from pathlib import Path
+
+from ppafo.errors import DataError
+from ppafo.storage.trial_reading import OUT_OF_MEMORY, REFUSED
+
+_ALWAYS_ALLOWED = 400_000_000
+"""Bytes of memory that reading any file may take."""
+_MAXIMUM_GROWTH = 100
+"""How many times its own size [-] reading a larger file may take."""
+
+
+def read_on_trial(reader: str, library: str, path: str) -> int:
+    """Return the exit code of reading a file: 0, ``REFUSED`` with the reason on the output, or ``OUT_OF_MEMORY``."""
+    # What the libraries take themselves does not count.
+    import_module(library)
+    read = pkgutil.resolve_name(reader)
+    _limit_memory(Path(path).stat().st_size)
+    try:
+        read(path)
+    except DataError as error:
+        sys.stdout.buffer.write(os.fsencode(str(error)))
+        return REFUSED
+    except MemoryError:
+        return OUT_OF_MEMORY
+    return 0
+
+
+def _limit_memory(file_bytes: int) -> None:
+    """Let this process take no more memory than a file of a size may need, beside what it has; only Linux can that."""
+    sizes = Path("/proc/self/statm")
+    if not sizes.exists():
+        return
+    import resource
+
+    pages_taken = int(sizes.read_text().split()[0])
+    taken = pages_taken * resource.getpagesize()
+    limit = taken + max(_ALWAYS_ALLOWED, _MAXIMUM_GROWTH * file_bytes)
+    highest = resource.getrlimit(resource.RLIMIT_AS)[1]
+    if highest != resource.RLIM_INFINITY:
+        limit = min(limit, highest)
+    resource.setrlimit(resource.RLIMIT_AS, (limit, highest))
+
+
+if __name__ == "__main__":
+    sys.exit(read_on_trial(*sys.argv[1:]))

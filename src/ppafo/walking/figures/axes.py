@@ -1,0 +1,19 @@
+"""What figures over the time of a walk share: the axis of time, kinds of numbers, the look of their lines."""
+
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark
+from ppafo.report.style import GREY
+
+GAS = Kind("Gas taken", "kg", "gas mass")
+TOES = Kind("Toe height above ground", "m", "body length")
+GROUND = Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8})
+"""The height at which the toes touch."""
+THIN = {"linewidth": 0.8}
+"""Look of a curve that swings in every stride."""
+_LONG = 120.0
+"""Time [s] above which the axis is in minutes."""
+
+
+def time_axis(end: float) -> Kind:
+    """Return the kind of the axis of a walk that ends at a time [s]: seconds, or minutes of a long one."""
+    return Kind("Time", "s", "duration") if end > _LONG else TIME

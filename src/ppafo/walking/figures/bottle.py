@@ -1,0 +1,126 @@
+"""A walk on its bottle over time: pressures, temperatures, peak torques, and the gas that is left."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.report.display_units import display_value
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel, draw_panels
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
+from ppafo.walking.bottle import SupplyCourse
+from ppafo.walking.figures.axes import time_axis
+from ppafo.walking.result import WalkResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_DASHED = {"linestyle": "--", "linewidth": 1.2}
+_TEMPERATURES = (
+    ("bottle_temperature", "bottle", BLUE),
+    ("regulator_temperature", "regulator", BLACK),
+    ("outlet_temperature", "gas behind it", ORANGE),
+    ("gas_temperature", "gas at the device", GREEN),
+)
+"""Rows of the supply, with their names in the legend and colours."""
+_MASSES = (("bottle_mass", "total gas", BLUE), ("liquid_mass", "liquid", GREEN))
+"""Rows of the supply, with their names in the legend and colours; a gas that has no liquid has no row of it."""
+_LEAST_TORQUE = 0.1
+"""Torque [N m] up to which the axis goes at least."""
+_MOST_IN_AXES = 3
+"""Marks of a panel up to which its legend has room above it in the usual form."""
+
+
+def bottle_figure(result: WalkResult) -> "Figure":
+    """Return the figure of a walk on its bottle; below it stands what ended it."""
+    supply, recording, peaks = result.supply, result.recording, result.peak_torques
+    assert supply is not None, "drawn for a walk on a bottle"
+    times, values = supply.times, supply.values
+    end = float(recording.time[-1])
+    dots = {"marker": ".", "markersize": 2.5, "linewidth": 0.8}
+    torque = [Mark("line", recording.time[result.starts[:-1]] if peaks.size else peaks, peaks, style=dots)]
+    left = [
+        Mark("line", times, values[name], label=label, colour=colour)
+        for name, label, colour in _MASSES
+        if name in values
+    ]
+    panel = partial(_panel, end, Mark("at", supply.ending.time, colour=VERMILION, style={"linewidth": 1.0}))
+    return draw_panels(
+        [
+            panel(Kind("Pressure behind the regulator", "Pa_a", "pressure"), _marks_behind(result, supply)),
+            panel(
+                Kind("Pressure in the bottle", "Pa_a", "pressure"),
+                _marks_inside(supply),
+                largest=float(np.max(values["bottle_pressure"])),
+            ),
+            panel(Kind("Temperature", "K", "temperature"), _temperature_marks(supply)),
+            panel(
+                Kind("Peak torque of each stride", "N m", "torque"),
+                torque,
+                largest=float(peaks.max(initial=_LEAST_TORQUE)),
+            ),
+            panel(Kind("Left in the bottle", "kg", "gas mass"), left, largest=supply.supply.mass),
+        ],
+        size=(8.1, 1.75),
+        title=f"{result.scenario.name} on {supply.supply.bottle.name}",
+        note=f"End: {supply.ending.message}.",
+        kind=recording.kind,
+    )
+
+
+def _marks_behind(result: WalkResult, supply: SupplyCourse) -> list[Mark]:
+    """Return what the regulator delivers at most, and lowest and highest of each stride of what the line has."""
+    recording, starts = result.recording, result.starts
+    delivered = supply.values["regulated_pressure"]
+    marks = [Mark("line", supply.times, delivered, label="delivered at most", colour=GREY, style=_DASHED)]
+    if starts.size > 1:
+        line = recording["line_pressure_1"]
+        lowest, highest = (pick.reduceat(line, starts)[:-1] for pick in (np.minimum, np.maximum))
+        look = {"alpha": 0.3}
+        marks.append(
+            Mark("band", recording.time[starts[:-1]], (lowest, highest), label="line, in a stride", style=look)
+        )
+    return marks
+
+
+def _marks_inside(supply: SupplyCourse) -> list[Mark]:
+    """Return the pressure in the bottle, and the one that the regulator needs there."""
+    regulator = supply.supply.bottle.regulator
+    needed = regulator.set_pressure + regulator.pressure_margin
+    return [
+        Mark("level", y=needed, label="needed", colour=VERMILION, style=_DASHED),
+        Mark("line", supply.times, supply.values["bottle_pressure"], label="bottle"),
+    ]
+
+
+def _temperature_marks(supply: SupplyCourse) -> list[Mark]:
+    """Return the temperatures on the way of the gas, and that of dry ice where the gas may freeze."""
+    marks = [
+        Mark("line", supply.times, supply.values[name], label=label, colour=colour)
+        for name, label, colour in _TEMPERATURES
+    ]
+    if supply.supply.line.freezes > 0.5:
+        dry_ice = supply.supply.line.temperatures[0]
+        marks.append(Mark("level", y=dry_ice, label="dry ice", colour=VERMILION, style=_DASHED))
+    return marks
+
+
+def _panel(end: float, ended: Mark, kind: Kind, marks: Sequence[Mark], largest: float | None = None) -> Panel:
+    """Return a panel up to the end of the walk [s] with a line where its bottle ended it.
+
+    Where a largest value [SI] is given, its axis begins at 0 and shows that value.
+    """
+    axis = time_axis(end)
+
+    def set_limits(axes: "Axes") -> None:
+        axes.set_xlim(0.0, 1.005 * float(axis.values(end)))
+        axes.locator_params(axis="y", nbins=5)
+        if len(marks) > _MOST_IN_AXES:
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderaxespad=0.1, handlelength=1.2)
+        if largest is not None:
+            axes.set_ylim(0.0, 1.08 * display_value(largest, kind.quantity))
+
+    return Panel(axis, kind, [*marks, ended], then=set_limits, shares_x=True)

@@ -1,0 +1,138 @@
+"""A task sequence over time, with the device and without it: pace, angle, forces, torque, toes and gas by segment."""
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.gait.gait import clinical_angle
+from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
+from ppafo.report.kind import TIME, Kind
+from ppafo.report.panels import Mark, Panel, draw_panels
+from ppafo.report.style import BLACK, GREY
+from ppafo.signals.recording import Floats, Recording
+from ppafo.walking.events import acting_phase
+from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
+from ppafo.walking.figures.mean_stride import ANGLE, WITH, WITHOUT
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_PHASES = {
+    LANDING: ("landing", "#f6d5bd"),
+    MID_STANCE: ("mid-stance", "#e4e4e4"),
+    PUSH_OFF: ("push-off", "#8fbfe0"),
+    SWING: ("swing", "#f0b48a"),
+}
+"""Name and colour of each phase in the strip under the torque."""
+_SHADED, _LESS_HELP = "#f3f3f3", "#cc3311"
+_NARROWEST = 0.045
+"""Fraction of the task sequence below which the name of a segment stands upright."""
+_ROOM = 2.2
+"""Height of the panel of the pace over its curve, for the names of the segments above it."""
+_STRIP, _STRIP_GAP = 0.18, 0.05
+"""Height of the strip of phases and its distance below the torque, as fractions of the torque's range."""
+_LEAST_RANGE = 1.0e-3
+"""Range of the torque [N m] that the strip has its height of where the torque is 0 throughout."""
+
+
+def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
+    """Return a task sequence over time with the device (and without it); needs a recording of at least two samples."""
+    recording, time = worn.recording, worn.recording.time
+    walks = {WITHOUT: bare.recording, WITH: worn.recording}
+    angles = [
+        Mark("line", walk.time, clinical_angle(walk["angle"]), colour=colour, style=THIN)
+        for colour, walk in walks.items()
+    ]
+    toes = [Mark("line", walk.time, walk["toe_height"], colour=colour, style=THIN) for colour, walk in walks.items()]
+    forces = [
+        Mark("line", time, recording["heel_force"], label="heel", colour=BLACK, style=THIN),
+        Mark("line", time, recording["toe_force"], label="toes", colour=GREY, style=THIN),
+    ]
+    torque = [Mark("line", time, recording["torque"], colour=WITH, style=THIN), *_phase_strip(recording)]
+    marks_by_kind = {
+        ANGLE: angles,
+        Kind("Force under heel and toes", "N", "force"): forces,
+        Kind("Actuator torque; strip: controller", "N m", "torque"): torque,
+        TOES: [GROUND, *toes],
+        GAS: [Mark("line", time, recording["supplied_mass"], colour=WITH)],
+    }
+    segments, set_limits = _segment_marks(worn), partial(_set_limits, float(time[-1]))
+    panels = [_pace_panel(worn, segments)]
+    panels += [
+        Panel(TIME, kind, [*segments, *marks], then=set_limits, shares_x=True) for kind, marks in marks_by_kind.items()
+    ]
+    sequence = walk_of(worn.scenario).task_sequence
+    return draw_panels(
+        panels,
+        size=(9.1, 1.45),
+        title=f"{worn.scenario.name}, task sequence {'' if sequence is None else sequence.name}",
+        note="blue: with the device; orange: without it; red line: the controller helps less",
+        kind=recording.kind,
+    )
+
+
+def _segment_marks(worn: WalkResult) -> list[Mark]:
+    """Return every other segment on grey, and a line where the controller helps less."""
+    behind: dict[str, Any] = {"alpha": 1.0, "zorder": 0}
+    shaded = [Mark("span", (part.start, part.end), colour=_SHADED, style=behind) for part in worn.segments[1::2]]
+    losses = [part.safe_time for part in worn.segments if part.safe_time is not None]
+    return [*shaded, *(Mark("at", loss, colour=_LESS_HELP, style={"linewidth": 1.2}) for loss in losses)]
+
+
+def _pace_panel(worn: WalkResult, segments: list[Mark]) -> Panel:
+    """Return the walking speed, or strides per second where there is none, under the names of the segments."""
+    recording = worn.recording
+    has_speed = "walking_speed" in recording
+    kind = Kind("Walking speed", "m/s", "velocity") if has_speed else Kind("Strides per second", "Hz", "frequency")
+    pace = recording["walking_speed" if has_speed else "stride_frequency"]
+    curve = Mark("line", recording.time, pace, colour=BLACK)
+    return Panel(TIME, kind, [*segments, curve], then=partial(_name_segments, worn, pace), shares_x=True)
+
+
+def _name_segments(worn: WalkResult, pace: Floats, axes: "Axes") -> None:
+    """Name the segments above the curve of the pace, with room for that."""
+    end = float(worn.recording.time[-1])
+    for segment in worn.segments:
+        is_narrow = segment.end - segment.start < _NARROWEST * end
+        axes.text(
+            0.5 * (segment.start + segment.end),
+            0.96,
+            segment.kind,
+            transform=axes.get_xaxis_transform(),
+            rotation=90.0 if is_narrow else 0.0,
+            ha="center",
+            va="top",
+            fontsize=8,
+            color=GREY,
+        )
+    axes.set_ylim(-0.05 * float(pace.max()), _ROOM * float(pace.max()) + 0.01)
+    _set_limits(end, axes)
+
+
+def _set_limits(end: float, axes: "Axes") -> None:
+    axes.set_xlim(0.0, end)
+    axes.locator_params(axis="y", nbins=4)
+
+
+def _phase_strip(recording: Recording) -> list[Mark]:
+    """Return the phase in which the device acts, as a strip under the curve of the torque."""
+    if "controller_phase" not in recording:
+        return []
+    acting, torque = acting_phase(recording), recording["torque"]
+    height = max(float(np.ptp(torque)), _LEAST_RANGE)
+    top = np.full(acting.size, float(torque.min()) - _STRIP_GAP * height)
+    return [
+        Mark(
+            "band",
+            recording.time,
+            (top - _STRIP * height, top),
+            label=name,
+            colour=colour,
+            style={"alpha": 1.0, "where": acting == phase, "step": "post"},
+        )
+        for phase, (name, colour) in _PHASES.items()
+    ]

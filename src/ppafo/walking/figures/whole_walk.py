@@ -1,0 +1,134 @@
+"""A whole walk over time: gas, toes, phase of the controller, level of help; with failures, pauses and the stop."""
+
+from collections.abc import Mapping
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ppafo.model.helping import HELPS, LIFTS, PAUSED, STOPPED
+from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark, Panel, draw_panels
+from ppafo.report.style import BLACK, GREY, VERMILION
+from ppafo.signals.recording import Recording
+from ppafo.walking.events import acting_phase, failure_times
+from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES, time_axis
+from ppafo.walking.result import WalkResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_LEVELS = {
+    HELPS: ("help", "#cfe3c9"),
+    LIFTS: ("lift", "#e6e2a8"),
+    PAUSED: ("pause", "#f3d27a"),
+    STOPPED: ("stop", "#e08a8a"),
+}
+"""Name and colour of each level of help."""
+_PHASES = ("swing", "heel", "free", "push")
+"""Names of the phases, whose numbers count from 0."""
+_NAMED_STRETCH = 0.06
+"""Fraction of the walk from which a stretch at one level of help is wide enough for its name."""
+_APART = 0.2
+"""Fraction of the walk within which failures have one label; others are in two rows in turn."""
+_ROW = 0.16
+"""Distance of the two rows of labels, as a fraction of the panel."""
+_TURNS = 0.6
+"""Fraction of the walk from which on a label stands left of its line, so that it stays inside."""
+_ROOM = 1.4
+"""Height of the panel of the gas over its curve, for the labels above it."""
+
+
+def whole_walk_figure(result: WalkResult) -> "Figure":
+    """Return gas, toe height, phase and level of help over the time of a walk, with faults, pauses and the stop."""
+    recording, time = result.recording, result.recording.time
+    end = float(time[-1])
+    axis = time_axis(end)
+    failed = {name: failure for name, failure in failure_times(result.scenario).items() if failure < end}
+    losses = [event.time for event in result.events if event.fault_flag is not None]
+    lines = [Mark("at", loss, colour=VERMILION, style={"linewidth": 0.9}) for loss in losses]
+    dashed = {"linewidth": 0.9, "linestyle": "--"}
+    lines += [Mark("at", failure, colour=GREY, style=dashed) for failure in failed.values()]
+    name_failures = partial(_name_failures, failed, end, axis)
+    phase = Kind("Phase of the controller")
+    panels = [
+        Panel(axis, GAS, [Mark("line", time, recording["supplied_mass"]), *lines], then=name_failures, shares_x=True),
+        Panel(axis, TOES, [Mark("line", time, recording["toe_height"], style=THIN), GROUND, *lines], shares_x=True),
+        Panel(axis, phase, [*_phase_marks(recording), *lines], then=_name_phases, shares_x=True),
+    ]
+    if "safe_state" in recording:
+        panels.append(_level_panel(recording, axis))
+    title = f"{result.scenario.name}: the whole walk"
+    figure = draw_panels(panels, size=(9.1, 1.5), title=title, kind=recording.kind)
+    # Panels that share an axis take the limits of the one below when they are joined, so limits come last.
+    figure.axes[0].set_xlim(0.0, float(axis.values(end)))
+    return figure
+
+
+class _Label(NamedTuple):
+    """Failures that are named together: the time of the first [s], and the names."""
+
+    time: float
+    names: list[str]
+
+
+def _name_failures(failed: Mapping[str, float], end: float, axis: Kind, axes: "Axes") -> None:
+    """Name what fails beside its line, with room for that above the curve; ``failed`` and ``end`` are times [s]."""
+    axes.set_ylim(top=_ROOM * axes.get_ylim()[1])
+    labels: list[_Label] = []
+    for part, time in failed.items():
+        # Labels of failures that are close would cover each other.
+        if not labels or time - labels[-1].time >= _APART * end:
+            labels.append(_Label(time, []))
+        labels[-1].names.append(part.replace("_", " "))
+    for number, label in enumerate(labels):
+        verb = "fails" if len(label.names) == 1 else "fail"
+        axes.annotate(
+            f"{', '.join(label.names)} {verb}",
+            (float(axis.values(label.time)), 0.98 - _ROW * (number % 2)),
+            xycoords=("data", "axes fraction"),
+            ha="left" if label.time < _TURNS * end else "right",
+            va="top",
+            fontsize=8.5,
+            color=GREY,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+        )
+
+
+def _phase_marks(recording: Recording) -> list[Mark]:
+    """Return the phase in which the device acts, where its controller sees phases."""
+    if "controller_phase" not in recording:
+        return []
+    look = {"linewidth": 0.9, "drawstyle": "steps-post"}
+    return [Mark("line", recording.time, acting_phase(recording), colour=BLACK, style=look)]
+
+
+def _name_phases(axes: "Axes") -> None:
+    axes.set_yticks(range(len(_PHASES)), _PHASES)
+    axes.set_ylim(-0.3, len(_PHASES) - 0.7)
+
+
+def _level_panel(recording: Recording, axis: Kind) -> Panel:
+    """Return the strip of help, pause and stop, with the name of each stretch that is wide enough."""
+    time, level = recording.time, recording["safe_state"]
+    edges = np.flatnonzero(np.diff(level, prepend=-1.0, append=-1.0))
+    marks: list[Mark] = []
+    names: dict[float, str] = {}
+    for first, last in pairwise(edges.tolist()):
+        name, colour = _LEVELS[float(level[first])]
+        begin, end = float(time[first]), float(time[min(last, time.size - 1)])
+        marks.append(Mark("span", (begin, end), colour=colour, style={"alpha": 1.0}))
+        if end - begin > _NAMED_STRETCH * time[-1]:
+            names[float(axis.values(0.5 * (begin + end)))] = name
+    return Panel(axis, Kind("Level of help"), marks, then=partial(_name_levels, names), tall=0.55, shares_x=True)
+
+
+def _name_levels(names: Mapping[float, str], axes: "Axes") -> None:
+    """Write names in the middle of their stretches, whose places on the axis are their keys."""
+    for middle, name in names.items():
+        axes.text(middle, 0.5, name, ha="center", va="center", fontsize=9.0)
+    axes.set_ylim(0.0, 1.0)
+    axes.set_yticks([])
+    axes.grid(visible=False)
