@@ -22,7 +22,7 @@ from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.loading import set_or_load
-from ppafo.parameters.overrides import split_override
+from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
@@ -30,10 +30,12 @@ from ppafo.simulation.loading import (
     Layout,
     ScenarioRequest,
     assumed_lines,
+    origin_of,
     read_device,
     read_gas_model,
     read_hardware,
     read_supply_line,
+    request_again,
     scenario_of,
 )
 from ppafo.simulation.motion_kind import MOTIONS, WALK
@@ -43,7 +45,6 @@ from ppafo.simulation.scenario import (
     Assumption,
     Control,
     Initial,
-    Origin,
     RunSettings,
     Scenario,
     Sensors,
@@ -98,7 +99,7 @@ def list_walks() -> tuple[str, ...]:
 def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None:
     """Raise ScenarioError for a duration that an override sets beside ``minutes``."""
     if minutes is not None and any(
-        split_override(override, ScenarioError)[0] == "run.duration" for override in overrides
+        override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
@@ -127,22 +128,22 @@ def load_walk(
     'solenoid'
     """
     name_plugins(plugins)
-    file, words = label(str(scenario)), tuple(overrides)
+    file, given = label(str(scenario)), read_overrides(overrides, ScenarioError)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(value) for path, value in named.items() if value is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
-    for override in words:
-        path, text = split_override(override, ScenarioError)
+    for override in given:
+        path = override.typed
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
             raise ScenarioError(
-                f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
+                f"{file}: override '{override}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
                 "already; give it once"
             )
     content = FILE.parse(FILE.read(scenario), file)
     folder = Path(scenario).parent
     return scenario_of(
-        ScenarioRequest(file, str(scenario), folder, content, words, set_or_load(parameter_set), instead), WALKING
+        ScenarioRequest(file, str(scenario), folder, content, given, set_or_load(parameter_set), instead), WALKING
     )
 
 
@@ -152,20 +153,20 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     ``overrides`` are values of the bottle, ``room.temperature=5 degC``. ScenarioError or ParameterError for what does
     not go with a bottle, and where the walk is no longer what its file and overrides say.
     """
-    origin = scenario.origin
-    folder = Path() if origin.file is None else Path(origin.file).parent
-    as_given = ScenarioRequest(scenario.name, origin.file, folder, origin.content, origin.overrides)
+    as_given = replace(request_again(scenario.origin), file=scenario.name)
     if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
             f"{scenario.name}: this walk is not what its file says (a number was changed after it was loaded, or the "
             "file or the package has changed since): give the bottle where the walk is loaded, with --bottle"
         )
-    content, before = origin.content, origin.overrides
+    content, before = as_given.content, as_given.overrides
     if bottle is not None:
         # Another bottle takes the place of the whole section, its overrides included.
         content = {name: part for name, part in content.items() if name != BOTTLE}
-        before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
-    changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
+        before = tuple(override for override in before if not override.typed.startswith(f"{BOTTLE}."))
+    changes = read_overrides(
+        (text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides), ScenarioError
+    )
     instead = {} if bottle is None else {BOTTLE_NAME: str(bottle)}
     every = over_layer(content, before, changes, scenario.name, WALKING.declared)
     return scenario_of(replace(as_given, content=content, overrides=every, instead=instead), WALKING)
@@ -215,7 +216,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=_origin(request, document["device"]["set"], hardware.valve),
+        origin=origin_of(request, document, hardware.valve, _named_beside(request)),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -271,14 +272,13 @@ def _motion(
     )
 
 
-def _origin(request: ScenarioRequest, set_name: str, valve: str) -> Origin:
-    """Return where a walk comes from; files that were named beside its own count as overrides."""
+def _named_beside(request: ScenarioRequest) -> tuple[str, ...]:
+    """Return the files that were named beside a walk's own as overrides."""
     # The path of a file in full means the same from any folder.
     full = {
         path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
     }
-    named = tuple(f"{path}={name}" for path, name in full.items())
-    return Origin(request.path, set_name, valve, (*request.overrides, *named), request.content)
+    return tuple(f"{path}={name}" for path, name in full.items())
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:

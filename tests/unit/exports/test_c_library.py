@@ -24,8 +24,9 @@ from ppafo.metrics.metric import Readings
 from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.numbers import TIMES, with_numbers
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result

@@ -48,7 +48,7 @@ def tune(
     from ppafo.analyses.tune.solve import crossed, judge, rows_of_gains, scales_of, search, setting_of
     from ppafo.errors import StudyError
     from ppafo.studies.distributions import Floats
-    from ppafo.studies.draws import NOISE_DRAWS
+    from ppafo.studies.sampling import NOISE_DRAWS
     from ppafo.study.runs import Runs, Tally, with_companions
 
     if isinstance(tuning, Problem) and overrides:

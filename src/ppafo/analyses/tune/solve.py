@@ -25,12 +25,14 @@ from ppafo.metrics import METRICS
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
-from ppafo.simulation.numbers import TIMES, absolute, with_numbers
+from ppafo.simulation.clock import TIMES
+from ppafo.simulation.ensemble.columns import absolute
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
-from ppafo.studies.draws import with_new_noise
+from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import FAILED, Runs, oscillating, settled
 

@@ -123,7 +123,7 @@ def links_of_walk(configuration: Scenario) -> Graph:
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
-    return holding(links, known.__getitem__)
+    return holding(links, known)
 
 
 def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:

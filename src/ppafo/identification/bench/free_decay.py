@@ -65,19 +65,12 @@ def free_decay(
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     decays = tuple(decay_of(source, start, end) for source in sources)
-    mass = inertia or 1.0
-    if inertia:
-        damping, friction, units = "friction.viscous_damping", "friction.dynamic_torque", ("N m s/rad", "N m")
-        missing = over_inertia = ""
-    else:
-        damping, friction = "free_decay.damping_over_inertia", "free_decay.friction_over_inertia"
-        units, over_inertia = ("1/s", "rad/s^2"), " over the inertia"
-        missing = "; the inertia is not known, so only ratios to it follow"
-    starts, (rate, deceleration) = _starts(decays, mass)
+    names, mass = (_OF_DEVICE, inertia) if inertia else (_OVER_INERTIA, 1.0)
+    rough = _rough_rates(decays)
     numbers = (
-        sought(damping, rate, 0.0),
-        sought(friction, deceleration, 0.0),
-        *starts,
+        sought(names.damping, mass * rough.damping, 0.0),
+        sought(names.friction, mass * rough.friction, 0.0),
+        *_starts(decays),
         *_near_rest(rise),
         *tolerance(_INERTIA, inertia_deviation / mass),
         *within(_GAIN, tolerances.gain_of(ANGLE)),
@@ -85,66 +78,110 @@ def free_decay(
 
     def law(at: Values) -> Floats:
         moved = mass * (1.0 + at[_INERTIA])
-        rates = max(at[damping], 0.0) / moved, max(at[friction], 0.0) / moved
+        rates = Rates(max(at[names.damping], 0.0) / moved, max(at[names.friction], 0.0) / moved)
         parts = []
-        for number, decay in enumerate(decays):
-            first, speed = at[f"start angle {number + 1}"], at[f"start speed {number + 1}"]
-            swept, left = course(decay.time, speed, *rates, math.expm1(at[_RISE]), at[_RISE_VELOCITY])
-            parts.append(first + (1.0 + at[_GAIN]) * decay.sign * swept)
-            parts += [] if decay.velocity is None else [decay.sign * left]
+        for number, decay in enumerate(decays, start=1):
+            angle, speed = at[f"start angle {number}"], at[f"start speed {number}"]
+            swept, speeds = course(decay.time, speed, *rates, math.expm1(at[_RISE]), at[_RISE_VELOCITY])
+            parts.append(angle + (1.0 + at[_GAIN]) * decay.sign * swept)
+            parts += [] if decay.velocity is None else [decay.sign * speeds]
         return np.concatenate(parts)
 
-    series, halves, sensors = list[Floats](), list[str](), list[str]()
-    for decay in decays:
-        moved = np.abs(decay.angle - decay.angle[0])
-        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-        for sensor, seen in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
-            if seen is not None:
-                series.append(seen)
-                sensors += [sensor] * seen.size
-                # A law that is wrong parts the fast from the slow.
-                halves += ["the first half of the way"] * half + ["the second half of the way"] * (seen.size - half)
-    counts = [item.time.size * (1 if item.velocity is None else 2) for item in decays]
-    readings = Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
-    found, model = solve(law, readings, numbers, confidence)
-    reported = (
-        Reported(damping, units[0], f"Viscous damping{over_inertia}"),
-        Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
-    )
-    values = found.by_name
-    rates = values[damping] / mass, values[friction] / mass
+    fitted, model = solve(law, _readings(sources, decays), numbers, confidence)
+    values = fitted.by_name
+    rates = Rates(values[names.damping] / mass, values[names.friction] / mass)
     near_rest = math.expm1(values.get(_RISE, 0.0)), values.get(_RISE_VELOCITY, 0.0)
     at_rest = sum(
-        float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *near_rest)[0][-1]
-        for number, decay in enumerate(decays)
+        float(decay.time[-1]) > course_times(values[f"start speed {number}"], *rates, *near_rest)[0][-1]
+        for number, decay in enumerate(decays, start=1)
     )
+    missing = "" if inertia else "; the inertia is not known, so only ratios to it follow"
     return result_of(
         PROCEDURE,
         sources,
-        found,
-        reported,
-        f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates[0]:.4g} 1/s, T_c/I = "
-        f"{rates[1]:.4g} rad/s^2{missing}",
+        fitted,
+        names.reported(),
+        f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates.damping:.4g} 1/s, T_c/I = "
+        f"{rates.friction:.4g} rad/s^2{missing}",
         _panels(decays, model, rates, near_rest),
         "another torque acts, such as gravity, an end stop or a friction of another shape",
     )
 
 
-def _starts(decays: tuple["Decay", ...], mass: float) -> tuple[list[Free], tuple[float, float]]:
-    """Return the start of each decay, which is sought, and rough damping [N m s/rad] and friction [N m] of all."""
-    starts, rates = list[Free](), []
+class Rates(NamedTuple):
+    """Damping [1/s] and friction [rad/s^2] over the inertia."""
+
+    damping: float
+    friction: float
+
+
+class _Names(NamedTuple):
+    """Paths and units of damping and friction, of the device or over its inertia, which ``over`` says in words."""
+
+    damping: str
+    damping_unit: str
+    friction: str
+    friction_unit: str
+    over: str
+
+    def reported(self) -> tuple[Reported, Reported]:
+        """Return both as they are reported."""
+        return (
+            Reported(self.damping, self.damping_unit, f"Viscous damping{self.over}"),
+            Reported(self.friction, self.friction_unit, f"Dynamic friction{self.over}"),
+        )
+
+
+_OF_DEVICE = _Names("friction.viscous_damping", "N m s/rad", "friction.dynamic_torque", "N m", "")
+_OVER_INERTIA = _Names(
+    "free_decay.damping_over_inertia", "1/s", "free_decay.friction_over_inertia", "rad/s^2", " over the inertia"
+)
+
+
+def _readings(sources: tuple[Source, ...], decays: tuple["Decay", ...]) -> Readings:
+    """Return angles and velocities of all decays, in groups of the fast and the slow half of the way."""
+    series, halves, sensors = list[Floats](), list[str](), list[str]()
+    for decay in decays:
+        moved = np.abs(decay.angle - decay.angle[0])
+        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
+        for sensor, samples in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
+            if samples is not None:
+                series.append(samples)
+                sensors += [sensor] * samples.size
+                # A law that is wrong parts the fast from the slow.
+                halves += ["the first half of the way"] * half + ["the second half of the way"] * (samples.size - half)
+    counts = [decay.time.size * (1 if decay.velocity is None else 2) for decay in decays]
+    return Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
+
+
+def _way_of(decay: "Decay") -> tuple[float, float]:
+    """Return the speed [rad/s] with which a decay begins, roughly, and the angle [rad] that it sweeps."""
+    velocity, _ = smoothed_rates(decay.time, decay.angle)
+    speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
+    return speed, max(abs(float(decay.angle[-1] - decay.angle[0])), 1e-9)
+
+
+def _starts(decays: tuple["Decay", ...]) -> list[Free]:
+    """Return angle and speed with which each decay begins, which are sought."""
+    starts = list[Free]()
     for number, decay in enumerate(decays, start=1):
-        velocity, _ = smoothed_rates(decay.time, decay.angle)
-        speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
-        swept = max(abs(float(decay.angle[-1] - decay.angle[0])), 1e-9)
+        speed, swept = _way_of(decay)
         starts.append(sought(f"start angle {number}", float(decay.angle[0]), scale=swept))
         # The direction is the push's: a speed of 0 or below would be another decay.
         starts.append(sought(f"start speed {number}", speed, 1e-9 * speed, 10.0 * speed))
-        # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
-        # deceleration: half of each is a start between the two.
-        rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
-    rate, deceleration = (mass * float(item) for item in np.median(rates, axis=0))
-    return starts, (rate, deceleration)
+    return starts
+
+
+def _rough_rates(decays: tuple["Decay", ...]) -> Rates:
+    """Return first guesses of damping and friction, the medians over all decays.
+
+    With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
+    deceleration: half of each is a start between the two.
+    """
+    ways = [_way_of(decay) for decay in decays]
+    rates = [(0.5 * speed / swept, 0.25 * speed**2 / swept) for speed, swept in ways]
+    damping, friction = np.median(rates, axis=0).tolist()
+    return Rates(damping, friction)
 
 
 def _near_rest(rise: float) -> tuple[Free, ...]:
@@ -282,7 +319,7 @@ def _smoothing_width(count: int) -> int:
 
 
 def _panels(
-    decays: tuple[Decay, ...], model: Floats, rates: tuple[float, float], near_rest: tuple[float, float]
+    decays: tuple[Decay, ...], model: Floats, rates: Rates, near_rest: tuple[float, float]
 ) -> tuple[Panel, ...]:
     angles, shown, place = list[Mark](), list[Mark](), 0
     measured, fitted, fastest = "measured", "fitted", 0.0
@@ -298,12 +335,17 @@ def _panels(
         fastest = max(fastest, float(velocity.max()))
         measured = fitted = ""  # the legend names the first decay only
     line = np.linspace(0.0, fastest, 200)
-    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1]))
+    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates.damping * line - rates.friction))
     rise, velocity_of_rise = near_rest
     if rise > 0.0 and velocity_of_rise > 0.0:
         # The formula of the legend is a straight line; what was fitted near rest bends, and has a name of its own.
         more = rise / (1.0 + np.square(line / velocity_of_rise))
-        fit = Mark("line", line, -rates[0] * line - rates[1] * (1.0 + more), label="fit, with more friction near rest")
+        fit = Mark(
+            "line",
+            line,
+            -rates.damping * line - rates.friction * (1.0 + more),
+            label="fit, with more friction near rest",
+        )
         shown.append(replace(fit, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))
     rate, acceleration_kind = Kind("Angular velocity", "rad/s"), Kind("Angular acceleration", "rad/s$^2$")
     return (
