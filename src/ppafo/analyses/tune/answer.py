@@ -152,30 +152,17 @@ def finding_of(
     problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
 ) -> Finding[Tuned]:
     """Return what a search came to; it has passed where the gains satisfy all constraints, over fresh draws too."""
-    found = [(gain.path, gain.bound_reached(after.gains[gain.path])) for gain in problem.searched]
-    reached = {path: bound for path, bound in found if bound is not None}
+    ends = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
+    reached = {path: bound for path, bound in ends.items() if bound is not None}
     overrides = over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)
-    said, file = verdict(problem, before, after), problem.scenario.origin.file or problem.scenario.name
-    options = " ".join(f'--set "{line}"' for line in overrides)
-    verb = "simulate" if not problem.scenario.walks else "walk"
-    remarks = _remarks(problem, after, starts, runs, reached)
-    gains = []
-    for gain in problem.searched:
-        numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
-        end = f"at its {reached[gain.path]}" if gain.path in reached else ""
-        gains.append((gain.path, *map(gain.place.quote, numbers), end))
-    listed = ", ".join(f'"{line}"' for line in overrides)
-    pasted = (
-        f"# {said}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\nppafo.{verb}({problem.scenario.name!r}, {'overrides=' * (verb == 'walk')}[{listed}])\n"
-    )
+    sentence, remarks = verdict(problem, before, after), _remarks(problem, after, starts, runs, reached)
     return Finding(
         name="tune",
         kicker="Tuning",
         title=problem.name,
-        said=(said, *([problem.description] if problem.description else [])),
+        said=(sentence, *([problem.description] if problem.description else [])),
         parts=(
-            Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), gains)),
+            _gains(problem, after, reached),
             Part(
                 "Before and after",
                 _metrics(problem, before, after),
@@ -193,12 +180,12 @@ def finding_of(
                 across=2,
                 size=(4.4, max(2.6, 0.9 + 0.4 * len(problem.searched))),
             ),
-            Part("To use the gains", code=f"ppafo {verb} {file} {options}"),
+            Part("To use the gains", code=_command(problem, overrides)),
         ),
         found=Tuned(
             tuning=problem.name,
             scenario=problem.scenario.name,
-            verdict=said,
+            verdict=sentence,
             is_feasible=after.is_feasible,
             overrides=list(overrides),
             bounds_reached=reached,
@@ -217,8 +204,43 @@ def finding_of(
             problem=problem,
         ),
         passed=after.is_feasible,
-        files={"overrides.txt": pasted.encode},
+        files={"overrides.txt": partial(_overrides_file, problem, overrides, sentence)},
     )
+
+
+def _gains(problem: Problem, after: Setting, reached: Mapping[str, str]) -> Part:
+    """Return a row for each gain, before and after, in its bounds; ``reached`` says at which bound it ended."""
+    rows = []
+    for gain in problem.searched:
+        numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
+        end = f"at its {reached[gain.path]}" if gain.path in reached else ""
+        rows.append((gain.path, *map(gain.place.quote, numbers), end))
+    return Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows))
+
+
+def _verb(problem: Problem) -> str:
+    return "walk" if problem.scenario.walks else "simulate"
+
+
+def _options(overrides: Sequence[str]) -> str:
+    return " ".join(f'--set "{override}"' for override in overrides)
+
+
+def _command(problem: Problem, overrides: Sequence[str]) -> str:
+    """Return the command that runs the scenario with the gains that were found."""
+    scenario = problem.scenario.origin.file or problem.scenario.name
+    return f"ppafo {_verb(problem)} {scenario} {_options(overrides)}"
+
+
+def _overrides_file(problem: Problem, overrides: Sequence[str], sentence: str) -> bytes:
+    """Return lines to paste into a command, a study file or Python, under what the search came to."""
+    listed, name = ", ".join(f'"{override}"' for override in overrides), problem.scenario.name
+    # The second argument of a walk has a name.
+    given = f"overrides=[{listed}]" if problem.scenario.walks else f"[{listed}]"
+    return (
+        f"# {sentence}\n\n# on the command line\n{_options(overrides)}\n\n# in a study file\noverrides = [{listed}]\n\n"
+        f"# in Python\nppafo.{_verb(problem)}({name!r}, {given})\n"
+    ).encode()
 
 
 def verdict(problem: Problem, before: Setting, after: Setting) -> str:
