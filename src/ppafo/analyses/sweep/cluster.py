@@ -42,7 +42,8 @@ def check_scheduler(address: str) -> None:
 def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
     """Compute the chunks of these numbers on the workers of the scheduler at an address; ``finish`` hears of each one.
 
-    They finish in any order. A chunk whose worker dies is given to another one by the scheduler. StudyError where the scheduler itself is lost.
+    They finish in any order. A chunk whose worker dies is given to another one by the scheduler. StudyError where the
+    scheduler itself is lost.
     """
     # A client that did not connect complains once more when it is collected: whether it can connect is tried before.
     check_scheduler(address)
