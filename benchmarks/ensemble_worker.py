@@ -69,7 +69,7 @@ def metrics_of(batch: Batch, threads: int) -> Callable[[], dict[str, Floats]]:
 
     def run() -> dict[str, Floats]:
         outcome = Outcome(runs, request)
-        outcome.run(sampled, np.arange(runs), threads)
+        outcome.run_all([(np.arange(runs), sampled)], threads)
         return outcome.metrics
 
     run()

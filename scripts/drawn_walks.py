@@ -27,8 +27,8 @@ from ppafo.control.walking.observer import NominalDevice
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model import contact as ground
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.helping import HELPS, PAUSED, STOPPED
-from ppafo.model.plant_faults import PLANT_FAULTS
 from ppafo.parameters.device import Orifice
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario

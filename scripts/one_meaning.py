@@ -31,16 +31,19 @@ from ppafo.errors import PpafoError
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import library_files
-from ppafo.gym.environments import TARGETS
-from ppafo.gym.episodes import FromOutside, scenario_episodes
+from ppafo.gym.lanes import FromOutside
+from ppafo.gym.scenario_episodes import scenario_episodes
+from ppafo.gym.world import TARGETS
 from ppafo.loading import load_scenario
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.page.wasm import description_of
 from ppafo.page.workbench import page_content, program_content
 from ppafo.parameters.graph import ATMOSPHERE_PATH, counts_from
+from ppafo.simulation.clock import TIMES
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import list_scenarios
-from ppafo.simulation.numbers import TIMES, check_columns, with_numbers
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.loading import load_study

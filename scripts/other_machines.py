@@ -20,7 +20,8 @@ from ppafo.engine.compilers import FLAGS
 from ppafo.engine.lanes import Batch, BatchResult
 from ppafo.errors import SimulationError
 from ppafo.translation.c99 import program_source
-from ppafo.translation.native import compiler, run_native
+from ppafo.translation.native import compiler
+from scripts.built_programs import run_native
 
 DRIVER = r"""
 #include <stdio.h>

@@ -18,7 +18,8 @@ from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form
+from ppafo.simulation.clock import TIMES
+from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si

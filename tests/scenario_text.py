@@ -3,10 +3,13 @@
 from collections.abc import Iterable
 from pathlib import Path
 
+from ppafo.errors import ScenarioError
+from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.loading import FILE, VANE, ScenarioRequest, scenario_of
 from ppafo.simulation.scenario import Scenario
 
 
 def parse_scenario(content: bytes, file: str, overrides: Iterable[str] = ()) -> Scenario:
     """Return the scenario in the bytes of a TOML file; ScenarioError or ParameterError for what cannot be used."""
-    return scenario_of(ScenarioRequest(file, file, Path(), FILE.parse(content, file), tuple(overrides)), VANE)
+    document, given = FILE.parse(content, file), read_overrides(overrides, ScenarioError)
+    return scenario_of(ScenarioRequest(file, file, Path(), document, given), VANE)

@@ -5,6 +5,7 @@ The code of walks, which is much, is loaded only where one is asked for.
 
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from ppafo.documents.toml_text import beside, label
 from ppafo.errors import ScenarioError, nearest_name
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.loading import set_or_load
+from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import loading as of_vanes
 from ppafo.simulation import schema
@@ -74,7 +76,8 @@ def load_scenario(
             "or give a .toml file"
         )
     document = of_vanes.FILE.parse(FILE.read(path), label(name))
-    request = ScenarioRequest(label(name), name, path.parent, document, tuple(overrides), parameter_set)
+    given = read_overrides(overrides, ScenarioError)
+    request = ScenarioRequest(label(name), name, path.parent, document, given, parameter_set)
     return of_vanes.scenario_of(request, _layout(document))
 
 
@@ -122,16 +125,16 @@ def placed(name: str, folder: Path) -> str:
 
 
 def reloaded(scenario: Scenario, more: Iterable[str]) -> Scenario:
-    """Return a scenario read again from where it came from, with further overrides as a layer on top of its own.
+    """Return a scenario built again of what its file said, with further overrides as a layer on top of its own.
 
     A Python object that controls it stays in charge.
     """
-    origin, custom = scenario.origin, scenario.controller.custom
-    declared = _layout(origin.content).declared
+    before, custom = of_vanes.request_again(scenario.origin), scenario.controller.custom
+    layout, later = _layout(before.content), read_overrides(more, ScenarioError)
     every = over_layer(
-        origin.content, origin.overrides, tuple(more), scenario.name, declared, scenario.device.valve_name
+        before.content, before.overrides, later, scenario.name, layout.declared, scenario.device.valve_name
     )
-    read = scenario_from_dict(origin.content, every) if origin.file is None else load_scenario(origin.file, every)
+    read = of_vanes.scenario_of(replace(before, overrides=every), layout)
     return read if custom is None else read.controlled_by(custom)
 
 

@@ -28,7 +28,7 @@ from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, rebuilt, row_numbers
+from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
@@ -122,8 +122,8 @@ def load_program(program: Program) -> Advancing:
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
     chosen = dict.fromkeys(programs)
-    compilers = compilers_to_try()
-    if len(chosen) > 1 and compilers:
+    compilers = compilers_to_try() if len(chosen) > 1 else ()
+    if compilers:
         from ppafo.engine.cache.making import load_all  # most runs have one program
 
         load_all([_current_source(program) for program in chosen], compilers[0], compiled)
@@ -327,25 +327,11 @@ def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] 
     program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
     clock, interval = batch.clock, batch.clock.record_every
     clock = replace(clock, record_every=0, measure_every=interval, trace_every=trace_every)
-    rows = sum(len(leaf_paths(row, name)) for name, row in program.state_rows().items())
+    rows = len(row_numbers(program.state_rows()))
     # Meters begin with zeros; their first sample fills them.
     states = np.zeros((rows, batch.states.shape[1]))
     states[: batch.states.shape[0]] = batch.states
     return Batch(program, clock, batch.parameters, states)
-
-
-def group_of(name: str, groups: dict[str, type], rows: Floats) -> Any:
-    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,).
-
-    KeyError where no group has that name.
-    """
-    start = 0
-    for group, row in groups.items():
-        count = len(leaf_paths(row, group))
-        if group == name:
-            return rebuilt(row, rows[start : start + count])
-        start += count
-    raise KeyError(name)
 
 
 def meters_of(program: Program, states: Floats) -> dict[str, Any]:

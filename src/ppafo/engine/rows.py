@@ -6,6 +6,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from ppafo.model.columns import over_runs
 from ppafo.model.declaration import number_of
 
 
@@ -100,3 +101,28 @@ def rebuilt(row: Any, values: Iterable[Any]) -> Any:
         return next(rest)
     inner = [rebuilt(kind, rest) for _, kind in members(row)]
     return row(*inner) if is_row(row) else tuple(inner)
+
+
+def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, Any]") -> Any:
+    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,).
+
+    KeyError where no group has that name.
+    """
+    start = 0
+    for group, row in groups.items():
+        count = len(leaf_paths(row, group))
+        if group == name:
+            return rebuilt(row, rows[start : start + count])
+        start += count
+    raise KeyError(name)
+
+
+def of_each(function: Callable[..., Any], *rows: Any) -> Any:
+    """What a function makes of some NamedTuples of floats; where they have arrays (runs,), run by run."""
+    kinds, numbers = [type(row) for row in rows], leaves(rows)
+
+    def from_numbers(*numbers: float) -> Any:
+        rest = iter(numbers)
+        return function(*(rebuilt(kind, rest) for kind in kinds))
+
+    return over_runs(from_numbers, *numbers)

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.linking import composed_with
 from ppafo.engine.program import FaultPhases, LegPhases, Program
-from ppafo.engine.rows import leaves, rebuilt, row_numbers, table
+from ppafo.engine.rows import of_each, row_numbers, table
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
-from ppafo.model.columns import larger, over_runs, truncated
-from ppafo.model.effects.kind import Moment, State
+from ppafo.model.columns import larger, truncated
+from ppafo.model.effects.kind import Moment
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
@@ -25,8 +25,9 @@ if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
     from ppafo.engine.scheme.walking import DeviceShare, WalkState
     from ppafo.model.gait import GaitSeries, GaitTiming, TimedSequence
     from ppafo.model.leg import LegParameters
-    from ppafo.model.plant_faults import PlantFaults, ShutOff
+    from ppafo.model.plant_faults import PlantFaults
     from ppafo.model.regulator import LineState, SupplyLines
+    from ppafo.model.shut_off import ShutOff
 
 Members = NDArray[np.intp]
 Floats = NDArray[np.float64]
@@ -78,7 +79,7 @@ class Walk:
         faults: FaultPhases | None = None
         if self.failing is not None:
             from ppafo.engine.step import failing as faults  # most runs have no fault
-            from ppafo.model.plant_faults import POWERED
+            from ppafo.model.shut_off import POWERED
 
             parameters += self.failing
             states.append(POWERED)
@@ -174,13 +175,10 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
     leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
     rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
-    parameters = table([timing, *plant, *valve, *rest], runs)
-    further = [*walk_states, *line_states, *states_at_start(run)]
     controller = NoParameters() if program.controller is None else program.controller.initial
-    states = table(
-        [AT_REST, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller, *further],
-        runs,
-    )
+    states_of_device = [AT_REST, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller]
+    parameters = table([timing, *plant, *valve, *rest], runs)
+    states = table([*states_of_device, *walk_states, *line_states, *states_at_start(run)], runs)
     counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     for column, count in enumerate(numbers):
@@ -226,16 +224,7 @@ def gas_at_start(run: Run) -> Any:
     if composed is None:
         return start(run.plant, run.initial)
     rows = dict(zip((effect.name for effect in program.effects), run.effects, strict=True))
-    types = [*(program.effect_rows[name] for name in composed.needed), program.actuator.plant, PlantState]
-    arguments = [*(rows[name] for name in composed.needed), run.plant, run.initial]
-    counts = [len(leaves(row)) for row in arguments]
-
-    def alone(*values: float) -> Any:
-        rest = iter(values)
-        parts = [rebuilt(kind, [next(rest) for _ in range(count)]) for kind, count in zip(types, counts, strict=True)]
-        return composed.function(*parts)
-
-    return over_runs(alone, *(number for row in arguments for number in leaves(row)))
+    return of_each(composed.function, *(rows[name] for name in composed.needed), run.plant, run.initial)
 
 
 def states_at_start(run: Run) -> list[Any]:
@@ -246,21 +235,10 @@ def states_at_start(run: Run) -> list[Any]:
     pressures = pressures_of(program.actuator, run.plant, initial.angle, initial.mass_1, initial.mass_2)
     now = _at_rest(initial, *pressures)
     return [
-        _started(effect.state, effect.parameters, row, now)
+        effect.state.row() if effect.state.start is None else of_each(effect.state.start, row, now)
         for effect, row in zip(program.effects, run.effects, strict=True)
         if effect.state is not None
     ]
-
-
-def _started(state: State, parameters: type, row: Any, now: Moment) -> Any:
-    start, numbers = state.start, leaves(row)
-    if start is None:
-        return state.row()
-
-    def alone(*values: float) -> Any:
-        return start(rebuilt(parameters, values[: len(numbers)]), rebuilt(Moment, values[len(numbers) :]))
-
-    return over_runs(alone, *numbers, *now)
 
 
 def moment_at_start(plant: PlantParameters, initial: PlantState) -> Moment:

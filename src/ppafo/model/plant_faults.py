@@ -1,21 +1,16 @@
-"""Faults of the plant in a walk, and the shut-off valve of the safe state: what they do to the ports of both chambers.
+"""Faults of the plant in a walk, and what they do to the ports of both chambers.
 
-A fault is one entry of ``PLANT_FAULTS``: the part, the kind, its numbers, and the fields of ``PlantFaults`` they fill.
 All act at the ports between valve and chamber, at the command, or at the controller's sample, from a time on; without
 one the numbers of ``SOUND`` change nothing, and a walk that has neither fault nor shut-off is composed without them.
+``fault_catalogue.py`` has what they are called in a file.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.model.declaration import Quantity
 from ppafo.model.orifice import conductance_in_series
 from ppafo.model.plant import BlendedPort, PlantParameters, SinglePort
 from ppafo.model.sensors import unit_noise
-
-NEVER = 1.0e9
-"""Time [s] of what does not happen."""
+from ppafo.model.shut_off import NEVER, ShutOff, Unpowered, vents_line
 
 
 class ChamberFaults(NamedTuple):
@@ -55,244 +50,88 @@ class PlantFaults(NamedTuple):
 
 
 SOUND = PlantFaults(ChamberFaults(), ChamberFaults())
+_NOISE_OF_CONTROLLER = 11
+"""Channel of the noise that says which samples a controller misses; the sensors have channels 0 to 10."""
 
 
-class ShutOff(NamedTuple):
-    """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 where none is fitted, and delay [s].
-
-    Its watchdog cuts the power of all valves where the controller is silent for longer than
-    ``silence`` [s]; ``NEVER`` where there is none.
-    """
-
-    conductance: float
-    delay: float
-    silence: float
-
-
-NOT_FITTED = ShutOff(0.0, 0.0, NEVER)
-
-
-class Unpowered(NamedTuple):
-    """For how long [s] the shut-off valve has had no power, and for how long the controller has been silent.
-
-    It has none since the controller stopped, was in a brown-out, or was silent for longer than the watchdog allows.
-    """
-
-    since: float
-    silent: float
-
-
-POWERED = Unpowered(0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class PlantFault:
-    """A fault as ``[faults]`` of a walk knows it: what it is, its numbers, and which field each of them is."""
-
-    part: str
-    kind: str
-    summary: str
-    quantities: tuple[Quantity, ...]
-    fields: Mapping[str, str]
-
-
-TIME = Quantity("time", "s", "when it fails", None, 0.0, 1.0e6)
-
-
-def _of_chambers(part: str, kind: str, summary: str, own: Mapping[str, Quantity], time: str) -> list[PlantFault]:
-    """The fault of the part of either chamber: its own quantities by field, and the field of its ``time``."""
-    return [
-        PlantFault(
-            f"{part}_{chamber}",
-            kind,
-            f"{summary} {chamber}",
-            (TIME, *own.values()),
-            {item.name: f"chamber_{chamber}.{name}" for name, item in {time: TIME, **own}.items()},
-        )
-        for chamber in (1, 2)
-    ]
-
-
-_CATALOGUE = [
-    *_of_chambers(
-        "valve",
-        "stuck",
-        "stays at one opening, whatever it is commanded: the valve of chamber",
-        {"opening": Quantity("opening", "1", "1 open to the supply, -1 to the atmosphere, 0 shut", 1.0, -1.0, 1.0)},
-        "stuck_time",
-    ),
-    PlantFault("valve", "swapped", "feeds the other chamber", (TIME,), {"time": "swapped_time"}),
-    PlantFault(
-        "valve",
-        "slow",
-        "follows late: it takes a command only once in each such time",
-        (TIME, Quantity("delay", "s", "that time", 0.1, 0.0, 10.0)),
-        {"time": "slow_time", "delay": "slow_delay"},
-    ),
-    *_of_chambers("hose", "off", "is open to the atmosphere: the hose of chamber", {}, "off_time"),
-    *_of_chambers(
-        "hose",
-        "kinked",
-        "is narrow: the hose of chamber",
-        {"kinked_share": Quantity("share", "1", "what is left of its conductance", 0.1, 0.0, 1.0)},
-        "kinked_time",
-    ),
-    *_of_chambers(
-        "regulator",
-        "high",
-        "gives another pressure: the regulator of chamber",
-        {"pressure": Quantity("pressure", "Pa_a", "that pressure", 9.286959e5, 1.0e4, 1.0e8)},
-        "high_time",
-    ),
-    *_of_chambers(
-        "regulator",
-        "creeping",
-        "gives more and more: the regulator of chamber",
-        {"rate": Quantity("rate", "Pa/s", "what it gives more in each second", 6.894757e4, -1.0e7, 1.0e7)},
-        "creep_time",
-    ),
-    *_of_chambers(
-        "regulator",
-        "frozen",
-        "lets little through: the regulator of chamber",
-        {"frozen_share": Quantity("share", "1", "what is left of its flow", 0.1, 0.0, 1.0)},
-        "frozen_time",
-    ),
-    PlantFault(
-        "bottle",
-        "empty",
-        "its pressure falls to atmospheric",
-        (TIME, Quantity("lag", "s", "time in which most of it is gone", 0.2, 1.0e-3, 1.0e3)),
-        {"time": "empty_time", "lag": "empty_lag"},
-    ),
-    PlantFault(
-        "vane",
-        "leaking",
-        "leaks more between the chambers",
-        (TIME, Quantity("factor", "1", "its leak over a sound one's", 50.0, 0.0, 1.0e4)),
-        {"time": "leak_time", "factor": "leak_factor"},
-    ),
-    PlantFault(
-        "controller",
-        "late",
-        "runs only once in each such time",
-        (TIME, Quantity("delay", "s", "that time", 0.02, 0.0, 10.0)),
-        {"time": "late_time", "delay": "late_delay"},
-    ),
-    PlantFault(
-        "controller",
-        "jittering",
-        "misses samples at random",
-        (TIME, Quantity("share", "1", "share of samples that it misses", 0.3, 0.0, 1.0)),
-        {"time": "jitter_time", "share": "jitter_share"},
-    ),
-    PlantFault(
-        "controller",
-        "brown_out",
-        "is without power for a time, with all valves, and starts anew",
-        (TIME, Quantity("duration", "s", "for how long", 0.3, 0.0, 1.0e6)),
-        {"time": "brown_out_time", "duration": "brown_out_duration"},
-    ),
-]
-PLANT_FAULTS: dict[str, dict[str, PlantFault]] = {}
-for _fault in _CATALOGUE:
-    PLANT_FAULTS.setdefault(_fault.part, {})[_fault.kind] = _fault
-"""Every fault of the plant, by part and by kind."""
-
-SHUT_OFF = (
-    Quantity("area", "m^2", "area of the shut-off valve, 0 where none is fitted", 0.0, 0.0, 1.0e-3),
-    Quantity("discharge_coefficient", "1", "its discharge coefficient", 0.7, 0.01, 1.0),
-    Quantity("delay", "s", "time from the alarm to a vented line", 0.02, 0.0, 1.0),
-    Quantity(
-        "silence",
-        "s",
-        "its watchdog lets it shut, for good, where the controller is silent for longer",
-        0.01,
-        0.0,
-        1.0e9,
-    ),
-    Quantity("mass", "kg", "its mass", 0.06, 0.0, 1.0),
-    Quantity("power", "W", "what holds it open, as long as the device helps", 0.5, 0.0, 100.0),
-)
-"""What a walk says of a shut-off valve; mass and power of a miniature 3/2 solenoid with a holding circuit, assumed."""
-
-
-def set_pressure(faults: PlantFaults, own: ChamberFaults, pressure: float, room: float, time: float) -> float:
+def set_pressure(faults: PlantFaults, chamber: ChamberFaults, pressure: float, room: float, time: float) -> float:
     """Pressure of a faulty regulator at a time [s], never below the atmosphere ``room``; all [Pa]."""
     # First the regulator's own faults, then the bottle before it: an empty one takes any of them down with it.
-    given = (own.pressure if time >= own.high_time else pressure) + own.rate * max(time - own.creep_time, 0.0)
-    gone = max(time - faults.empty_time, 0.0) / faults.empty_lag
+    steady = chamber.pressure if time >= chamber.high_time else pressure
+    regulated = steady + chamber.rate * max(time - chamber.creep_time, 0.0)
+    lags = max(time - faults.empty_time, 0.0) / faults.empty_lag
     # 1 / (1 + x + x^2/2) stands for exp(-x), without a call, so in vector code.
-    left = 1.0 / (1.0 + gone + 0.5 * gone * gone)
-    return max(room + (given - room) * left, room)
+    remaining = 1.0 / (1.0 + lags + 0.5 * lags * lags)
+    return max(room + (regulated - room) * remaining, room)
 
 
-def feed_conductance(shut_off: ShutOff, own: ChamberFaults, conductance: float, time: float) -> float:
+def feed_conductance(shut_off: ShutOff, chamber: ChamberFaults, conductance: float, time: float) -> float:
     """Conductance [kg/(s Pa)] from a supply to a chamber at a time [s], through regulator, shut-off, valve and hose."""
     # A frozen regulator and a kinked hose are in series; shares of both stand for their joint loss.
-    share = (own.frozen_share if time >= own.frozen_time else 1.0) * hose_share(own, time)
-    fitted = shut_off.conductance > 0.0
+    share = (chamber.frozen_share if time >= chamber.frozen_time else 1.0) * hose_share(chamber, time)
+    is_fitted = shut_off.conductance > 0.0
     # Both sides of a select are computed in vector code: without the valve the divisor is 1.
-    second = shut_off.conductance if fitted else 1.0
-    passed = conductance_in_series(conductance, 1.0 / (second * second)) if fitted else conductance
-    return share * passed
+    divisor = shut_off.conductance if is_fitted else 1.0
+    in_series = conductance_in_series(conductance, 1.0 / (divisor * divisor)) if is_fitted else conductance
+    return share * in_series
 
 
-def hose_share(own: ChamberFaults, time: float) -> float:
+def hose_share(chamber: ChamberFaults, time: float) -> float:
     """Fraction of its conductance [-] that a hose still has at a time [s]."""
-    return own.kinked_share if time >= own.kinked_time else 1.0
+    return chamber.kinked_share if time >= chamber.kinked_time else 1.0
 
 
 def failed_single_port(
     plant: PlantParameters,
     faults: PlantFaults,
-    own: ChamberFaults,
+    chamber: ChamberFaults,
     shut_off: ShutOff,
-    closed: Unpowered,
+    unpowered: Unpowered,
     port: SinglePort,
     supply: float,
     time: float,
 ) -> SinglePort:
     """A port with one open path as faults leave it at a time [s]; ``supply`` [Pa] feeds a stuck valve."""
-    room, stuck = plant.atmospheric_pressure, time >= own.stuck_time
+    room, is_stuck = plant.atmospheric_pressure, time >= chamber.stuck_time
     # A stuck valve feeds or vents by its own opening, whatever the command would do.
-    fed = (own.opening > 0.0) if stuck else (port.source_fraction > 0.5)
-    conductance = abs(own.opening) * plant.valve_conductance if stuck else port.conductance
-    node = supply if stuck else port.node_pressure
-    back = plant.relieving if stuck else port.is_relieving
-    is_off, vents = time >= own.off_time, (closed.since > shut_off.delay) & (shut_off.conductance > 0.0)
-    through = feed_conductance(shut_off, own, conductance, time) if fed else hose_share(own, time) * conductance
-    from_supply = fed & (not vents) & (not is_off)
+    feeds = (chamber.opening > 0.0) if is_stuck else (port.source_fraction > 0.5)
+    conductance = abs(chamber.opening) * plant.valve_conductance if is_stuck else port.conductance
+    node_pressure = supply if is_stuck else port.node_pressure
+    is_relieving = plant.relieving if is_stuck else port.is_relieving
+    is_off, is_vented = time >= chamber.off_time, vents_line(shut_off, unpowered)
+    vented = hose_share(chamber, time) * conductance
+    through = feed_conductance(shut_off, chamber, conductance, time) if feeds else vented
+    from_supply = feeds & (not is_vented) & (not is_off)
     return SinglePort(
         conductance=plant.valve_conductance if is_off else through,
-        node_pressure=set_pressure(faults, own, node, room, time) if from_supply else room,
+        node_pressure=set_pressure(faults, chamber, node_pressure, room, time) if from_supply else room,
         source_fraction=1.0 if from_supply else 0.0,
-        is_relieving=back if from_supply else 1.0,
+        is_relieving=is_relieving if from_supply else 1.0,
     )
 
 
 def failed_blended_port(
     plant: PlantParameters,
     faults: PlantFaults,
-    own: ChamberFaults,
+    chamber: ChamberFaults,
     shut_off: ShutOff,
-    closed: Unpowered,
+    unpowered: Unpowered,
     port: BlendedPort,
     time: float,
 ) -> BlendedPort:
     """A port with two open paths as faults leave it at a time [s]."""
-    room, stuck, full = plant.atmospheric_pressure, time >= own.stuck_time, plant.valve_conductance
-    source = max(own.opening, 0.0) * full if stuck else port.source_conductance
-    vent = max(-own.opening, 0.0) * full if stuck else port.vent_conductance
-    is_off, vents = time >= own.off_time, (closed.since > shut_off.delay) & (shut_off.conductance > 0.0)
-    lost = is_off | vents
-    through = feed_conductance(shut_off, own, source, time)
+    room, fully_open, is_stuck = plant.atmospheric_pressure, plant.valve_conductance, time >= chamber.stuck_time
+    source = max(chamber.opening, 0.0) * fully_open if is_stuck else port.source_conductance
+    vent = max(-chamber.opening, 0.0) * fully_open if is_stuck else port.vent_conductance
+    is_off = time >= chamber.off_time
+    lacks_supply = is_off | vents_line(shut_off, unpowered)
+    fed = feed_conductance(shut_off, chamber, source, time)
     return BlendedPort(
-        source_conductance=0.0 if is_off else through,
-        source_pressure=room if lost else set_pressure(faults, own, port.source_pressure, room, time),
-        vent_conductance=full if is_off else hose_share(own, time) * vent,
+        source_conductance=0.0 if is_off else fed,
+        source_pressure=room if lacks_supply else set_pressure(faults, chamber, port.source_pressure, room, time),
+        vent_conductance=fully_open if is_off else hose_share(chamber, time) * vent,
         vent_pressure=port.vent_pressure,
-        is_relieving=1.0 if lost else port.is_relieving,
+        is_relieving=1.0 if lacks_supply else port.is_relieving,
     )
 
 
@@ -300,23 +139,23 @@ def failed_single_ports(
     plant: PlantParameters,
     faults: PlantFaults,
     shut_off: ShutOff,
-    closed: Unpowered,
+    unpowered: Unpowered,
     port_1: SinglePort,
     port_2: SinglePort,
     time: float,
 ) -> tuple[SinglePort, SinglePort]:
     """Ports of both chambers with one open path each, as faults leave them at a time [s]."""
     swapped = time >= faults.swapped_time
-    first, second = swapped_single(port_1, port_2, swapped), swapped_single(port_2, port_1, swapped)
-    to_1, to_2 = plant.supply_pressure, plant.dorsiflexion_pressure
+    own_1, own_2 = swapped_single(port_1, port_2, swapped), swapped_single(port_2, port_1, swapped)
+    supply_1, supply_2 = plant.supply_pressure, plant.dorsiflexion_pressure
     return (
-        failed_single_port(plant, faults, faults.chamber_1, shut_off, closed, first, to_1, time),
-        failed_single_port(plant, faults, faults.chamber_2, shut_off, closed, second, to_2, time),
+        failed_single_port(plant, faults, faults.chamber_1, shut_off, unpowered, own_1, supply_1, time),
+        failed_single_port(plant, faults, faults.chamber_2, shut_off, unpowered, own_2, supply_2, time),
     )
 
 
 def swapped_single(port: SinglePort, other: SinglePort, swapped: bool) -> SinglePort:
-    """A port with one open path, or the other one."""
+    """The port of a chamber with one open path: its own, or the other chamber's where they are swapped."""
     return SinglePort(
         conductance=other.conductance if swapped else port.conductance,
         node_pressure=other.node_pressure if swapped else port.node_pressure,
@@ -329,22 +168,22 @@ def failed_blended_ports(
     plant: PlantParameters,
     faults: PlantFaults,
     shut_off: ShutOff,
-    closed: Unpowered,
+    unpowered: Unpowered,
     port_1: BlendedPort,
     port_2: BlendedPort,
     time: float,
 ) -> tuple[BlendedPort, BlendedPort]:
     """Ports of both chambers with two open paths each, as faults leave them at a time [s]."""
     swapped = time >= faults.swapped_time
-    first, second = swapped_blended(port_1, port_2, swapped), swapped_blended(port_2, port_1, swapped)
+    own_1, own_2 = swapped_blended(port_1, port_2, swapped), swapped_blended(port_2, port_1, swapped)
     return (
-        failed_blended_port(plant, faults, faults.chamber_1, shut_off, closed, first, time),
-        failed_blended_port(plant, faults, faults.chamber_2, shut_off, closed, second, time),
+        failed_blended_port(plant, faults, faults.chamber_1, shut_off, unpowered, own_1, time),
+        failed_blended_port(plant, faults, faults.chamber_2, shut_off, unpowered, own_2, time),
     )
 
 
 def swapped_blended(port: BlendedPort, other: BlendedPort, swapped: bool) -> BlendedPort:
-    """A port with two open paths, or the other one."""
+    """The port of a chamber with two open paths: its own, or the other chamber's where they are swapped."""
     return BlendedPort(
         source_conductance=other.source_conductance if swapped else port.source_conductance,
         source_pressure=other.source_pressure if swapped else port.source_pressure,
@@ -366,34 +205,18 @@ def is_in_brown_out(faults: PlantFaults, time: float) -> bool:
 
 
 def is_due(began: float, delay: float, time: float, period: float) -> bool:
-    """True where something that happens once in each ``delay`` since it began does so in this sample; all [s]."""
+    """True where something that happens once in each ``delay`` since it began does so in this sample; all [s].
+
+    It is due in each sample before it ``began``, and in none more often than once in a sample ``period``.
+    """
     length = max(delay, period)
     # A sample within half a period of its time is due, and one that misses it by rounding (1e-9 of a delay) is not
     # early.
-    place = max(time - began, 0.0) / length
-    return (time < began) | ((place - float(int(place + 1.0e-9))) * length < 0.5 * period)
+    turns = max(time - began, 0.0) / length
+    return (time < began) | ((turns - float(int(turns + 1.0e-9))) * length < 0.5 * period)
 
 
 def runs_at(faults: PlantFaults, time: float, period: float, seed: int, sample: int) -> bool:
-    """True where the controller runs at a sample, at its time [s]."""
-    missed = (time >= faults.jitter_time) & (unit_noise(seed, sample, 11) < faults.jitter_share)
+    """True where the controller runs at a ``sample`` at a time [s]; ``seed`` decides which samples it misses."""
+    missed = (time >= faults.jitter_time) & (unit_noise(seed, sample, _NOISE_OF_CONTROLLER) < faults.jitter_share)
     return is_due(faults.late_time, faults.late_delay, time, period) & (not missed)
-
-
-def is_silenced(shut_off: ShutOff, closed: Unpowered) -> bool:
-    """True where the watchdog has taken the power of all valves away."""
-    return closed.silent > shut_off.silence
-
-
-def next_unpowered(
-    shut_off: ShutOff, closed: Unpowered, runs: bool, stopped: bool, brown_out: bool, period: float
-) -> Unpowered:
-    """The shut-off valve after a sample [s] at which the controller runs or not; without power it shuts at once.
-
-    A watchdog that has acted stays: what the controller would do when it comes back is not known.
-    """
-    silenced = is_silenced(shut_off, closed)
-    silent = closed.silent if silenced else (0.0 if runs | brown_out else closed.silent + period)
-    # The same test with the new silence: the sample that exceeds the limit already takes the power.
-    since = closed.since + period if stopped | (silent > shut_off.silence) else 0.0
-    return Unpowered(NEVER if brown_out else since, silent)

@@ -18,7 +18,7 @@ from ppafo.page.still import still_of
 from ppafo.page.wasm import WasmModule, module_of
 from ppafo.page.words import words
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.overrides import over
+from ppafo.parameters.overrides import over, read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.report.setting_names import label_of
@@ -84,10 +84,11 @@ def program_content(simulated: Simulated, module: str, intervals: Mapping[str, I
         from ppafo.walking.declaration import OF_A_WALK
 
         declared = OF_A_WALK
-    changed = apply_overrides(described["document"], described["overrides"], described["name"], declared)
+    overridden = read_overrides(described["overrides"], ScenarioError)
+    changed = apply_overrides(described["document"], overridden, described["name"], declared)
     document, own = changed.document, changed.device
     of_file = document.get("device", {}).get("overrides", ())
-    overrides = list(over(of_file, own, valve=simulated.scenario.device.valve_name))
+    overrides = list(over(of_file, map(str, own), valve=simulated.scenario.device.valve_name))
     document["device"] = {**document.get("device", {}), **({"overrides": overrides} if overrides else {})}
     return {
         "name": described["name"],

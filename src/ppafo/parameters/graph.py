@@ -140,18 +140,26 @@ def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = (
 
 
 def resolved(
-    graph: Graph, replaced: Mapping[str, Any], present: Callable[[str], Any], orifices: Collection[str] = ()
+    graph: Graph, replaced: Mapping[str, Any], present: Mapping[str, Any], orifices: Collection[str] = ()
 ) -> dict[str, Any]:
-    """Return all numbers that are given, and all that follow them; what stays is looked up at ``present``.
+    """Return all numbers that are given, and all that follow them by links that still hold of those ``present``.
 
     Some orifices, by their sections, take the form that they have not.
     """
-    numbers = dict(replaced)
-    links = in_other_forms(graph, orifices)
-    turned = [path for path in graph if links[path] != graph[path]]
+    held = holding(graph, present)
+    links = in_other_forms(held, orifices)
+    turned = [path for path in held if links[path] != held[path]]
+    numbers, moved = {**present, **replaced}, dict(replaced)
     for path, link in acting(links, replaced, turned).items():
-        numbers[path] = link.number(lambda source: numbers[source] if source in numbers else present(source))
-    return numbers
+        numbers[path] = moved[path] = link.number(numbers.__getitem__)
+    return moved
+
+
+def paths_in(graph: Graph) -> set[str]:
+    """Return all paths that links name: what follows, and what is followed in either form of an orifice."""
+    terms = [term for links in graph.values() for link in links for term in link.terms]
+    turned = [term.in_other_form for term in terms if term.in_other_form is not None]
+    return {*graph, *(source for term in (*terms, *turned) for source in term.sources)}
 
 
 def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
@@ -179,14 +187,19 @@ def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[Follows, ..
     }
 
 
-def holding(graph: Graph, present: Callable[[str], Any]) -> dict[str, tuple[Follows, ...]]:
+def outside(graph: Graph, *sections: str) -> dict[str, tuple[Follows, ...]]:
+    """Return the links of the numbers that are in none of some sections, such as ``controller``, which are left out."""
+    return {path: links for path, links in graph.items() if path.partition(".")[0] not in sections}
+
+
+def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[Follows, ...]]:
     """Return the links that are still true of numbers which may have been changed by other means since."""
     links_held = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
     return {path: links for path, links in links_held.items() if links}
 
 
-def _holds(path: str, link: Follows, present: Callable[[str], Any]) -> bool:
-    number, followed = present(path), link.number(present)
+def _holds(path: str, link: Follows, present: Mapping[str, Any]) -> bool:
+    number, followed = present[path], link.number(present.__getitem__)
     if link.when_set:
         return bool(np.all(np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0)))
     # Exactly: what follows was computed by this same link.

@@ -25,7 +25,7 @@ from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.joint import ANKLE, OPPOSITES, Joint
-from ppafo.parameters.overrides import check_valve
+from ppafo.parameters.overrides import check_valve, read_overrides
 from ppafo.parameters.parameter_set import (
     Accepted,
     Citation,
@@ -33,8 +33,8 @@ from ppafo.parameters.parameter_set import (
     FlagEntry,
     ParameterSet,
     TextEntry,
-    apply_overrides,
     chosen_valve,
+    with_overrides,
     written_units,
 )
 from ppafo.plugins import Plugins, name_plugins
@@ -216,9 +216,10 @@ def load_device(
     583958 Pa absolute, 0.0084 kg m^2
     """
     name_plugins(plugins)
-    check_valve(overrides, valve, f"valve = '{valve}'")
+    given = read_overrides(overrides)
+    check_valve(given, valve, f"valve = '{valve}'")
     loaded = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
-    return build_device(apply_overrides(loaded, overrides, valve=valve), valve)
+    return build_device(with_overrides(loaded, given, valve), valve)
 
 
 @checked(name_or_path="parameter_set")

@@ -4,7 +4,7 @@ A form is one of the ways to give a thing, of which only one is taken: files, ov
 checked by the same table. What the kinds of a scenario add is in ``simulation/overrides.py``.
 """
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ppafo.errors import ParameterError, PpafoError, one_line
@@ -17,9 +17,10 @@ _ORIFICE = tuple(tuple(quantity.name for quantity in form) for form in (AREA_FOR
 FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("rate",), ("period",))}
 
 
-class Given(NamedTuple):
-    """An override as it was typed: path and value."""
+class Override(NamedTuple):
+    """An override: its words as they were given, path and value in them."""
 
+    words: str
     typed: str
     text: str
 
@@ -28,35 +29,41 @@ class Given(NamedTuple):
         return f"{self.typed}={self.text}"
 
 
-def split_override(override: str, error: type[PpafoError] = ParameterError) -> Given:
+def split_override(override: str, error: type[PpafoError] = ParameterError) -> Override:
     """Return path and value of a text such as ``run.duration=1 s``; an ``error`` for any other text."""
     on_one_line = one_line(override)
     path, separator, text = (part.strip() for part in on_one_line.partition("="))
     if not separator or not path or not text:
         raise error(f"override '{on_one_line}' is not of the form PATH=VALUE, for example valve.area=12.6mm^2")
-    return Given(path, text)
+    return Override(override, path, text)
+
+
+def read_overrides(texts: Iterable[str], error: type[PpafoError] = ParameterError) -> tuple[Override, ...]:
+    """Return texts as overrides, in their order; an ``error`` for the first, in sorted order, that is none."""
+    in_order = tuple(texts)
+    read = {text: split_override(text, error) for text in sorted(in_order)}
+    return tuple(read[text] for text in in_order)
 
 
 def override_set(
-    overrides: Iterable[str],
+    overrides: Iterable[Override],
     error: type[PpafoError] = ParameterError,
     same: Mapping[str, str] | None = None,
     valve: str = "",
     forms: Forms = FORMS,
-) -> dict[str, Given]:
+) -> dict[str, Override]:
     """Return overrides by path, sorted, so that their order is forgotten.
 
     ``same`` maps a path to another one of the same value; ``valve`` is the name of the valve that is chosen, whose
     values have two paths. An ``error`` where a value is given twice or in two forms names both overrides.
     """
-    by_path: dict[str, Given] = {}
+    by_path: dict[str, Override] = {}
     # Sorted, so that of two messages the same one comes in any order.
     for override in sorted(overrides):
-        read = split_override(override, error)
-        path = one_path((same or {}).get(read.typed, read.typed), valve)
+        path = one_path((same or {}).get(override.typed, override.typed), valve)
         if path in by_path:
-            raise error(f"overrides '{by_path[path]}' and '{read}': the same value is given twice; omit one")
-        by_path[path] = read
+            raise error(f"overrides '{by_path[path]}' and '{override}': the same value is given twice; omit one")
+        by_path[path] = override
     pair = in_two_forms(by_path, forms)
     if pair is not None:
         first, second = (by_path[path] for path in pair)
@@ -64,23 +71,30 @@ def override_set(
     return {path: by_path[path] for path in sorted(by_path)}
 
 
-def over(
-    earlier: Iterable[str],
-    later: Iterable[str],
-    error: type[PpafoError] = ParameterError,
+def layered(
+    earlier: Sequence[Override],
+    later: Sequence[Override],
+    error: type[PpafoError],
     same: Mapping[str, str] | None = None,
     valve: str = "",
-    forms: Forms = FORMS,
-) -> tuple[str, ...]:
-    """Return two layers as one set: what the later one gives replaces the value, and another form, of the earlier.
+) -> dict[str, Override]:
+    """Return two layers as one set by path: what the later gives replaces value, and other form, of the earlier.
 
-    The other arguments as in ``override_set``.
+    Those of a layer keep their order. The other arguments as in ``override_set``.
     """
-    first, second = tuple(earlier), tuple(later)
-    old, new = (override_set(layer, error, same, valve, forms) for layer in (first, second))
-    replaced = {other for path in new for other in (path, *other_forms(path, forms))}
-    kept = {text for path, text in old.items() if path not in replaced}
-    return (*(text for text in first if split_override(text, error) in kept), *second)
+    old, new = (override_set(layer, error, same, valve) for layer in (earlier, later))
+    replaced = {other for path in new for other in (path, *other_forms(path))}
+    path_of = {override: path for layer in (old, new) for path, override in layer.items()}
+    kept = [override for override in earlier if path_of[override] not in replaced]
+    return {path_of[override]: override for override in (*kept, *later)}
+
+
+def over(
+    earlier: Iterable[str], later: Iterable[str], error: type[PpafoError] = ParameterError, valve: str = ""
+) -> tuple[str, ...]:
+    """Return two layers of texts as the texts of one set, as ``layered`` does."""
+    old, new = (read_overrides(texts, error) for texts in (earlier, later))
+    return tuple(override.words for override in layered(old, new, error, valve=valve).values())
 
 
 def one_path(path: str, valve: str) -> str:
@@ -95,16 +109,15 @@ def of_another_valve(path: str, valve: str) -> bool:
 
 
 def check_valve(
-    overrides: Iterable[str], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
+    overrides: Iterable[Override], valve: str | None, choice: str, error: type[PpafoError] = ParameterError
 ) -> None:
     """Refuse an override of another valve than the one that is chosen beside it, None for no choice.
 
     The ``error`` names the override and the ``choice`` as it was given.
     """
     for override in sorted(overrides) if valve else ():
-        read = split_override(override, error)
-        if valve and of_another_valve(read.typed, valve):
-            raise error(f"override '{read}' and {choice}: with the latter that valve is not used; omit one")
+        if valve and of_another_valve(override.typed, valve):
+            raise error(f"override '{override}' and {choice}: with the latter that valve is not used; omit one")
 
 
 def other_forms(path: str, forms: Forms = FORMS) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 """A parameter set: every value with its origin, as it was given, and in SI; values changed by dotted path."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -29,7 +29,15 @@ from ppafo.parameters.graph import (
     gauge_link,
 )
 from ppafo.parameters.joint import ANKLE, Joint
-from ppafo.parameters.overrides import CHOSEN_VALVE, NAMED_VALVE, Given, one_path, other_forms, override_set
+from ppafo.parameters.overrides import (
+    CHOSEN_VALVE,
+    NAMED_VALVE,
+    Override,
+    one_path,
+    other_forms,
+    override_set,
+    read_overrides,
+)
 from ppafo.units import SI, base_value, format_quantity, from_si, split_number, to_si
 from ppafo.units.shown import pressure_units
 
@@ -330,6 +338,11 @@ def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve:
     >>> changed.numbers["supply.pressure"].value, changed.numbers["supply.pressure"].unit
     (70.0, 'psi_g')
     """
+    return with_overrides(parameter_set, read_overrides(overrides), valve)
+
+
+def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], valve: str | None) -> ParameterSet:
+    """Return the set with overrides in it; the other words as of ``apply_overrides``."""
     chosen = chosen_valve(parameter_set, valve)
     overrides_by_path = {
         f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: override
@@ -355,7 +368,7 @@ def overridden_paths(parameter_set: ParameterSet) -> frozenset[str]:
     return frozenset(path for path, entry in parameter_set.entries().items() if entry.source == SOURCE)
 
 
-def _with_number(parameter_set: ParameterSet, path: str, override: Given) -> ParameterSet:
+def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     find_effects([path])
     declared = parameter_set.declarations()
     if path not in declared:
@@ -383,7 +396,7 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Given) -> Par
     return replace(parameter_set, numbers={**kept, path: entry})
 
 
-def _in_conductance(override: Given) -> str:
+def _in_conductance(override: Override) -> str:
     """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
     section, _, name = override.typed.rpartition(".")
     conductance = conductance_of(name.lower(), override.text) if name.lower() in ("cv", "kv", "qn") else None
@@ -395,7 +408,7 @@ def _in_conductance(override: Given) -> str:
     )
 
 
-def _with_species(parameter_set: ParameterSet, path: str, override: Given) -> ParameterSet:
+def _with_species(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     species = SPECIES.get(override.text)
     if species is None:
         hint = nearest_name(override.text, SPECIES)
@@ -415,7 +428,7 @@ def _with_species(parameter_set: ParameterSet, path: str, override: Given) -> Pa
     )
 
 
-def _with_relieving(parameter_set: ParameterSet, path: str, override: Given) -> ParameterSet:
+def _with_relieving(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
     if override.text not in _FLAGS:
         raise ParameterError(f"override '{override}': must be {' or '.join(_FLAGS)}")
     entry = FlagEntry(value=_FLAGS[override.text], origin="assumed", source=SOURCE, note=_before(parameter_set, path))

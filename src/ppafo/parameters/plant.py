@@ -154,7 +154,8 @@ def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect,
 
 def switches_of(device: Device) -> dict[Effect, Any]:
     """Return for each effect of a device whether it is on; an array (runs,) where settings that switch it vary."""
-    return {effect: effect.is_on(settings_of(device, effect)) for effect in _effects(device) if effect.is_of_device}
+    settings = all_settings(device)
+    return {effect: effect.is_on(settings[effect.name]) for effect in ordered_effects() if effect.is_of_device}
 
 
 def _effects(device: Device) -> tuple[Effect, ...]:

@@ -34,7 +34,7 @@ from ppafo.model.plant import PlantParameters
 from ppafo.model.sensors import quantise
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.device import Device, SonicOrifice
-from ppafo.parameters.overrides import override_set
+from ppafo.parameters.overrides import override_set, read_overrides
 from ppafo.parameters.plant import switches_of
 from ppafo.rig.dynamics import RigPhysics
 from ppafo.signals.recording import Recording
@@ -191,7 +191,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
             in_si = to_si(entry.value, entry.unit, quantity.unit)
         with refused_as(ParameterError, file, ParameterError):
             preset = preset.with_value(path, in_si, entry.reason)
-    for typed, override in override_set(overrides).items():
+    for typed, override in override_set(read_overrides(overrides)).items():
         path = typed.removeprefix(PREFIX)
         if path not in PATHS or not typed.startswith(PREFIX):
             hint = nearest_name(typed, [f"{PREFIX}{known}" for known in PATHS])

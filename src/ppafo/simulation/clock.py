@@ -6,8 +6,11 @@ from typing import Any
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Number, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_text, value_at
 from ppafo.simulation.motion_kind import Clock
+from ppafo.simulation.overrides import apply_overrides
+from ppafo.simulation.scenario import Scenario
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6
@@ -20,6 +23,8 @@ _DURATION, _STEP, _OUTPUT = RUN
 _LONGEST_STEP = 1.0e-3
 _DURATION_PATH, _STEP_PATH, _OUTPUT_PATH = (f"run.{item.name}" for item in RUN)
 _RATE_PATH, _PERIOD_PATH = "controller.rate", "controller.period"
+TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, _RATE_PATH, _PERIOD_PATH)
+"""Paths that decide the clock of a run."""
 
 
 def read_clock(reading: Reading) -> Clock:
@@ -128,3 +133,40 @@ def _read_output(reading: Reading, duration: float, step: float) -> float:
 def _not_above(reading: Reading, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
         raise reading.refusal(path, f"must not be above {quantity_text(limit, 's')}, which {limit_path} gives")
+
+
+TimeTexts = Mapping[str, Mapping[str, Any]]
+"""The times of a scenario by section and name, as a file gives them."""
+
+
+def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock:
+    """Return the clock [s] of a run with other times, which are read as overrides of the scenario ``name`` are.
+
+    ScenarioError if they do not fit together.
+    """
+    document = {section: dict(texts) for section, texts in given.items()}
+    for path, value in times.items():
+        section, key = path.split(".")
+        # A rate takes the place of a period that the file has, and the reverse.
+        if section == "controller":
+            document[section] = {}
+        document[section][key] = f"{value!r} {'Hz' if path == _RATE_PATH else 's'}"
+    return read_clock(Reading(name, document, frozenset(times)))
+
+
+def time_texts(base: Scenario) -> TimeTexts:
+    """Return the times as the scenario's file gives them, or the numbers where the scenario was changed since."""
+    document = apply_overrides(base.origin.content, read_overrides(base.origin.overrides), base.name).document
+    texts = {
+        section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
+        for section in ("run", "controller")
+    }
+    # The file speaks for the scenario only as long as nobody has changed its times in Python.
+    own = Clock(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)
+    if read_clock(Reading(base.name, texts)) == own:
+        return texts
+    run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}
+    return {
+        "run": {name: f"{value!r} s" for name, value in run.items()},
+        "controller": {"period": f"{base.controller.period!r} s"},
+    }

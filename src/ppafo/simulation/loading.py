@@ -18,12 +18,11 @@ from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.controlled import CONTROLLED
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
-from ppafo.parameters import apply_overrides as apply_device_overrides
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
-from ppafo.parameters.overrides import FORMS, check_valve, either, in_two_forms, split_override
-from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
+from ppafo.parameters.overrides import FORMS, Override, check_valve, either, in_two_forms, read_overrides
+from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set, with_overrides
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
 from ppafo.simulation.declaration import (
     ACCURACY,
@@ -90,7 +89,7 @@ class ScenarioRequest:
     path: str | None
     folder: Path
     content: dict[str, Any]
-    overrides: tuple[str, ...]
+    overrides: tuple[Override, ...]
     parameter_set: ParameterSet | None = None
     instead: Mapping[str, str] = field(default_factory=dict)
 
@@ -138,7 +137,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         reference=reference,
         sensors=sensors,
         assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
-        origin=Origin(request.path, document["device"]["set"], hardware.valve, request.overrides, request.content),
+        origin=origin_of(request, document, hardware.valve),
         gas_model=read_gas_model(reading),
         supply_line=lines,
         links={**links, **of_reference, **of_control},
@@ -156,12 +155,19 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     return scenario
 
 
-def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[str, ...]) -> Hardware:
+def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
+    """Return where a scenario comes from; ``named`` are overrides for what the request gives ``instead``."""
+    overrides = (*(override.words for override in request.overrides), *named)
+    return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
+
+
+def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then the caller's."""
     section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
     try:
-        check_valve(in_file.get("overrides", ()), in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
+        of_file = read_overrides(section.get("overrides", ()))
+        check_valve(of_file, in_file.get("valve"), f"device.valve = '{in_file.get('valve')}'")
         parameter_set = request.parameter_set or load_parameter_set(set_name(section["set"], request.folder))
         kinds = parameter_set.valve_kinds
         if valve is not None and valve not in kinds and not nearest_name(valve, kinds):
@@ -171,13 +177,12 @@ def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[s
                 f"--set device.valve={parameter_set.default_valve}"
             )
         name = chosen_valve(parameter_set, valve)
-        parameter_set = apply_device_overrides(parameter_set, section.get("overrides", ()), valve=valve)
+        parameter_set = with_overrides(parameter_set, of_file, valve)
     except ParameterError as error:
         raise _of_device(reading, error) from error
     before = atmospheric_pressure(parameter_set) if overrides else None
-    changed = apply_device_overrides(parameter_set, overrides, valve=valve)
-    paths = {split_override(text, ScenarioError).typed for text in overrides}
-    return Hardware(changed, name, links_of_set(changed, paths, before))
+    changed = with_overrides(parameter_set, overrides, valve)
+    return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before))
 
 
 def set_name(name: str, folder: Path) -> str:
@@ -298,13 +303,13 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
 
 
 def read_assumptions(
-    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[str]
+    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[Override]
 ) -> tuple[Assumption, ...]:
     """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
 
     ScenarioError for a path that has no value.
     """
-    replaced = frozenset(split_override(text, ScenarioError).typed for text in overrides)
+    replaced = {override.typed for override in overrides}
     notes: Mapping[str, str] = reading.document.get(_SECTION, {})
     assumptions = []
     for path, note in notes.items():
@@ -421,8 +426,8 @@ def load_scenario(
     changes in its device is changed in this one. ScenarioError or ParameterError for anything that cannot be used.
     """
     document = FILE.parse(FILE.read(name_or_path), label(str(name_or_path)))
-    folder, file = Path(name_or_path).parent, str(name_or_path)
-    return scenario_of(ScenarioRequest(label(file), file, folder, document, tuple(overrides), parameter_set), VANE)
+    folder, file, given = Path(name_or_path).parent, str(name_or_path), read_overrides(overrides, ScenarioError)
+    return scenario_of(ScenarioRequest(label(file), file, folder, document, given, parameter_set), VANE)
 
 
 def scenario_or_load(
@@ -451,11 +456,24 @@ def request_of_dict(content: Mapping[str, Any], overrides: Iterable[str]) -> Sce
     """Return the request for a scenario of nested dictionaries; ScenarioError where they are none or too deep."""
     if not isinstance(content, Mapping):
         raise ScenarioError(f"a scenario is a dictionary laid out as a scenario file, not a {type(content).__name__}")
-    name = content.get("name")
-    file = f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
+    file = _called(content)
     FILE.check_depth(content, file)
     # A copy: the scenario is loaded anew from it, whatever becomes of the caller's dictionaries.
-    return ScenarioRequest(file, None, Path(), copy.deepcopy(dict(content)), tuple(overrides))
+    document = copy.deepcopy(dict(content))
+    return ScenarioRequest(file, None, Path(), document, read_overrides(overrides, ScenarioError))
+
+
+def request_again(origin: Origin) -> ScenarioRequest:
+    """Return the request of which a scenario was made."""
+    file, content = origin.file, origin.content
+    name, folder = (_called(content), Path()) if file is None else (label(file), Path(file).parent)
+    return ScenarioRequest(name, file, folder, content, read_overrides(origin.overrides, ScenarioError))
+
+
+def _called(content: Mapping[str, Any]) -> str:
+    """Return what messages call a document that is no file."""
+    name = content.get("name")
+    return f"scenario '{label(name)}'" if isinstance(name, str) else "scenario"
 
 
 def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
@@ -476,7 +494,7 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
         changed = apply_overrides(request.content, request.overrides, request.file, declared)
     except ScenarioError:
         # A kind that is not known has no values: where one is given, it is the mistake.
-        kinds = [text for text in request.overrides if split_override(text, ScenarioError).typed.endswith(".kind")]
+        kinds = [override for override in request.overrides if override.typed.endswith(".kind")]
         chosen = apply_overrides(request.content, kinds, request.file, declared)
         _check_layout(chosen.document, request.file, layout, of_kinds_alone=True)
         raise

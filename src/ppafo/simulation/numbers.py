@@ -1,47 +1,25 @@
 """The numbers of a scenario by dotted path: which there are, and columns of them in their place for many runs."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import Any
 
-import numpy as np
-
-from ppafo.engine.lanes import Floats
-from ppafo.errors import ScenarioError, nearest_name
-from ppafo.model.catalog import VALVES, device_effects, find_effects
+from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.declaration import Quantity, held_in
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice
-from ppafo.parameters.graph import ATMOSPHERE_PATH, Graph, holding, in_other_forms, left, resolved
-from ppafo.parameters.overrides import either, in_two_forms, one_path
+from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
+from ppafo.parameters.overrides import one_path
 from ppafo.parameters.plant import all_settings
-from ppafo.simulation.clock import read_clock
-from ppafo.simulation.declaration import LOCKED_ANGLE, TEXTS, Reading
-from ppafo.simulation.motion_kind import Clock
-from ppafo.simulation.overrides import apply_overrides
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario, vane_motion
-
-TIMES = ("run.duration", "run.step", "run.output_interval", "controller.rate", "controller.period")
-"""Paths that decide the clock of a run."""
+from ppafo.simulation.declaration import LOCKED_ANGLE
+from ppafo.simulation.scenario import Scenario, vane_motion
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
-_ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
+ORIFICES = {"valve": ("device", "valve", "orifice"), "actuator.leak": ("device", "actuator", "leak")}
 
-_TEXTS = (
-    *TEXTS,
-    "gas.species",
-    "supply.relieving",
-    "motion.kind",
-    "controller.kind",
-    "reference.kind",
-    "motion.profile.kind",
-    "motion.shank.kind",
-    "motion.shank.gait",
-)
 _RATE, _PERIOD = "controller.rate", "controller.period"
-_UNIT_OF_TIMES = {"controller.rate": "Hz"}
 
 
 def chosen_path(path: str, scenario: Scenario) -> str:
@@ -88,7 +66,7 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
         form = other_form(scenario.device, section)
         in_form = {name: moved.pop(f"{section}.{name}") for name in form}
         kind = SonicOrifice if "sonic_conductance" in form else Orifice
-        scenario = _replace_number(scenario, _ORIFICES[section], kind(**in_form))
+        scenario = _replace_number(scenario, ORIFICES[section], kind(**in_form))
     for path, number in moved.items():
         scenario = _replace_number(scenario, _attributes(path, scenario), number)
     return scenario
@@ -99,21 +77,24 @@ def moving_together(scenario: Scenario, replaced: Mapping[str, Any]) -> dict[str
 
     What was changed since the scenario was loaded follows nothing any more.
     """
-    links = links_that_hold(scenario)
     # What follows the sample period follows a rate that is given for it.
     period = {_PERIOD: 1.0 / replaced[_RATE]} if _RATE in replaced and _PERIOD not in replaced else {}
-    moved = resolved(
-        links,
-        {**replaced, **period},
-        lambda path: _number(scenario, _attributes(path, scenario)),
-        _changing_form(scenario, replaced),
-    )
+    changing = _changing_form(scenario, replaced)
+    moved = resolved(scenario.graph, {**replaced, **period}, _numbers_of_graph(scenario), changing)
     return {path: number for path, number in moved.items() if path not in period}
 
 
 def links_that_hold(scenario: Scenario) -> Graph:
     """Return the links of a scenario without links of numbers that were changed since it was loaded."""
-    return holding(scenario.graph, lambda path: _number(scenario, _attributes(path, scenario)))
+    return holding(scenario.graph, _numbers_of_graph(scenario))
+
+
+def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
+    """Return the numbers that links of a scenario name, by path; of an orifice the form that it has."""
+    absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)}
+    return {
+        path: _number(scenario, _attributes(path, scenario)) for path in paths_in(scenario.graph) if path not in absent
+    }
 
 
 def number_at(scenario: Scenario, path: str) -> float:
@@ -144,7 +125,7 @@ def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
     """Return the sections of the orifices that take the form in which they are not."""
     return [
         section
-        for section in _ORIFICES
+        for section in ORIFICES
         if any(f"{section}.{name}" in paths for name in other_form(scenario.device, section))
     ]
 
@@ -175,123 +156,3 @@ def _replace_number(node: Any, attributes: tuple[str, ...], number: Any) -> Any:
     holder = held_in(node, name)
     assert holder is not None, f"a declared number '{name}' is in a {type(node).__name__}"
     return replace(node, **{holder: _replace_number(getattr(node, holder), attributes, number)})
-
-
-@dataclass(frozen=True, slots=True)
-class Columns:
-    """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations.
-
-    ``given`` are the paths that are no followers.
-    """
-
-    base: Scenario
-    values: Mapping[str, Floats]
-    declared: Mapping[str, Quantity]
-    given: frozenset[str]
-
-    @property
-    def runs(self) -> int:
-        """Number of runs."""
-        return next(iter(self.values.values())).size
-
-    def only(self, kept: Any) -> "Columns":
-        """Return the columns of some runs, by a mask or by places."""
-        return replace(self, values={path: column[kept] for path, column in self.values.items()})
-
-
-def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> Columns:
-    """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for.
-
-    Those of the paths in ``gauge`` count from the atmosphere of their run.
-    """
-    if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
-        raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
-    # Effects of other packages are known by their paths once they are loaded.
-    find_effects(columns)
-    declared = declared_numbers(base)
-    values: dict[str, Floats] = {}
-    for given, column in columns.items():
-        path = chosen_path(given, base)
-        _check_path(base, given, path, declared)
-        # valve.area and valves.NAME.area are one number of the chosen valve.
-        if path in values:
-            raise ScenarioError(f"{base.name}: '{given}' and '{path}' are the same value; give one of them")
-        values[path] = np.ascontiguousarray(column, dtype=np.float64)
-    shapes = {path: column.shape for path, column in values.items()}
-    if len(set(shapes.values())) != 1 or any(len(shape) != 1 or shape[0] == 0 for shape in shapes.values()):
-        raise ScenarioError(
-            f"{base.name}: an ensemble needs columns of one length, one value for each run, not {shapes or 'none'}"
-        )
-    pair = in_two_forms(values)
-    if pair is not None:
-        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
-    for section in _ORIFICES:
-        form = [f"{section}.{name}" for name in other_form(base.device, section)]
-        missing = [path for path in form if path not in values]
-        if missing and len(missing) < len(form):
-            raise ScenarioError(
-                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
-            )
-    every = moving_together(base, absolute(base, values, gauge))
-    return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
-
-
-def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:
-    """Return the columns with absolute pressures in place of those that count from the atmosphere of their run."""
-    atmosphere = columns.get(ATMOSPHERE_PATH, base.device.supply.atmospheric_pressure)
-    return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
-
-
-def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> None:
-    if path in declared:
-        return
-    if path in _TEXTS:
-        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
-    if base.controller.kind == PYTHON_CONTROLLER and path.startswith("controller."):
-        raise ScenarioError(
-            f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
-            "a module with a KIND has them (docs/how-to/extend.md)"
-        )
-    hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
-    raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")
-
-
-TimeTexts = Mapping[str, Mapping[str, Any]]
-"""The times of a scenario by section and name, as a file gives them."""
-
-
-def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock:
-    """Return the clock [s] of a run with other times, which are read as overrides of the scenario ``name`` are.
-
-    ScenarioError if they do not fit together.
-    """
-    document = {section: dict(texts) for section, texts in given.items()}
-    for path, value in times.items():
-        section, key = path.split(".")
-        # A rate takes the place of a period that the file has, and the reverse.
-        if section == "controller":
-            document[section] = {}
-        document[section][key] = f"{value!r} {_UNIT_OF_TIMES.get(path, 's')}"
-    return read_clock(Reading(name, document, frozenset(times)))
-
-
-def time_texts(base: Scenario) -> TimeTexts:
-    """Return the times as the scenario's file gives them, or the numbers where the scenario was changed since."""
-    document = apply_overrides(base.origin.content, base.origin.overrides, base.name).document
-    texts = {
-        section: {name: value for name, value in document[section].items() if f"{section}.{name}" in TIMES}
-        for section in ("run", "controller")
-    }
-    # The file speaks for the scenario only as long as nobody has changed its times in Python.
-    if read_clock(Reading(base.name, texts)) == clock_of(base):
-        return texts
-    run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}
-    return {
-        "run": {name: f"{value!r} s" for name, value in run.items()},
-        "controller": {"period": f"{base.controller.period!r} s"},
-    }
-
-
-def clock_of(base: Scenario) -> Clock:
-    """Return the clock that a scenario has."""
-    return Clock(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)

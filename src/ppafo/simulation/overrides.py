@@ -15,15 +15,7 @@ from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
-from ppafo.parameters.overrides import (
-    Given,
-    check_valve,
-    of_another_valve,
-    other_forms,
-    over,
-    override_set,
-    split_override,
-)
+from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
 from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
 from ppafo.units import SI, number_text
 
@@ -40,11 +32,11 @@ class OverriddenDocument:
 
     document: dict[str, Any]
     paths: frozenset[str]
-    device: tuple[str, ...]
+    device: tuple[Override, ...]
 
 
 def apply_overrides(
-    document: Mapping[str, Any], overrides: Iterable[str], file: str, declared: Declared = OF_A_VANE
+    document: Mapping[str, Any], overrides: Iterable[Override], file: str, declared: Declared = OF_A_VANE
 ) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is what messages call it.
 
@@ -55,12 +47,8 @@ def apply_overrides(
     """
     overrides_of = override_set(overrides, ScenarioError, declared.same)
     if _VALVE in overrides_of:
-        check_valve(
-            map(str, overrides_of.values()),
-            overrides_of[_VALVE].text,
-            f"override '{overrides_of[_VALVE]}'",
-            ScenarioError,
-        )
+        chosen = overrides_of[_VALVE]
+        check_valve(overrides_of.values(), chosen.text, f"override '{chosen}'", ScenarioError)
     changed = _with_one_path_each(document, file, declared)
     of_device = {
         path: override
@@ -84,36 +72,34 @@ def apply_overrides(
             changed.setdefault(section, {}).setdefault("overrides", []).append(f"{inner}={own[path].text}")
         else:
             _set(changed, path, own[path].text, file, declared)
-    return OverriddenDocument(changed, frozenset(own), tuple(map(str, of_device.values())))
+    return OverriddenDocument(changed, frozenset(own), tuple(of_device.values()))
 
 
 def over_layer(
     content: Mapping[str, Any],
-    earlier: Sequence[str],
-    later: Sequence[str],
+    earlier: Sequence[Override],
+    later: Sequence[Override],
     file: str,
     declared: Declared,
     valve: str = "",
-) -> tuple[str, ...]:
+) -> tuple[Override, ...]:
     """Return two layers of overrides of a document as one set: the later ones replace by path, form and kind.
 
     ``valve`` is the name of the one that is chosen unless the later ones choose another.
     """
-    new = override_set(later, ScenarioError, declared.same)
-    chosen = new[_VALVE].text if _VALVE in new else valve
-    if _VALVE in new:
-        earlier = [text for text in earlier if not of_another_valve(split_override(text, ScenarioError).typed, chosen)]
-    both = over(earlier, later, ScenarioError, declared.same, chosen)
-    choosing = {path for path in new if _is_choosing(path)}
+    for override in later:
+        if override.typed == _VALVE:
+            valve = override.text
+            earlier = [old for old in earlier if not of_another_valve(old.typed, valve)]
+    every = layered(earlier, later, ScenarioError, declared.same, valve)
+    new = {path for path, override in every.items() if override in later}
+    choosing = set(filter(_is_choosing, new))
     if not choosing:
-        return both
-    every = override_set(both, ScenarioError, declared.same, chosen)
+        return tuple(every.values())
     changed = _with_one_path_each(content, file, declared)
     _choose_kinds(changed, every, file, declared)
-    known = frozenset(declared.paths(changed))
-    lost = {path for path in every if path not in known and path not in new and chosen_by(path, choosing)}
-    left = {text for path, text in every.items() if path not in lost}
-    return tuple(text for text in both if split_override(text, ScenarioError) in left)
+    known = new.union(declared.paths(changed))
+    return tuple(override for path, override in every.items() if path in known or not chosen_by(path, choosing))
 
 
 def _is_choosing(path: str) -> bool:
@@ -131,7 +117,7 @@ def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
 
 
 def _choose_kinds(
-    document: dict[str, Any], overrides_of: Mapping[str, Given], file: str, declared: Declared
+    document: dict[str, Any], overrides_of: Mapping[str, Override], file: str, declared: Declared
 ) -> tuple[str, ...]:
     """Set the kinds that are given, outer sections first, and return the paths that remain.
 
@@ -149,11 +135,11 @@ def _choose_kinds(
     return tuple(path for path in sorted(overrides_of) if path not in done)
 
 
-def _unused(path: str, overrides_of: Mapping[str, Given], known: tuple[str, ...], file: str) -> ScenarioError:
+def _unused(path: str, overrides_of: Mapping[str, Override], known: tuple[str, ...], file: str) -> ScenarioError:
     """Return the error for an override without use: beside a kind that is given, or in any case."""
     choosing = chosen_by(path, filter(_is_choosing, overrides_of))
     if not choosing:
-        return unknown_value(str(overrides_of[path]), known, f"{file} has")
+        return unknown_value(overrides_of[path], known, f"{file} has")
     section = f"{choosing[-1].rpartition('.')[0]}."
     near = [known_path for known_path in known if known_path.startswith(section)]
     hint = nearest_name(path, near) or f"; there it has {', '.join(near)}"
@@ -189,15 +175,14 @@ def is_of_device(path: str) -> bool:
     return path.partition(".")[0] in {*SECTIONS, EFFECTS_SECTION, "valve", "valves"}
 
 
-def unknown_value(override: str, known: tuple[str, ...], who_has: str) -> ScenarioError:
+def unknown_value(override: Override, known: tuple[str, ...], who_has: str) -> ScenarioError:
     """Return the error for a path that is neither known nor of the device; ``who_has`` begins as ``task.toml has``."""
-    change = split_override(override, ScenarioError)
     EFFECTS.load_own()
     allowed = [*known, *device_paths()]
-    section = change.typed.partition(".")[0]
+    section = override.typed.partition(".")[0]
     near = [name for name in known if name.startswith(f"{section}.")]
-    hint = nearest_name(change.typed, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
-    return ScenarioError(f"override '{change}': {who_has} no value '{change.typed}'{hint}")
+    hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(near[:6] or known[:6])}"
+    return ScenarioError(f"override '{override}': {who_has} no value '{override.typed}'{hint}")
 
 
 def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:

@@ -7,9 +7,9 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, group_of, load_program, samples_in
+from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, load_program, samples_in
 from ppafo.engine.linking import python_place
-from ppafo.engine.rows import row_numbers
+from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.ports import shown_signals

@@ -16,7 +16,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Number, held
 from ppafo.parameters.device import Device, Supply
-from ppafo.parameters.graph import Graph
+from ppafo.parameters.graph import Graph, outside
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
 
 if TYPE_CHECKING:
@@ -380,8 +380,7 @@ class Scenario:
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
         # The settings of the law that leaves follow nothing any more.
-        own = ("controller.", "timing.")
-        links = {path: link for path, link in self.links.items() if not path.startswith(own)}
+        links = outside(self.links, "controller", "timing")
         return replace(self, controller=Control(PYTHON_CONTROLLER, {}, self.controller.period, controller), links=links)
 
 

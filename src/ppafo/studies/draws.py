@@ -15,7 +15,7 @@ from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
-from ppafo.studies.sampling import NOISE, correlate, other_noise, uniform_numbers, with_noise
+from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
 from ppafo.units import parse_quantity
 
@@ -96,16 +96,6 @@ def seeds_of_noise(scenarios: Iterable[Scenario], paths: Sequence[str], first: i
     """
     noise = Uncertainty(with_noise((), None, scenarios, paths)[0])
     return noise.random_columns(first, count, seed)[NOISE] if noise.has_noise else np.zeros(0)
-
-
-NOISE_DRAWS = 512
-"""Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
-
-
-def with_new_noise(columns: Columns) -> Columns:
-    """Return the first ``NOISE_DRAWS`` draws, each with another noise stream and all else as it was."""
-    first = {path: column[:NOISE_DRAWS] for path, column in columns.items()}
-    return first | {NOISE: other_noise(first[NOISE])}
 
 
 def study_of(

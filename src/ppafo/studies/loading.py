@@ -25,7 +25,7 @@ from ppafo.errors import (
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
-from ppafo.parameters.overrides import other_forms, override_set
+from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
@@ -161,7 +161,8 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source)
 def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Configuration]) -> None:
     """Refuse a value that is set in a configuration in which it, or another form of it, also varies."""
     for each, loaded in zip(parsed.configurations, configurations, strict=True):
-        override = override_set(each.overrides, StudyError, valve=loaded.scenario.device.valve_name)
+        given = read_overrides(each.overrides, StudyError)
+        override = override_set(given, StudyError, valve=loaded.scenario.device.valve_name)
         for entry in parsed.vary:
             path = chosen_path(entry.path, loaded.scenario)
             # The varied column replaces the value in every run, whichever form of it (area or conductance) is set.

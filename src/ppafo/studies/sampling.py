@@ -14,7 +14,7 @@ realisation: where sensors are noisy, every draw gets a noise stream of its own.
 
 import threading
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -164,6 +164,16 @@ def with_noise(
         return (*drawn, noise), None
     alone = (*(0.0,) * len(drawn), 1.0)
     return (*drawn, noise), (*((*row, 0.0) for row in scores), alone)
+
+
+NOISE_DRAWS = 512
+"""Draws that are run again with other noise, at most: its fraction of the variance is then known to some percent."""
+
+
+def with_new_noise(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Return the first ``NOISE_DRAWS`` draws, each with another noise stream and all else as it was."""
+    first = {path: column[:NOISE_DRAWS] for path, column in columns.items()}
+    return first | {NOISE: other_noise(first[NOISE])}
 
 
 def other_noise(seeds: Floats) -> Floats:

@@ -238,7 +238,7 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
     of_object = [text for text in changes if scenario.controller.custom is not None and _SETTING.match(text)]
     if of_object:
         raise StudyError(f"override '{of_object[0]}': scenario '{scenario.name}' is controlled by a Python object")
-    # Overrides load the file anew, so what was replaced in Python would silently come back.
+    # Overrides begin at what the file said, so what was replaced in Python would silently come back.
     if reloaded(scenario, ()) != scenario:
         raise StudyError(
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"

@@ -12,11 +12,11 @@ import numpy as np
 from ppafo.errors import ScenarioError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters import apply_overrides, load_parameter_set
+from ppafo.parameters import load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
-from ppafo.parameters.overrides import split_override
-from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
+from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, with_overrides
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.loading import set_name
@@ -282,11 +282,11 @@ def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround,
     """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
     origin, path = scenario.origin, varied.path
     folder = Path(origin.file).parent if origin.file is not None else Path()
-    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
+    own = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
     parameters = load_parameter_set(set_name(origin.parameter_set, folder))
-    for overrides in (origin.content["device"].get("overrides", ()), own):
-        parameters = apply_overrides(parameters, overrides, valve=origin.valve)
+    for overrides in (read_overrides(origin.content["device"].get("overrides", ())), own):
+        parameters = with_overrides(parameters, overrides, origin.valve)
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:

@@ -15,6 +15,7 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, field
 from importlib.resources import files
 
+from ppafo.engine.compilers import LIBRARY
 from ppafo.engine.entries import INLINE
 from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.program import Program
@@ -28,7 +29,6 @@ from ppafo.translation.value_types import (
     INT,
     INT16,
     INT32,
-    LIBRARY,
     Array,
     Items,
     Row,

@@ -63,9 +63,6 @@ class Shared:
 
 Type: TypeAlias = Scalar | Row | Items | Array | Handed | Shared
 
-LIBRARY = frozenset({"exp", "log", "pow"})
-"""Functions that every C library has, with last bits of its own."""
-
 
 def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
     """Functions of a composed module that are called from outside, with the types of their parameters."""

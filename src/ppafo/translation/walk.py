@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import Any, Protocol
 
-from ppafo.engine.compilers import UntranslatableError
+from ppafo.engine.compilers import LIBRARY, UntranslatableError
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
@@ -23,7 +23,6 @@ from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
     INT,
-    LIBRARY,
     Array,
     Handed,
     Items,

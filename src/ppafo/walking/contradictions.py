@@ -28,7 +28,10 @@ COMPRESSION = 1.6
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two numbers of a walk: one must be below, above, at most or at least the other; ``unit`` in SI, words if not."""
+    """Two numbers of a walk: the one at ``path`` must be below, above, at most or at least the ``other``.
+
+    ``unit`` is that of both in SI, ``words`` what is wrong where the bare relation would not say it.
+    """
 
     path: str
     relation: str
@@ -58,14 +61,14 @@ _IS_BAD = {"below": operator.ge, "above": operator.le, "at most": operator.gt, "
 
 
 class Contradiction(NamedTuple):
-    """A path, the runs that it contradicts another number in, and what to say of one of them."""
+    """A path, whether its number contradicts another one, in all runs or in each (runs,), and why in one of them."""
 
     path: str
     is_bad: Any
     reason: Callable[[int], str]
 
     def line(self, run: int) -> str:
-        """The path and what to say of a run."""
+        """The path, and what is wrong with it in a run."""
         return f"{self.path}: {self.reason(run)}"
 
 
@@ -103,22 +106,13 @@ def check_no_bottle(scenario: Scenario) -> None:
         )
 
 
-def _text(number: Any, run: int, unit: str) -> str:
-    return short_quantity_text(at(number, run), unit) if unit else f"{at(number, run):g}"
-
-
 def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
-    settings, wearer = scenario.controller.settings, walk_of(scenario).wearer
-    present = {f"controller.{name}": number for name, number in settings.items()}
-    present |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
-    for pair in PAIRS:
-        if pair.path in present and pair.other in present:
-            number, other = present[pair.path], present[pair.other]
-            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
+    """Yield every pair of numbers that could contradict each other, with whether they do."""
+    yield from _of_pairs(scenario)
     # An object in charge has no settings that could contradict.
     if scenario.controller.kind == PYTHON_CONTROLLER:
         return
-    valve = scenario.device.valve.kind
+    settings, valve = scenario.controller.settings, scenario.device.valve.kind
     fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
     yield Contradiction(
         "controller.kind",
@@ -128,8 +122,11 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
             f"take device.valve 'proportional', or controller.kind {fitting}"
         ),
     )
+    # A controller with a threshold of force finds the events of the gait by itself.
     if "load_threshold" in settings:
-        yield from _of_events(scenario)
+        yield from _of_times(scenario)
+        yield from _of_swing(scenario)
+        yield from _of_pressures(scenario)
     if "peak_time" in settings:
         peak, fall = settings["peak_time"], settings["fall_time"]
         yield Contradiction(
@@ -139,6 +136,17 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
         )
 
 
+def _of_pairs(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield the contradictions of ``PAIRS`` of which a walk has both numbers."""
+    wearer = walk_of(scenario).wearer
+    numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
+    numbers |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
+    for pair in PAIRS:
+        if pair.path in numbers and pair.other in numbers:
+            number, other = numbers[pair.path], numbers[pair.other]
+            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
+
+
 def _reason(pair: Pair, other: Any, run: int) -> str:
     value = _text(other, run, pair.unit)
     if pair.words:
@@ -146,24 +154,24 @@ def _reason(pair: Pair, other: Any, run: int) -> str:
     return f"must be {pair.relation} {pair.other}, which is {value}"
 
 
-def _of_events(scenario: Scenario) -> Iterator[Contradiction]:
-    """Yield what contradicts the settings of a controller that sees events by force: times, angle, gait, pressures."""
-    settings, period, gait = scenario.controller.settings, scenario.controller.period, walk_of(scenario).gait
-    stride, first = gait.stride_time, settings["first_stride_time"]
+def _of_times(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield the times of a controller against those of the gait, the valve and its own samples."""
+    settings, period = scenario.controller.settings, scenario.controller.period
+    stride, first_stride = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
     yield Contradiction(
         "controller.first_stride_time",
-        np.logical_or(first <= 0.5 * stride, first >= 2.0 * stride),
+        np.logical_or(first_stride <= 0.5 * stride, first_stride >= 2.0 * stride),
         lambda run: (
             f"must be between half and twice the stride of the gait, which is {_text(round(stride, 4), run, 's')}"
         ),
     )
     # A valve that has not moved yet neither fills nor vents, and would be taken for one that fails.
-    delay = walking_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
+    dead_time = walking_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
     for name in ("fill_time", "vent_time"):
         yield Contradiction(
             f"controller.{name}",
-            settings[name] <= delay,
-            lambda run: f"must be longer than the dead time of the valve, which is {_text(delay, run, 's')}",
+            settings[name] <= dead_time,
+            lambda run: f"must be longer than the dead time of the valve, which is {_text(dead_time, run, 's')}",
         )
     yield Contradiction(
         "controller.frozen_time",
@@ -171,16 +179,18 @@ def _of_events(scenario: Scenario) -> Iterator[Contradiction]:
         lambda run: f"must be longer than two sample periods of the controller, {_text(period, run, 's')} each",
     )
 
-    # The swing must lie between what sensor and device reach, and the gait must have a force to see.
-    actuator = scenario.device.actuator
-    least = larger(settings["lowest_angle"], actuator.angle_min)
-    most = smaller(settings["highest_angle"], actuator.angle_max)
-    swing = settings["swing_angle"]
+
+def _of_swing(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield the angle of the swing against what sensor and device reach, and a gait without a force to see."""
+    settings, actuator = scenario.controller.settings, scenario.device.actuator
+    lowest = larger(settings["lowest_angle"], actuator.angle_min)
+    highest = smaller(settings["highest_angle"], actuator.angle_max)
+    swing, gait = settings["swing_angle"], walk_of(scenario).gait
     yield Contradiction(
         "controller.swing_angle",
-        np.logical_or(swing <= least, swing >= most),
+        np.logical_or(swing <= lowest, swing >= highest),
         lambda run: (
-            f"lies outside the range of sensor and device, {_text(least, run, 'rad')} to {_text(most, run, 'rad')}"
+            f"lies outside the range of sensor and device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}"
         ),
     )
     yield Contradiction(
@@ -192,23 +202,24 @@ def _of_events(scenario: Scenario) -> Iterator[Contradiction]:
         ),
     )
 
-    # The atmosphere, the supply and what a moving foot makes of it are the limits of the pressures.
-    supply = scenario.device.supply
-    room = supply.atmospheric_pressure
-    lowest = smaller(supply.pressure, supply.dorsiflexion_pressure)
+
+def _of_pressures(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield the pressures of a controller against the atmosphere, the supply and what a moving foot makes of it."""
+    settings, supply = scenario.controller.settings, scenario.device.supply
+    atmosphere, filled = supply.atmospheric_pressure, settings["filled_pressure"]
+    lower_supply = smaller(supply.pressure, supply.dorsiflexion_pressure)
     compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION
     yield Contradiction(
         "controller.lowest_pressure",
-        settings["lowest_pressure"] >= room,
-        lambda run: f"must be below the atmosphere, which is {_text(room, run, 'Pa_a')}",
+        settings["lowest_pressure"] >= atmosphere,
+        lambda run: f"must be below the atmosphere, which is {_text(atmosphere, run, 'Pa_a')}",
     )
-    filled = settings["filled_pressure"]
     yield Contradiction(
         "controller.filled_pressure",
-        np.logical_or(filled <= room, filled >= lowest),
+        np.logical_or(filled <= atmosphere, filled >= lower_supply),
         lambda run: (
             "must be between atmosphere and supply, which are "
-            f"{_text(room, run, 'Pa_a')} and {_text(lowest, run, 'Pa_a')}"
+            f"{_text(atmosphere, run, 'Pa_a')} and {_text(lower_supply, run, 'Pa_a')}"
         ),
     )
     yield Contradiction(
@@ -216,3 +227,8 @@ def _of_events(scenario: Scenario) -> Iterator[Contradiction]:
         settings["highest_pressure"] <= compressed,
         lambda run: f"must be above {_text(compressed, run, 'Pa_a')}: a moving foot compresses the gas in a chamber",
     )
+
+
+def _text(number: Any, run: int, unit: str) -> str:
+    """Return the number of a run, one for all or (runs,), with its SI unit as a message shows it."""
+    return short_quantity_text(at(number, run), unit) if unit else f"{at(number, run):g}"

@@ -17,7 +17,8 @@ from ppafo.control.walking.catalog import (
 from ppafo.documents.models import make_schema, one_of, optional, quote, table
 from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF, PlantFault
+from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.simulation.declaration import (
     PERIOD,
     RATE,

@@ -15,13 +15,13 @@ from ppafo.control.walking.fault_flags import FAULT_FLAGS, FaultFlag
 from ppafo.engine.lanes import Floats
 from ppafo.model import contact as ground
 from ppafo.model.helping import HELPS, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
+from ppafo.model.shut_off import NEVER
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import from_si, without_exponent
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, law_of
-from ppafo.walking.preparation import NEVER
 
 EVENTS = ("heel strike", "toes on", "heel off", "toes off")
 """In the order of a stride; 'toes on' is the foot that has come down flat."""

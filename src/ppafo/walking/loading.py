@@ -6,22 +6,23 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ppafo.arguments import Overrides, checked
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused_as
-from ppafo.gait import NORMATIVE, load_gait
+from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
-from ppafo.model.plant_faults import PLANT_FAULTS, SHUT_OFF
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.regulator import SupplyLines
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.loading import set_or_load
-from ppafo.parameters.overrides import split_override
+from ppafo.parameters.overrides import read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
@@ -29,10 +30,12 @@ from ppafo.simulation.loading import (
     Layout,
     ScenarioRequest,
     assumed_lines,
+    origin_of,
     read_device,
     read_gas_model,
     read_hardware,
     read_supply_line,
+    request_again,
     scenario_of,
 )
 from ppafo.simulation.motion_kind import MOTIONS, WALK
@@ -42,7 +45,6 @@ from ppafo.simulation.scenario import (
     Assumption,
     Control,
     Initial,
-    Origin,
     RunSettings,
     Scenario,
     Sensors,
@@ -73,7 +75,7 @@ from ppafo.walking.motion import (
 )
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.task_sequence import load_task_sequence
+from ppafo.walking.task_sequence import TaskSequence, load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
@@ -97,7 +99,7 @@ def list_walks() -> tuple[str, ...]:
 def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None:
     """Raise ScenarioError for a duration that an override sets beside ``minutes``."""
     if minutes is not None and any(
-        split_override(override, ScenarioError)[0] == "run.duration" for override in overrides
+        override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
@@ -126,22 +128,22 @@ def load_walk(
     'solenoid'
     """
     name_plugins(plugins)
-    file, words = label(str(scenario)), tuple(overrides)
+    file, given = label(str(scenario)), read_overrides(overrides, ScenarioError)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(value) for path, value in named.items() if value is not None}
     # Refuse an override beside another word for the same value, by path in ``others``.
-    for override in words:
-        path, text = split_override(override, ScenarioError)
+    for override in given:
+        path = override.typed
         other = instead.get(OF_A_WALK.same.get(path, path))
         if other is not None:
             raise ScenarioError(
-                f"{file}: override '{path}={text}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
+                f"{file}: override '{override}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
                 "already; give it once"
             )
     content = FILE.parse(FILE.read(scenario), file)
     folder = Path(scenario).parent
     return scenario_of(
-        ScenarioRequest(file, str(scenario), folder, content, words, set_or_load(parameter_set), instead), WALKING
+        ScenarioRequest(file, str(scenario), folder, content, given, set_or_load(parameter_set), instead), WALKING
     )
 
 
@@ -151,27 +153,27 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     ``overrides`` are values of the bottle, ``room.temperature=5 degC``. ScenarioError or ParameterError for what does
     not go with a bottle, and where the walk is no longer what its file and overrides say.
     """
-    origin = scenario.origin
-    folder = Path() if origin.file is None else Path(origin.file).parent
-    as_given = ScenarioRequest(scenario.name, origin.file, folder, origin.content, origin.overrides)
-    if _walked_with(scenario_of(as_given, WALKING)) != _walked_with(scenario):
+    as_given = replace(request_again(scenario.origin), file=scenario.name)
+    if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
             f"{scenario.name}: this walk is not what its file says (a number was changed after it was loaded, or the "
             "file or the package has changed since): give the bottle where the walk is loaded, with --bottle"
         )
-    content, before = origin.content, origin.overrides
+    content, before = as_given.content, as_given.overrides
     if bottle is not None:
         # Another bottle takes the place of the whole section, its overrides included.
         content = {name: part for name, part in content.items() if name != BOTTLE}
-        before = tuple(text for text in before if not text.startswith(f"{BOTTLE}."))
-    changes = tuple(text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides)
+        before = tuple(override for override in before if not override.typed.startswith(f"{BOTTLE}."))
+    changes = read_overrides(
+        (text if text.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{text}" for text in overrides), ScenarioError
+    )
     instead = {} if bottle is None else {BOTTLE_NAME: str(bottle)}
     every = over_layer(content, before, changes, scenario.name, WALKING.declared)
     return scenario_of(replace(as_given, content=content, overrides=every, instead=instead), WALKING)
 
 
-def _walked_with(scenario: Scenario) -> tuple[Any, ...]:
-    """Return what a walk on another bottle shares with a walk: all but how long it is and what it hangs on."""
+def _without_bottle(scenario: Scenario) -> tuple[Any, ...]:
+    """Return what a walk shares with the same walk on another bottle: all but its length and the bottle."""
     hardware = scenario.device, scenario.supply_lines, scenario.gas_model, scenario.sensors, scenario.controller
     return *hardware, scenario.run.step, replace(walk_of(scenario), bottle=None)
 
@@ -181,56 +183,32 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
 
     ScenarioError, ParameterError or DataError for the first value that cannot be used.
     """
-    document, instead = changed.document, request.instead
-    if BOTTLE_NAME in instead:
-        document.setdefault(BOTTLE, {})["name"] = instead[BOTTLE_NAME]
+    document = changed.document
+    if BOTTLE_NAME in request.instead:
+        document.setdefault(BOTTLE, {})["name"] = request.instead[BOTTLE_NAME]
     reading = Reading(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    named_sequence = _named_file("task_sequence", request, document)
-    with _named_by("task_sequence", reading, request, ScenarioError):
-        sequence = None if named_sequence is None else load_task_sequence(named_sequence)
-    with _named_by("gait", reading, request, DataError):
-        walked = load_gait(_named_file("gait", request, document) or NORMATIVE)
-    is_named = "gait" in instead or "gait" in document
-    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in instead else request.folder)
+    led = _led_by(reading, request)
+    bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in request.instead else request.folder)
     if bottle is not None:
         # A bottle always feeds lines, with the defaults of what the file does not say of them.
         document.setdefault(SUPPLY_LINE, {})
     line = read_supply_line(reading, device)
-    line = line if line is None or bottle is None else bottle.fed(line)
+    if line is not None and bottle is not None:
+        line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
-    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
-    person = reading.number(f"wearer.{PERSON.name}", PERSON)
-    if person != int(person):
-        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
-    motion = WalkMotion(
-        motion_kind=MOTIONS[kind_at(document, "motion") or WALK],
-        gait=walked,
-        wearer=read_wearer(reading, walked, is_named),
-        timing=timing_of(document),
-        forces={name: sensors[name] for name in FORCES},
-        faults=faults,
-        task_sequence=sequence,
-        bottle=bottle,
-        wearer_origin=wearer_origin(reading, walked, is_named),
-        person=person,
-        broken=_broken(reading, line),
-        shut_off=_shut_off(reading),
-    )
-    # The path of a file in full means the same from any folder.
-    full = {path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in instead.items()}
-    named = tuple(f"{path}={name}" for path, name in full.items())
+    motion = _motion(reading, led, line, bottle, sensors)
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
-    room = device.supply.atmospheric_pressure
+    atmosphere = device.supply.atmospheric_pressure
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
         device=device,
         run=RunSettings(DEFAULT_DURATION, step, record_interval(DEFAULT_DURATION)),
         motion=motion,
-        initial=Initial(room, room),
+        initial=Initial(atmosphere, atmosphere),
         controller=controller,
         reference=NO_REFERENCE,
         sensors=Sensors(
@@ -238,9 +216,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=Origin(
-            request.path, document["device"]["set"], hardware.valve, (*request.overrides, *named), request.content
-        ),
+        origin=origin_of(request, document, hardware.valve, _named_beside(request)),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -248,6 +224,61 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     # Contradictions are looked for in the whole, once each number is usable by itself.
     check_walk(scenario, reading)
     return with_duration(scenario, _duration(reading, scenario))
+
+
+class _Led(NamedTuple):
+    """What leads the leg: a gait, whether anybody named it, and what the wearer does one after the other, if so."""
+
+    gait: Gait
+    is_named: bool
+    task_sequence: TaskSequence | None
+
+
+def _led_by(reading: Reading, request: ScenarioRequest) -> _Led:
+    """Return the gait and the task sequence of a walk, from the files that it names."""
+    sequence_file = _named_file("task_sequence", request, reading.document)
+    with _named_by("task_sequence", reading, request, ScenarioError):
+        sequence = None if sequence_file is None else load_task_sequence(sequence_file)
+    with _named_by("gait", reading, request, DataError):
+        gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
+    return _Led(gait, "gait" in request.instead or "gait" in reading.document, sequence)
+
+
+def _motion(
+    reading: Reading,
+    led: _Led,
+    line: SupplyLine | None,
+    bottle: BottleSupply | None,
+    sensors: Mapping[str, float],
+) -> WalkMotion:
+    """Return who walks how, and which sensors and parts fail; ``sensors`` are the settings [SI] of its sensors."""
+    faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
+    person = reading.number(f"wearer.{PERSON.name}", PERSON)
+    if person != int(person):
+        raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
+    return WalkMotion(
+        motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
+        gait=led.gait,
+        wearer=read_wearer(reading, led.gait, led.is_named),
+        timing=timing_of(reading.document),
+        forces={name: sensors[name] for name in FORCES},
+        faults=faults,
+        task_sequence=led.task_sequence,
+        bottle=bottle,
+        wearer_origin=wearer_origin(reading, led.gait, led.is_named),
+        person=person,
+        broken=_broken(reading, line),
+        shut_off=_shut_off(reading),
+    )
+
+
+def _named_beside(request: ScenarioRequest) -> tuple[str, ...]:
+    """Return the files that were named beside a walk's own as overrides."""
+    # The path of a file in full means the same from any folder.
+    full = {
+        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
+    }
+    return tuple(f"{path}={name}" for path, name in full.items())
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
@@ -263,9 +294,12 @@ def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]
 def _named_by(
     path: str, reading: Reading, request: ScenarioRequest, kind: type[PpafoError]
 ) -> AbstractContextManager[None]:
-    """Return what names the key in errors about a file that the walk itself names; an option names its own."""
-    own = path not in request.instead and path in reading.document
-    return refused_as(kind, reading.quote(path), kind) if own else nullcontext()
+    """Return what puts the key at ``path`` before errors about the file that the walk names there.
+
+    A file that an option names is in the error already.
+    """
+    is_of_walk = path not in request.instead and path in reading.document
+    return refused_as(kind, reading.quote(path), kind) if is_of_walk else nullcontext()
 
 
 def _control(
@@ -362,6 +396,7 @@ def lag_of_bandwidth(bandwidth: float) -> float:
 
 
 def _terms(valve: Valve) -> dict[str, Term]:
+    """Return how lags and delays [s] of valve and sensors, which a controller may follow, come from their settings."""
     kind = VALVES[valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
     paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay

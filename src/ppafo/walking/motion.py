@@ -14,7 +14,7 @@ from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
-from ppafo.model.plant_faults import SHUT_OFF
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import Clock, MotionKind
 from ppafo.simulation.scenario import Scenario

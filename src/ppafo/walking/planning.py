@@ -1,7 +1,6 @@
 """From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
 from ppafo.engine.lanes import Batch
-from ppafo.engine.rows import leaf_paths, leaves, rebuilt
+from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
 from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
@@ -18,11 +17,13 @@ from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import GaitNow, gait_at
 from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters, PlantState
-from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults, ShutOff
+from ppafo.model.plant_faults import SOUND, PlantFaults
 from ppafo.model.sensors import GaitSensors
+from ppafo.model.shut_off import NOT_FITTED, ShutOff
 from ppafo.model.valves import vent_valve
 from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
@@ -166,17 +167,6 @@ def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chamb
 def start_vented(device: Device, plant: PlantParameters, now: GaitNow) -> PlantState:
     """The state in which a walk begins: the ankle where the gait has it, and vented chambers."""
     return vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate)
-
-
-def of_each(function: Any, *rows: Any) -> Any:
-    """What a function makes of some NamedTuples of floats; where they have arrays (runs,), run by run."""
-    kinds, counts = [type(row) for row in rows], np.cumsum([0, *(len(leaves(row)) for row in rows)]).tolist()
-
-    def from_numbers(*numbers: float) -> Any:
-        parts = (numbers[first:last] for first, last in pairwise(counts))
-        return function(*(rebuilt(kind, part) for kind, part in zip(kinds, parts, strict=True)))
-
-    return over_runs(from_numbers, *(number for row in rows for number in leaves(row)))
 
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:

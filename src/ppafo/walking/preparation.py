@@ -19,6 +19,7 @@ from ppafo.model.gait import GaitNow
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, torque_of_shank
 from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.sensors import Fault, GaitSensors
+from ppafo.model.shut_off import NEVER
 from ppafo.simulation.plan import WHOLE, StepCounts, state_with_volumes
 from ppafo.walking.wearer import HeelRocker
 
@@ -30,8 +31,6 @@ STEPS_PER_FILLING = 15.0
 
 _TURN = 2.0 * math.pi
 
-NEVER = 1.0e9
-"""Time [s] of a fault that does not happen."""
 DISTORTED, FROZEN = "distorted", "frozen"
 DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "lost_share", "delay")
 """Numbers of a distorted sensor, in the order of ``distorting_fault``; the angle has no crosstalk, which is 0."""

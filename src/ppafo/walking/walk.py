@@ -22,6 +22,7 @@ from ppafo.metrics.strides import PER_STRIDE
 from ppafo.model.helping import STOPPED
 from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
+from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
@@ -190,8 +191,8 @@ def with_device_off(configuration: Scenario) -> Scenario:
     name = f"{configuration.name}-off"
     control = Control(event_on_off.OFF.name, {}, configuration.controller.period)
     motion = replace(walk_of(configuration), bottle=None, timing=THRESHOLDS)
-    gone = ("controller.", "timing.", "supply_line.")  # what follows others and is no longer there
-    links = {path: own for path, own in configuration.links.items() if not path.startswith(gone)}
+    # Nothing follows others where it is no longer there.
+    links = outside(configuration.links, "controller", "timing", "supply_line")
     return replace(configuration, name=name, controller=control, motion=motion, supply_line=None, links=links)
 
 

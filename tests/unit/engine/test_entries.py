@@ -21,7 +21,7 @@ from ppafo.engine.entries import (
     entry_types,
     with_arrays,
 )
-from ppafo.translation.native import NativeEntry
+from ppafo.translation.native_entries import NativeEntry
 from tests.compilers_here import modules_of
 
 

@@ -24,13 +24,14 @@ from ppafo.metrics.metric import Readings
 from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.numbers import TIMES, with_numbers
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import plan_run, plan_runs
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from ppafo.translation.c99 import program_source
-from ppafo.translation.native import build, run_native
+from scripts.built_programs import build, run_native
 from tests.built_once import shared_library
 
 PAGE = Path(__file__).parents[3] / "docs" / "how-to" / "export.md"

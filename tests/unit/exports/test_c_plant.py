@@ -125,6 +125,13 @@ def test_an_angle_at_which_a_chamber_has_no_volume_is_refused(angle: float, rate
     assert bytes(run.memory) == before
 
 
+@pytest.mark.parametrize("name", ["cylinder-servo", "pressure-loop"])
+def test_the_plant_of_a_loop_whose_gains_follow_other_numbers_has_neither_gains_nor_reference(name: str) -> None:
+    header = next(text for file, text in plant_library(load_scenario(name)).items() if file.endswith(".h")).decode()
+    assert "actuator_" in header
+    assert not re.search(r"double (controller_\w*(gain|stiffness)|reference_\w+);", header)
+
+
 @pytest.mark.parametrize("shape", ["loop", "plant"])
 def test_the_c_of_a_run_is_short_and_has_neither_lanes_nor_groups_that_are_packed_again(shape: str) -> None:
     files_of = {"loop": c_library, "plant": plant_library}[shape]

@@ -23,23 +23,23 @@ NOW = {ROOM: 1.0, FIRST: 4.0, SECOND: 4.0, START: 4.0}
 
 
 def test_what_is_given_moves_what_follows_it_and_what_follows_that() -> None:
-    assert resolved(GRAPH, {FIRST: 6.0}, NOW.__getitem__) == {FIRST: 6.0, SECOND: 6.0, START: 6.0}
-    assert resolved(GRAPH, {ROOM: 2.0}, NOW.__getitem__) == {ROOM: 2.0, FIRST: 5.0, SECOND: 5.0, START: 5.0}
+    assert resolved(GRAPH, {FIRST: 6.0}, NOW) == {FIRST: 6.0, SECOND: 6.0, START: 6.0}
+    assert resolved(GRAPH, {ROOM: 2.0}, NOW) == {ROOM: 2.0, FIRST: 5.0, SECOND: 5.0, START: 5.0}
 
 
 def test_what_is_given_itself_follows_nothing() -> None:
-    assert resolved(GRAPH, {FIRST: 6.0, SECOND: 5.0}, NOW.__getitem__) == {FIRST: 6.0, SECOND: 5.0, START: 5.0}
+    assert resolved(GRAPH, {FIRST: 6.0, SECOND: 5.0}, NOW) == {FIRST: 6.0, SECOND: 5.0, START: 5.0}
 
 
 def test_a_number_that_is_merely_equal_follows_only_what_is_given_itself() -> None:
     apart = {**NOW, SECOND: 4.0 + 1e-9}
-    assert resolved(GRAPH, {ROOM: 2.0, FIRST: 9.0}, apart.__getitem__)[SECOND] == 9.0
+    assert resolved(GRAPH, {ROOM: 2.0, FIRST: 9.0}, apart)[SECOND] == 9.0
     assert acting(GRAPH, {ROOM})[SECOND] == follows(ROOM, 3.0)
 
 
 def test_columns_are_resolved_run_by_run() -> None:
     rooms = np.array([1.0, 2.0])
-    assert resolved(GRAPH, {ROOM: rooms}, NOW.__getitem__)[START].tolist() == [4.0, 5.0]
+    assert resolved(GRAPH, {ROOM: rooms}, NOW)[START].tolist() == [4.0, 5.0]
 
 
 def test_links_of_what_was_replaced_end() -> None:
@@ -48,9 +48,9 @@ def test_links_of_what_was_replaced_end() -> None:
 
 
 def test_a_link_holds_while_it_gives_the_number() -> None:
-    assert holding(GRAPH, NOW.__getitem__) == GRAPH
+    assert holding(GRAPH, NOW) == GRAPH
     changed = {**NOW, FIRST: 5.0}
-    assert holding(GRAPH, changed.__getitem__) == {SECOND: (follows(ROOM, 3.0),), START: GRAPH[START]}
+    assert holding(GRAPH, changed) == {SECOND: (follows(ROOM, 3.0),), START: GRAPH[START]}
 
 
 def test_a_gauge_pressure_of_supply_and_start_counts_from_the_atmosphere_and_no_other_does() -> None:

@@ -17,10 +17,10 @@ from ppafo.metrics import METRICS
 from ppafo.model.gait import shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.loading import load_scenario, scenario_from_dict
-from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.simulate import simulate

@@ -9,8 +9,9 @@ import pytest
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Orifice, SonicOrifice
 from ppafo.parameters.overrides import over
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.numbers import TIMES, declared_numbers, number_at, other_form, with_numbers
+from ppafo.simulation.numbers import declared_numbers, number_at, other_form, with_numbers
 from ppafo.simulation.scenario import scenario_document
 
 

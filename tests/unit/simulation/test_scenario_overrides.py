@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 
 from ppafo.errors import ParameterError, PpafoError, ScenarioError
 from ppafo.loading import reloaded
+from ppafo.parameters.overrides import split_override
 from ppafo.simulation.declaration import OF_A_VANE
-from ppafo.simulation.loading import (
-    device_paths,
-    load_scenario,
-    scenario_from_dict,
-    split_override,
-)
+from ppafo.simulation.loading import device_paths, load_scenario, scenario_from_dict
 from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, ProfileChoice
 
 TASK = "torque-task-proportional"
@@ -139,8 +135,8 @@ def test_overrides_of_the_file_and_lists_are_not_paths() -> None:
 
 
 def test_an_override_is_split_at_its_first_equals_sign() -> None:
-    assert split_override("  run.duration =  1\n s ") == ("run.duration", "1 s")
-    assert split_override("description=a = b") == ("description", "a = b")
+    assert split_override("  run.duration =  1\n s ")[1:] == ("run.duration", "1 s")
+    assert split_override("description=a = b")[1:] == ("description", "a = b")
 
 
 PATHS = [*OF_A_VANE.paths(load_scenario(TASK).origin.content), *device_paths()]

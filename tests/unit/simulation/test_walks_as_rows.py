@@ -9,8 +9,8 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.loading import reloaded
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
-from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk, walk

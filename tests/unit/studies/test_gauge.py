@@ -13,8 +13,8 @@ from ppafo.analyses.find import solve as find_module
 from ppafo.analyses.sweep import statistic as statistic_module
 from ppafo.analyses.sweep.statistic import Statistic, parse_statistic
 from ppafo.errors import StudyError
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.numbers import check_columns
 from ppafo.studies.draws import atmosphere_of, level_of, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.study import Study

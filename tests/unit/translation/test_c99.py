@@ -17,13 +17,13 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.translation.c99 import c_source, program_source
-from ppafo.translation.native import build, run_native
-from ppafo.translation.value_types import entries_of
+from ppafo.translation.native_entries import parameters_of
 from ppafo.translation.walk import walk_module
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import with_duration
 from ppafo.walking.planning import plan_walk
 from scripts.bits import digest, drawn_batch, failures, plain_batch
+from scripts.built_programs import build, run_native
 from tests.composed_programs import drawn_programs
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror", "-fsyntax-only", "-ffp-contract=off")
@@ -54,7 +54,7 @@ def built(composed: str, folder: Path) -> Any:
     """A composed module by gcc, which stops where the C does what is not defined."""
     source = c_source(walk_module(composed), {}, "A test.")
     strict = ("-std=c99", "-O2", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-Wall", "-Wextra", "-Werror")
-    return build(source, folder, flags=strict, entries=entries_of(composed))
+    return build(source, folder, flags=strict, parameters=parameters_of(composed))
 
 
 def whole_numbers(left: float, right: float) -> tuple[float, float, float, float, float]:

@@ -19,6 +19,8 @@ from ppafo.golden_bits import digest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.translation import compiling, native
+from ppafo.translation.native_source import translated_text
+from scripts.built_programs import build
 from scripts.golden_bits import drawn_batch
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
@@ -167,10 +169,10 @@ def test_temporary_files_of_a_compiler_that_is_killed_are_with_what_it_was_to_ma
     aside = tmp_path / "aside"
     aside.mkdir()
     with pytest.raises(CompilerError):
-        native.build("int one(void) { return 1; }", aside, [str(killed)])
+        build("int one(void) { return 1; }", aside, [str(killed)])
     assert (aside / "program-1.o").exists()
 
 
 def test_what_has_no_c_is_refused() -> None:
     with pytest.raises(ProgramError, match="cannot be translated"):
-        native.translated_text(NO_C)
+        translated_text(NO_C)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.model.plant_faults import PLANT_FAULTS
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from scripts.drawn_walks import (
     AFTER,
     AT_REST,

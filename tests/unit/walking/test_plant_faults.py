@@ -7,8 +7,10 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
+from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.helping import STOPPED
-from ppafo.model.plant_faults import NOT_FITTED, PLANT_FAULTS, SOUND, PlantFaults
+from ppafo.model.plant_faults import SOUND, PlantFaults
+from ppafo.model.shut_off import NOT_FITTED
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import failing_of, plan_walk

@@ -18,9 +18,8 @@ from ppafo.studies.draws import (
     Uncertainty,
     check_fraction,
     uncertainty_of,
-    with_new_noise,
 )
-from ppafo.studies.sampling import NOISE
+from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at
 from ppafo.study.runs import Rows, Runs, Tally, failures_of, unvaried

@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.analyses.endurance.draw import Draw, draw_of_numbers, largest_flow
-from ppafo.errors import DataError, PpafoError, nearest_name, refused_as
+from ppafo.errors import DataError, PpafoError, ScenarioError, nearest_name, refused_as
+from ppafo.parameters.overrides import read_overrides
 from ppafo.signals import Recording
 from ppafo.simulation.loading import ScenarioRequest, scenario_of
 from ppafo.simulation.scenario import Scenario
@@ -142,4 +143,5 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
         if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(source, str | None)):
             raise DataError("'configuration' says no walk")
         folder = Path() if source is None else Path(source).parent
-        return scenario_of(ScenarioRequest(name, source, folder, content, tuple(map(str, overrides))), WALKING)
+        changes = read_overrides(map(str, overrides), ScenarioError)
+        return scenario_of(ScenarioRequest(name, source, folder, content, changes), WALKING)

@@ -22,13 +22,13 @@ from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
 from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import list_sets, load_parameter_set
-from ppafo.parameters.overrides import check_valve
+from ppafo.parameters.overrides import check_valve, read_overrides
 from ppafo.parameters.parameter_set import (
     ParameterSet,
-    apply_overrides,
     atmospheric_pressure,
     chosen_valve,
     number_in_si,
+    with_overrides,
 )
 from ppafo.progress import Report, report_nothing
 from ppafo.storage.foreign import read_foreign
@@ -115,8 +115,9 @@ def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
     name = problem.device.set
     beside = folder / name
     base = load_parameter_set(beside if beside.suffix == ".toml" else name)
-    check_valve(problem.device.overrides, problem.device.valve, f"device.valve = '{problem.device.valve}'")
-    return apply_overrides(base, problem.device.overrides, valve=problem.device.valve)
+    valve, overrides = problem.device.valve, read_overrides(problem.device.overrides)
+    check_valve(overrides, valve, f"device.valve = '{valve}'")
+    return with_overrides(base, overrides, valve)
 
 
 def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:

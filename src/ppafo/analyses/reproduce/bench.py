@@ -10,10 +10,10 @@ from functools import cache
 from ppafo.errors import DataError, SimulationError
 from ppafo.identification.bench import BenchResult, free_decay, static_torque
 from ppafo.identification.source import Source
-from ppafo.parameters import apply_overrides as apply_to_set
 from ppafo.parameters import load_device, load_parameter_set
+from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
-from ppafo.parameters.parameter_set import number_text, with_followers
+from ppafo.parameters.parameter_set import number_text, with_followers, with_overrides
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities
@@ -50,10 +50,10 @@ def assumed_values(scenarios: Mapping[str, Scenario]) -> tuple[AssumedValue, ...
     merged: dict[tuple[str, str, str], AssumedValue] = {}
     for name, scenario in scenarios.items():
         origin = scenario.origin
-        changed = apply_overrides(origin.content, origin.overrides, scenario.name)
-        written = origin.content["device"].get("overrides", ())
-        of_file = apply_to_set(load_parameter_set(origin.parameter_set), written, valve=origin.valve)
-        in_force = with_followers(apply_to_set(of_file, changed.device, valve=origin.valve))
+        changed = apply_overrides(origin.content, read_overrides(origin.overrides), scenario.name)
+        written = read_overrides(origin.content["device"].get("overrides", ()))
+        of_file = with_overrides(load_parameter_set(origin.parameter_set), written, origin.valve)
+        in_force = with_followers(with_overrides(of_file, changed.device, origin.valve))
         summaries = {path: quantity.summary for path, quantity in quantities(changed.document).items()}
         summaries |= {path: quantity.summary for path, quantity in in_force.declarations().items()}
         own = [

@@ -18,7 +18,7 @@ from ppafo.analyses.reproduce.torque_task import torque_task_claims, torque_task
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import audit
-from ppafo.parameters.overrides import override_set
+from ppafo.parameters.overrides import Override, override_set, read_overrides
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.declaration import OF_A_VANE, value_at
 from ppafo.simulation.loading import load_scenario
@@ -115,19 +115,18 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
     """Return the experiments, each with the overrides that are meant for it."""
-    meant: dict[str, list[str]] = {name: [] for name in EXPERIMENTS}
-    given = override_set(overrides, ScenarioError)
+    meant: dict[str, list[Override]] = {name: [] for name in EXPERIMENTS}
+    given = override_set(read_overrides(overrides, ScenarioError), ScenarioError)
     # Kinds come first, outer ones before inner ones: they decide which numbers there are.
     kinds = [path for path in given if path.endswith(".kind")]
     for path in sorted(given, key=lambda path: (path not in kinds, path.count("."), path)):
-        override = str(given[path])
         documents = {
             name: apply_overrides(load_scenario(name).origin.content, earlier, name).document
             for name, earlier in meant.items()
         }
         known = tuple(dict.fromkeys(known for document in documents.values() for known in OF_A_VANE.paths(document)))
         if path not in known and not is_of_device(path) and not chosen_by(path, kinds):
-            raise unknown_value(override, known, f"{', '.join(EXPERIMENTS)} have")
+            raise unknown_value(given[path], known, f"{', '.join(EXPERIMENTS)} have")
         # A scenario that has a section for the value; the device is in all of them.
         section = path.rpartition(".")[0]
         having = [
@@ -136,5 +135,5 @@ def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:
             if (not section or value_at(document, section) is not None) and path in OF_A_VANE.paths(document)
         ]
         for name in having or EXPERIMENTS:
-            meant[name].append(override)
-    return {name: load_scenario(name, chosen) for name, chosen in meant.items()}
+            meant[name].append(given[path])
+    return {name: load_scenario(name, map(str, chosen)) for name, chosen in meant.items()}

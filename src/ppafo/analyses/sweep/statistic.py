@@ -52,8 +52,8 @@ from ppafo.studies.draws import (
     difference_of,
     drawn_in,
     level_of,
-    with_new_noise,
 )
+from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study
 from ppafo.study.runs import Runs, Tally
 from ppafo.units import number_text, parse_quantity

@@ -11,14 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.tune.answer import (
-    FRESH_DRAWS,
-    INFEASIBLE,
-    Ceiling,
-    Setting,
-    Start,
-)
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
+from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start
 from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
@@ -26,12 +20,14 @@ from ppafo.metrics import METRICS
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
-from ppafo.simulation.numbers import TIMES, absolute, with_numbers
+from ppafo.simulation.clock import TIMES
+from ppafo.simulation.ensemble.columns import absolute
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
 from ppafo.studies.distributions import Floats, noise_interval
-from ppafo.studies.draws import with_new_noise
+from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import FAILED, Runs, oscillating, settled
 

@@ -5,10 +5,11 @@ from typing import Any
 
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
-from ppafo.model import plant_faults
+from ppafo.model import plant_faults, shut_off
 from ppafo.model.helping import STOPPED
 from ppafo.model.plant import PlantParameters
-from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+from ppafo.model.plant_faults import PlantFaults
+from ppafo.model.shut_off import ShutOff, Unpowered
 from ppafo.model.valves.kind import VENT
 
 PARAMETERS: Mapping[str, type] = {"plant_faults": PlantFaults, "shut_off": ShutOff}
@@ -44,8 +45,8 @@ def decide(parts: Program, lane: Lane, now: Now, ordered: float, after: Any) -> 
     runs = plant_faults.runs_at(lane.plant_faults, time, period, int(lane.sensors.seed), now.sample)
     takes = plant_faults.is_due(lane.plant_faults.slow_time, lane.plant_faults.slow_delay, time, period)
     stopped = (after.safety.level if parts.has_level_of_help else 0.0) >= STOPPED
-    lane.unpowered = plant_faults.next_unpowered(lane.shut_off, lane.unpowered, runs, stopped, brown_out, period)
-    vents = brown_out | plant_faults.is_silenced(lane.shut_off, lane.unpowered)
+    lane.unpowered = shut_off.next_unpowered(lane.shut_off, lane.unpowered, runs, stopped, brown_out, period)
+    vents = brown_out | shut_off.is_silenced(lane.shut_off, lane.unpowered)
     command = VENT if vents else (ordered if runs & takes else lane.result.command)
     lane.result = lane.result._replace(command=command)
     lane.controller_state = after if runs else lane.controller_state

@@ -24,9 +24,10 @@ if TYPE_CHECKING:  # rows of what few devices have
     from ppafo.model.gait import GaitMeasured, GaitNow, GaitPlace, GaitSeries, GaitTiming, Marks, TimedSequence
     from ppafo.model.leg import FootLoad, LegParameters
     from ppafo.model.plant import PlantState, ThermalParameters
-    from ppafo.model.plant_faults import PlantFaults, ShutOff, Unpowered
+    from ppafo.model.plant_faults import PlantFaults
     from ppafo.model.regulator import LineState, SupplyLines
     from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
+    from ppafo.model.shut_off import ShutOff, Unpowered
     from ppafo.signals.meter import Course, Sample
 
 

@@ -20,8 +20,8 @@ from ppafo.exports.c_library.preparation import following_text, preparation_of, 
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.clock import links_of_times
-from ppafo.simulation.numbers import links_that_hold, time_texts
+from ppafo.simulation.clock import links_of_times, time_texts
+from ppafo.simulation.numbers import links_that_hold
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 

@@ -1,27 +1,21 @@
 """The plant of a scenario or a walk alone: its inputs come from outside at each step."""
 
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import ExportedProgram
-from ppafo.exports.c_library.files import Library, Surface, c_identifier, library_files
+from ppafo.exports.c_library.files import Library, Setting, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
+from ppafo.parameters.graph import outside
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.profiles import profile_parameters
-from ppafo.simulation.scenario import (
-    Control,
-    FreeMotion,
-    PrescribedMotion,
-    ProfileChoice,
-    Scenario,
-    Sensors,
-)
+from ppafo.simulation.scenario import Control, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
 from ppafo.walking.declaration import FORCES
 from ppafo.walking.motion import walk_of
 from ppafo.walking.preparation import FaultSettings
@@ -48,144 +42,177 @@ WALKING_COMMAND = Input(
     -1.0,
     VENT,
 )
-LED = "From there on the angle goes on with the angular velocity that is given; the next step begins at the next angle."
-FREE = "The external torque is constant until the next one."
-ON_LEG = "The leg walks on by its gait."
+
+
+class Assignment(NamedTuple):
+    """A field in C and what it becomes: an expression in which ``{angle}`` stands for the input of that name.
+
+    ``{settings}`` stands for the pointer to the settings.
+    """
+
+    field: str
+    expression: str
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """How a plant is driven from outside: its command, its further inputs, and how its joint moves between two steps.
+
+    ``motion`` says the latter in words. ``settings`` of a run become what the first inputs are, ``parameters`` of the
+    engine what they are in each step, from ``time`` on for a ``length`` of it [s].
+    """
+
+    motion: str
+    command: Input = COMMAND
+    inputs: tuple[Input, ...] = ()
+    settings: tuple[Assignment, ...] = ()
+    parameters: tuple[Assignment, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class PlantAlone:
-    """A plant that is driven from outside: its library, inputs, and how the joint moves between them, in words.
+    """A plant that is driven from outside: its library, its drive, and the step [s] of the engine and of the inputs.
 
-    ``first`` are settings of a run that inputs decide, ``lead`` its parameters, both as C with the names of inputs;
-    ``hidden`` are the settings without effect. ``step`` [s] of the engine and of the inputs.
+    ``hidden`` are the paths of the settings without effect, because inputs replace them.
     """
 
     library: Library
-    inputs: tuple[Input, ...]
-    motion: str
-    first: tuple[tuple[str, str], ...]
-    lead: tuple[tuple[str, str], ...]
-    highest: float
+    drive: Drive
     hidden: frozenset[str]
     step: float
 
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        """What it is given at each step, the command first."""
+        return (self.drive.command, *self.drive.inputs)
 
-_SHORT = 0.0078125
-"""Length [s] of the ramp that the angle begins with."""
-_FIRST_ANGLE = (
-    ("motion_profile_start_level", "angle"),
-    ("motion_profile_level", f"angle + angular_velocity * {_SHORT}"),
-    ("motion_profile_ramp_start", "0.0"),
-    # Short: a fast ankle stays in the range of a level.
-    ("motion_profile_ramp_time", f"{_SHORT}"),
-)
-_LEAD_ANGLE = (
-    ("path.start_level", "angle"),
-    ("path.level", "angle + angular_velocity * (2.0 * length)"),
-    ("path.ramp_start", "time"),
-    ("path.ramp_time", "2.0 * length"),
-)
+    @property
+    def motion(self) -> str:
+        """How the joint moves between two steps, in words."""
+        return self.drive.motion
+
+
+_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.period", "controller.command")
+"""Times of a run and of a controller mean nothing to a plant that is stepped from outside."""
+_REPLACED = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
+"""Beginnings of the paths of what inputs replace."""
 
 
 def plant_of(scenario: Scenario) -> PlantAlone:
-    """The plant; an unconstrained vane takes an external torque, one with a prescribed angle takes angle and rate.
+    """Return the plant; an unconstrained vane takes an external torque, one with a prescribed angle angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
-    chosen = _prescribed_vane(scenario) if not scenario.walks else _commanded_walk(scenario)
-    library, motion = library_of(chosen), chosen.motion
-    command, unseen, highest = COMMAND, {"command", *(kind.reference for kind in CONTROLLED.values())}, 1.0
-    further: tuple[Input, ...] = ()
-    first: tuple[tuple[str, str], ...] = ()
-    lead: tuple[tuple[str, str], ...] = ()
-    if isinstance(motion, PrescribedMotion):
-        # An angle and its rate at each step make a ramp, which the profile of the library already is.
-        said, first, lead = LED, _FIRST_ANGLE, _LEAD_ANGLE
-        angle = motion.profile.start_level
-        settings = {setting.path: setting for setting in library.settings}
-        stops = [settings[f"actuator.angle_{end}"].value for end in ("min", "max")]
-        # So fast that the short ramp of the first angle still ends within what a level may be.
-        fastest = (settings["motion.profile.level"].quantity.maximum - max(map(abs, stops))) / _SHORT
-        further = (
-            Input("angle", "rad", "angle of the ankle, 90 deg neutral, growing in plantarflexion", angle, *stops),
-            Input("angular_velocity", "rad/s", "its rate", 0.0, -fastest, fastest),
-        )
-        unseen |= {"angle", "angular_velocity"}
-    elif isinstance(motion, FreeMotion):
-        # T_ex of a vane alone, or T_2 of the ankle of a leg, which is opposed.
-        is_alone = motion.leg is None
-        said = FREE
-        first = (
-            (("motion_external_torque", "external_torque"),)
-            if is_alone
-            else (("motion_ankle_torque", "-external_torque"),)
-        )
-        lead = (("plant.external_torque", "external_torque"),)
-        joint = "T_ex on the joint" if is_alone else "on the ankle of the leg, -T_2"
-        words = f"torque {joint}, above 0 works against plantarflexion"
-        path = "motion.external_torque" if is_alone else "motion.ankle_torque"
-        range_of = next(setting.quantity for setting in library.settings if setting.path == path)
-        limits = range_of.minimum, range_of.maximum
-        further = (Input("external_torque", "N m", words, motion.outside_torque, *limits),)
-    else:
-        said, command, highest = ON_LEG, WALKING_COMMAND, VENT
-    unused = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
-    # Times of a run and of a controller mean nothing to a plant that is stepped from outside.
-    hidden = {"run.duration", "run.output_interval", "controller.period", "controller.command"}
-    outputs = tuple(name for name in library.program.outputs if name not in unseen)
+    plant = _commanded_walk(scenario) if scenario.walks else _commanded_vane(scenario)
+    library = library_of(plant)
+    drive = _drive_of(plant, library.settings)
+    taken = {variable.name for variable in (drive.command, *drive.inputs)}
+    references = {kind.reference for kind in CONTROLLED.values()}
+    outputs = tuple(name for name in library.program.outputs if name not in taken | references)
     # Metrics need a whole run, which only the caller sees.
     program = replace(library.program.program, meters=(), traced=outputs)
+    replaced = {setting.path for setting in library.settings if setting.path.startswith(_REPLACED)}
     return PlantAlone(
         library=replace(library, program=ExportedProgram(program, ()), keeps_times=False),
-        inputs=(command, *further),
-        motion=said,
-        first=(("controller_period", "@.run_step"), ("run_output_interval", "@.run_step"), *first),
-        lead=lead,
-        highest=highest,
-        hidden=frozenset(hidden | {setting.path for setting in library.settings if setting.path.startswith(unused)}),
-        step=chosen.run.step,
+        drive=drive,
+        hidden=frozenset(replaced.union(_WITHOUT_EFFECT)),
+        step=plant.run.step,
+    )
+
+
+def _drive_of(plant: Scenario, settings: Sequence[Setting]) -> Drive:
+    """Return how a plant is driven, within the ranges of its settings."""
+    by_path = {setting.path: setting for setting in settings}
+    if isinstance(plant.motion, PrescribedMotion):
+        return _angle_drive(plant.motion, by_path)
+    if isinstance(plant.motion, FreeMotion):
+        return _torque_drive(plant.motion, by_path)
+    return Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
+
+
+_FIRST_RAMP = 0.0078125
+"""Length [s] of the ramp that an angle begins with. Short: a fast ankle stays in the range of a level."""
+
+
+def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> Drive:
+    """Return the drive of a joint whose angle and rate come from outside: a ramp, which the profile already is."""
+    stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
+    # So fast that the short ramp of the first angle still ends within what a level may be.
+    fastest = (settings["motion.profile.level"].quantity.maximum - max(abs(stop_1), abs(stop_2))) / _FIRST_RAMP
+    start = motion.profile.start_level
+    summary = "angle of the ankle, 90 deg neutral, growing in plantarflexion"
+    return Drive(
+        motion=(
+            "From there on the angle goes on with the angular velocity that is given; the next step begins at the next "
+            "angle."
+        ),
+        inputs=(
+            Input("angle", "rad", summary, start, stop_1, stop_2),
+            Input("angular_velocity", "rad/s", "its rate", 0.0, -fastest, fastest),
+        ),
+        settings=(
+            Assignment("motion_profile_start_level", "{angle}"),
+            Assignment("motion_profile_level", f"{{angle}} + {{angular_velocity}} * {_FIRST_RAMP}"),
+            Assignment("motion_profile_ramp_start", "0.0"),
+            Assignment("motion_profile_ramp_time", f"{_FIRST_RAMP}"),
+        ),
+        parameters=(
+            Assignment("path.start_level", "{angle}"),
+            Assignment("path.level", "{angle} + {angular_velocity} * (2.0 * length)"),
+            Assignment("path.ramp_start", "time"),
+            Assignment("path.ramp_time", "2.0 * length"),
+        ),
+    )
+
+
+def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
+    """Return the drive of a free joint: T_ex on a vane alone, or T_2 of the ankle of a leg, which is opposed."""
+    if motion.leg is None:
+        path, joint, setting = "motion.external_torque", "T_ex on the joint", "{external_torque}"
+    else:
+        path, joint, setting = "motion.ankle_torque", "on the ankle of the leg, -T_2", "-{external_torque}"
+    torque = Input(
+        "external_torque",
+        "N m",
+        f"torque {joint}, above 0 works against plantarflexion",
+        motion.outside_torque,
+        settings[path].quantity.minimum,
+        settings[path].quantity.maximum,
+    )
+    return Drive(
+        motion="The external torque is constant until the next one.",
+        inputs=(torque,),
+        settings=(Assignment(c_identifier(path), setting),),
+        parameters=(Assignment("plant.external_torque", "{external_torque}"),),
     )
 
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
-    """Files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step under its inputs."""
+    """Return the files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step."""
     return library_files(surfaced(plant_of(scenario)).library)
 
 
-def _volume_conditions(alone: PlantAlone, names: list[str]) -> list[str]:
-    """Conditions in C that both chambers of a prescribed vane have a volume, now and at the end of the step."""
-    if "angle" not in names or alone.library.program.program.actuator.shape is not None:
-        return []
-    plant = "run->parameters.plant"
-    # Where V = V_dead + B (angle - stop) is 0: beyond it a chamber would have no volume.
-    low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.displacement_per_radian"
-    high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.displacement_per_radian"
-    ends = ["angle"]
-    if "angular_velocity" in names:
-        ends.append("angle + angular_velocity * run->parameters.timing.step")
-    return [f"({low} < {end} && {end} < {high})" for end in ends]
-
-
 def surfaced(alone: PlantAlone) -> PlantAlone:
-    """A plant whose library is called with its inputs."""
+    """Return a plant whose library is called with its inputs."""
     names = [variable.name for variable in alone.inputs]
-    says = [f"{variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
+    by_name = {name: name for name in names}
+    # An example whose command does something.
+    example = [0.5 if variable.name == "command" else variable.start for variable in alone.inputs]
+    comments = [f" * {variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
+    entries = [f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs]
     words = {
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
-        "first_inputs": ", ".join(
-            repr(0.5 if variable.name == "command" else variable.start) for variable in alone.inputs
-        ),
-        "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone, names)]),
-        "said_inputs": ";\n".join(f" * {line}" for line in says) + ".",
-        "listed_inputs": "\n".join(
-            f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs
-        ),
+        "first_inputs": ", ".join(map(repr, example)),
+        "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone)]),
+        "said_inputs": ";\n".join(comments) + ".",
+        "listed_inputs": "\n".join(entries),
         "motion": alone.motion,
-        "highest": repr(alone.highest),
-        "lead": "\n".join(f"    parameters->{field} = {value};" for field, value in alone.lead),
-        "follow_inputs": follow_lines(alone, "first", {name: name for name in names}),
+        "highest": repr(alone.drive.command.maximum),
+        "lead": "\n".join(
+            f"    parameters->{field} = {expression.format(**by_name)};" for field, expression in alone.drive.parameters
+        ),
+        "follow_inputs": follow_lines(alone, "first", by_name),
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
     }
@@ -201,20 +228,38 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
     return replace(alone, library=replace(alone.library, surface=surface))
 
 
+_ONE_STEP = tuple(Assignment(field, "{settings}->run_step") for field in ("controller_period", "run_output_interval"))
+"""The engine is called step by step: commands come once in each, and nothing lies between."""
+
+
 def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
-    """Lines of C that give settings what inputs decide, of which each is called something."""
-    words = re.compile(rf"\b({'|'.join(inputs)})\b")
-    lines = [(field, words.sub(lambda match: inputs[match[1]], value)) for field, value in alone.first]
-    return "\n".join(f"    {settings}->{field} = {value.replace('@.', f'{settings}->')};" for field, value in lines)
+    """Return lines of C that give ``settings``, a pointer, what ``inputs`` decide, by name as they are called in C."""
+    return "\n".join(
+        f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"
+        for field, expression in (*_ONE_STEP, *alone.drive.settings)
+    )
 
 
-def _prescribed_vane(scenario: Scenario) -> Scenario:
-    """The scenario under a command at every step of its engine; an ankle is prescribed from outside as well."""
+def _volume_conditions(alone: PlantAlone) -> list[str]:
+    """Return conditions in C that both chambers of a prescribed vane have a volume, now and at the end of the step."""
+    names = [variable.name for variable in alone.inputs]
+    if "angle" not in names or alone.library.program.program.actuator.shape is not None:
+        return []
+    plant = "run->parameters.plant"
+    # Where V = V_dead + B (angle - stop) is 0: beyond it a chamber would have no volume.
+    low = f"{plant}.angle_min - {plant}.dead_volume_1 / {plant}.displacement_per_radian"
+    high = f"{plant}.angle_max + {plant}.dead_volume_2 / {plant}.displacement_per_radian"
+    ends = ("angle", "angle + angular_velocity * run->parameters.timing.step")
+    return [f"({low} < {end} && {end} < {high})" for end in ends]
+
+
+def _commanded_vane(scenario: Scenario) -> Scenario:
+    """Return the scenario under a command at every step of its engine; a prescribed angle comes from outside too."""
     motion = scenario.motion
     if isinstance(motion, PrescribedMotion):
+        # It begins where the scenario has it.
         start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
         settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
-        # It begins where the scenario has it.
         motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
     # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(
@@ -228,11 +273,12 @@ def _prescribed_vane(scenario: Scenario) -> Scenario:
         controller=Control("constant", {"command": 0.0}, step),
         sensors=Sensors(),
         motion=motion,
+        links=outside(scenario.links, "controller", "reference"),
     )
 
 
 def _commanded_walk(walk: Scenario) -> Scenario:
-    """The walk with a command that is handed in at every step, and sensors that nothing reads."""
+    """Return the walk with a command that is handed in at every step, and sensors that nothing reads."""
     check_can_leave(walk)
     step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
     motion = walk_of(walk)

@@ -32,17 +32,10 @@ from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
-from ppafo.simulation.clock import step_unless_given, step_with_output
+from ppafo.simulation.clock import TIMES, step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
 from ppafo.simulation.leg import foot_load, shank_kind, with_load
-from ppafo.simulation.numbers import (
-    TIMES,
-    declared_numbers,
-    number_at,
-    other_form,
-    path_of_locked_angle,
-    time_texts,
-)
+from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
 from ppafo.simulation.plan import (
     relative_tolerance,
     state_with_volumes,

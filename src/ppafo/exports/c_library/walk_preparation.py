@@ -15,8 +15,8 @@ from ppafo.exports.c_library.files import Relation, Setting, c_identifier
 from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
-from ppafo.model.plant_faults import POWERED
 from ppafo.model.sensors import NOTHING_SEEN
+from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
 from ppafo.simulation.declaration import RUN, SUPPLY_LINES
@@ -34,7 +34,6 @@ from ppafo.walking.preparation import (
     FROZEN,
     HIGHEST_ANGLE,
     LOWEST_ANGLE,
-    NEVER,
     device_share,
     distorting_fault,
     fixed_fault,
@@ -124,7 +123,7 @@ def links_of_walk(configuration: Scenario) -> Graph:
     recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
-    return holding(links, known.__getitem__)
+    return holding(links, known)
 
 
 def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:

@@ -91,15 +91,15 @@ from ppafo.exports.c_library.files import (
     conditions_of_program,
     run_words,
 )
-from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
+from ppafo.parameters import ParameterSet, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
-from ppafo.parameters.overrides import one_path, split_override
-from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
+from ppafo.parameters.overrides import one_path, read_overrides
+from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si, with_overrides
 from ppafo.report.display_units import display_unit, quantity_of_unit
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import set_name
-from ppafo.simulation.numbers import TIMES
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.compiling import asked, complaint
@@ -231,7 +231,9 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     """Where the value of each setting comes from, by path."""
     origin, device, parameter_set = scenario.origin, scenario.device, _parameter_set(scenario)
     assumed = {assumption.path: assumption.note for assumption in scenario.assumptions}
-    changed = {c_identifier(one_path(split_override(text).typed, device.valve_name)) for text in origin.overrides}
+    changed = {
+        c_identifier(one_path(override.typed, device.valve_name)) for override in read_overrides(origin.overrides)
+    }
     origins: dict[str, dict[str, Any]] = {}
     for setting in library.settings:
         if setting.name in changed:
@@ -275,11 +277,11 @@ def _parameter_set(scenario: Scenario) -> ParameterSet | None:
     origin, device = scenario.origin, scenario.device
     section: Mapping[str, Any] = origin.content.get("device", {})
     folder = Path() if origin.file is None else Path(origin.file).parent
-    own = [text for text in origin.overrides if is_of_device(split_override(text).typed)]
+    own = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
     try:
         loaded = load_parameter_set(set_name(section.get("set", device.name), folder))
-        of_file = apply_overrides(loaded, section.get("overrides", ()), valve=device.valve_name)
-        return apply_overrides(of_file, own, valve=device.valve_name)
+        of_file = with_overrides(loaded, read_overrides(section.get("overrides", ())), device.valve_name)
+        return with_overrides(of_file, own, device.valve_name)
     except PpafoError:
         return None
 

@@ -36,7 +36,7 @@ from ppafo.model.source import (
     pressure_reserve,
 )
 from ppafo.parameters.declaration import is_within, limits_text
-from ppafo.parameters.overrides import Forms, other_forms, override_set
+from ppafo.parameters.overrides import Forms, other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import Entry, TextEntry
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.units import format_quantity, from_si, split_quantity, to_si
@@ -298,7 +298,7 @@ def load_bottle(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Bott
     if part is not None:
         parsed = parsed.model_copy(update={"name": part.name, "title": f"{part.maker}: {part.model}, with a regulator"})
         entries, file = scaled_entries(part, entries), part.name
-    for path, override in override_set(overrides, forms=FILLS).items():
+    for path, override in override_set(read_overrides(overrides), forms=FILLS).items():
         if path not in PATHS:
             raise ParameterError(f"override '{override}': a bottle has no value '{path}'{nearest_name(path, PATHS)}")
         with refused_as(ParameterError, f"override '{override}'", UnitError):

@@ -14,9 +14,9 @@ from ppafo.errors import ScenarioError, nearest_name
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.check import MARGIN, finer
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import Outcome, Request, intervals, offered
-from ppafo.simulation.numbers import check_columns
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY
 

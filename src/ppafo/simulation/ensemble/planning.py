@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
-from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
 from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import limits, quantity_text
+from ppafo.simulation.ensemble.columns import Columns
 from ppafo.simulation.motion_kind import Clock, MotionKind
-from ppafo.simulation.numbers import TIMES, Columns, clock_of, with_numbers
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 
@@ -32,7 +33,10 @@ Rule = Callable[[Scenario], tuple[Problem, ...]]
 
 @dataclass(slots=True)
 class Screen:
-    """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not."""
+    """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not.
+
+    Without a ``clock`` it is the scenario's.
+    """
 
     columns: Columns
     members: Members
@@ -41,13 +45,12 @@ class Screen:
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that represents the runs that are left. ScenarioError before the times are read."""
-        clock = self.clock
-        if clock is None:
-            raise ScenarioError("the times of an ensemble are not read yet")
+        """The scenario that represents the runs that are left."""
         # What the clock came to stands in the place of the times that were given.
         numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
-        scenario = with_numbers(self.columns.base, numbers)
+        scenario, clock = with_numbers(self.columns.base, numbers), self.clock
+        if clock is None:
+            return scenario
         return replace(
             scenario,
             run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
@@ -61,7 +64,8 @@ class Screen:
             times = clock.duration, clock.step, clock.output_interval, clock.period
             kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
             clock = Clock(*kept)
-        return Screen(self.columns.only(places), self.members[places], self.reasons, clock)
+        values = {path: column[places] for path, column in self.columns.values.items()}
+        return Screen(replace(self.columns, values=values), self.members[places], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
         """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
@@ -81,9 +85,9 @@ def screen_columns(columns: Columns) -> Screen:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
             screen.refuse(*_out_of_range(screen.columns, path))
-    if screen.members.size:
-        base, times = columns.base, {path: column for path, column in screen.columns.values.items() if path in TIMES}
-        screen.clock, problems = base.motion.motion_kind.clock(base, times) if times else (clock_of(base), ())
+    times = {path: column for path, column in screen.columns.values.items() if path in TIMES}
+    if times and screen.members.size:
+        screen.clock, problems = columns.base.motion.motion_kind.clock(columns.base, times)
         for is_bad, line in problems:
             screen.refuse(is_bad, line)
     for rule in rules_of(columns.base.motion.motion_kind):

@@ -7,9 +7,9 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, group_of, load_programs, meters_of, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, load_programs, meters_of, run_blocks
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, row_numbers
+from ppafo.engine.rows import group_of, leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.errors import ScenarioError
@@ -60,19 +60,16 @@ class Outcome:
 
     def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
         """Run batches one after the other, whose runs have these places in the ensemble."""
-        first = {batch.program: batch for _, batch in batches}
-        alone = [
-            Batch(batch.program, batch.clock, batch.parameters[:, :1], batch.states[:, :1]) for batch in first.values()
-        ]
-        # Several programs are compiled side by side before the first batch runs; a single one as it is met.
-        if len(alone) > 1:
-            load_programs([_meter_batch(batch, self.request).batch.program for batch in alone])
+        tasks = []
         for members, batch in batches:
-            self.run(batch, members, threads)
+            tasks.append((members, _meter_batch(batch, self.request)))
+        # Several programs are compiled side by side before the first batch runs.
+        load_programs(task.batch.program for _, task in tasks)
+        for members, task in tasks:
+            self._run(task, members, threads)
 
-    def run(self, plain: Batch, members: Members, threads: int | None) -> None:
+    def _run(self, task: "_MeteredBatch", members: Members, threads: int | None) -> None:
         """Run a batch whose runs have these places in the ensemble."""
-        task = _meter_batch(plain, self.request)
         batch = task.batch
         states = np.empty_like(batch.states)
         # A run that ends at its last sample has there the states with which it ends.
@@ -95,19 +92,19 @@ class Outcome:
                 one = slice(run, run + 1)
                 alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
                 take(one, run_sampled(alone, self.request.custom))
-        self._judge(task, members, states, plain.states.shape[0])
+        self._judge(task, members, states)
         readings = task.readings(ends, slice(None), None)
         for name in task.metrics:
             values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
 
-    def _judge(self, task: "_MeteredBatch", members: Members, states: Floats, physical: int) -> None:
+    def _judge(self, task: "_MeteredBatch", members: Members, states: Floats) -> None:
         """Which runs were completed, as in a single run: possible all the time, and finite at the end."""
         result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time
         self.too_many_parts[members] = result.too_many_parts != 0.0
         # Meters stand below the rows of a plain batch, and what they come to says nothing about the run.
-        completed = (failed >= NEVER_FAILED) & np.isfinite(states[:physical]).all(axis=0)
+        completed = (failed >= NEVER_FAILED) & np.isfinite(states[: task.physical]).all(axis=0)
         self.is_completed[members] = completed
         # Without a time of failure the last sample is the best that is known.
         end = task.interval * (task.samples - 1)
@@ -122,10 +119,13 @@ class Outcome:
 class _MeteredBatch:
     """A batch with its meters, the metrics that it can have, and the interval of its samples.
 
+    The first ``physical`` rows of its states are no meters.
+
     ``late_totals`` are paths of the state, traced where a run goes on after the last sample that counts.
     """
 
     batch: Batch
+    physical: int
     metrics: Mapping[str, MetricKind]
     interval: Floats
     samples: int
@@ -202,7 +202,8 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     # Totals alone need no more than the first sample and the last.
     trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
-    return _MeteredBatch(batch, available, interval, plain.clock.samples, stride if every_sample else 1, late)
+    band_stride = stride if every_sample else 1
+    return _MeteredBatch(batch, len(plain.states), available, interval, plain.clock.samples, band_stride, late)
 
 
 def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:

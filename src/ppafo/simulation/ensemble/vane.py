@@ -11,10 +11,10 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
 from ppafo.model.columns import Problem, at
 from ppafo.model.controlled import CONTROLLED
-from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY
+from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
 from ppafo.simulation.motion_kind import Clock
-from ppafo.simulation.numbers import clock_with, path_of_locked_angle, time_texts
+from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.profiles import Limits, limits_of, profile_bounds, profile_problem, stops_of
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import batch_of
 from ppafo.errors import PpafoError
+from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.loading import list_scenarios, load_scenario
-from ppafo.simulation.numbers import check_columns, declared_numbers
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from tests.unit.simulation.ensemble import draws

@@ -13,9 +13,10 @@ from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.parameters.overrides import over
 from ppafo.running import simulate
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, REFUSED, EnsembleResult, run_ensemble, running
 from ppafo.simulation.loading import load_scenario
-from ppafo.simulation.numbers import TIMES, declared_numbers, with_numbers
+from ppafo.simulation.numbers import declared_numbers, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from tests.unit.simulation.ensemble import draws

@@ -24,8 +24,9 @@ from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.report.kind import Kind
 from ppafo.signals.recording import Floats
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.running import lacking
-from ppafo.simulation.numbers import TIMES, declared_numbers
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import common_level
 from ppafo.studies.sampling import NOISE

@@ -37,8 +37,9 @@ from ppafo.parameters.parts import rated_pressure
 from ppafo.progress import Report, report_nothing
 from ppafo.running import simulate
 from ppafo.signals.recording import Floats
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import PLAIN
-from ppafo.simulation.numbers import TIMES, declared_numbers, moving_together, number_at
+from ppafo.simulation.numbers import declared_numbers, moving_together, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.draws import seeds_of_noise
 

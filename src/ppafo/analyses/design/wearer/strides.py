@@ -8,7 +8,7 @@ from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.model.catalog import VALVES
-from ppafo.model.plant_faults import SHUT_OFF
+from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Part
 from ppafo.walking.loading import load_walk

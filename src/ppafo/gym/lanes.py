@@ -1,0 +1,203 @@
+"""Environments of one program side by side: each a lane, with an episode of its own that began at its own step."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.entries import with_arrays
+from ppafo.engine.lane_rows import VECTOR, lanes_of
+from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
+from ppafo.engine.loading import load_source
+from ppafo.engine.program import Program
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.step.lane import LaneStart
+from ppafo.errors import ScenarioError
+from ppafo.gym.kernel import OWN_PATHS, kernel_source
+from ppafo.gym.tasks import Outcome, Task
+from ppafo.model.sensors import Measurement
+
+Flags = NDArray[np.bool_]
+Places = NDArray[np.intp]
+
+_OUTCOMES = len(Outcome._fields)
+_FIRST_FLAG = Outcome._fields.index("failed")
+"""Row of the outcomes from which on they are truth values."""
+
+
+class FromOutside:
+    """Stands for the controller of a scenario whose commands come from an agent."""
+
+    def reset(self) -> None:
+        """Do nothing."""
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
+        """Refuse: an agent is asked through its environment."""
+        raise ScenarioError("the commands of an environment come from its agent; give the scenario a controller")
+
+
+def episode_program(batch: Batch) -> tuple[Program, Clock]:
+    """Return program and clock of a run whose commands come from outside; ScenarioError for samples inside a step."""
+    if batch.program.samples_inside:
+        raise ScenarioError("run.output_interval: an environment needs one that is a whole number of steps")
+    return replace(batch.program, controller=None, starts_apart=True), batch.clock
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """Starts of episodes: parameters and states as the program has them, and goals (rows, episodes)."""
+
+    parameters: Floats
+    states: Floats
+    goals: Floats
+
+    def repeated(self, count: int) -> "Columns":
+        """Return the start of one episode as that of ``count`` equal ones."""
+        return Columns(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
+
+
+@dataclass(frozen=True, slots=True)
+class Judging:
+    """Weights of the reward for squared error and gas, and bounds (2, observed) of what is observed."""
+
+    error_weight: float
+    gas_weight: float
+    bounds: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a step shows of every environment: observations (environments, observed), the rest (environments,)."""
+
+    observations: NDArray[np.float32]
+    rewards: Floats
+    errors: Floats
+    supplied: Floats
+    terminated: Flags
+    truncated: Flags
+
+    def then(self, later: "Seen") -> "Seen":
+        """Return what two samples show one after the other; an episode that ended with the first stays as it was."""
+        ended = self.terminated | self.truncated
+        pairs = {name: (getattr(self, name), getattr(later, name)) for name in ("errors", "supplied")}
+        chosen = {name: np.where(ended, *pair) for name, pair in pairs.items()}
+        return Seen(
+            observations=np.where(ended[:, None], self.observations, later.observations),
+            rewards=self.rewards + np.where(ended, 0.0, later.rewards),
+            terminated=self.terminated | (later.terminated & ~ended),
+            truncated=self.truncated | (later.truncated & ~ended),
+            **chosen,
+        )
+
+
+@final
+class Environments:
+    """Some environments of one program side by side, each a lane with an episode of its own."""
+
+    def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
+        self.count = count
+        self._clock, self._judging = clock, judging
+        self._program, self._task = program, task
+        # Lanes in whole vectors: a few environments need no block of full width.
+        width = min(lanes_of(program), -(-count // VECTOR) * VECTOR)
+        blocks = -(-count // width)
+        state_rows = [path for name, row in program.state_rows().items() for path in leaf_paths(row, name)]
+        parameter_rows = [path for name, row in program.parameter_rows().items() for path in leaf_paths(row, name)]
+        self.rows = {path: row for row, path in enumerate(state_rows)}
+        self._start = self.rows[leaf_paths(LaneStart, "start")[0]]
+        self._states = np.zeros((blocks, len(state_rows), width))
+        self._parameters = np.zeros((blocks, len(parameter_rows), width))
+        self._commands = np.zeros((blocks, clock.command_delay + 2, width))
+        self._own = np.zeros((blocks, len(OWN_PATHS), width))
+        # Where the next actions are written (environments, 1 or 2).
+        self.actions = np.zeros((count, 1 + task.walks))
+        self._chosen = np.zeros(count)
+        self._observations = np.zeros((count, len(task.observed_paths)))
+        self._outcomes = np.zeros((_OUTCOMES, count))
+        self._signals = np.zeros((blocks * SIGNAL_ROWS, clock.signal_delay + 2, width))
+        self._now = 0
+        self._go_on = with_arrays(
+            load_source(kernel_source(program, task)).go_on,
+            self._states.reshape(-1, width),
+            self._parameters.reshape(-1, width),
+            self._signals,
+            self._commands.reshape(-1, width),
+            np.empty((0, len(state_rows), width)),
+            np.empty((0, 0, width)),
+            self._own.reshape(-1, width),
+            self.actions,
+            np.ascontiguousarray(judging.bounds),
+            self._chosen,
+            self._observations,
+            self._outcomes,
+        )
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Environments":
+        """Return environments that go on from here by themselves; the compiled program is the same."""
+        other = Environments(self._program, self._clock, self._task, self.count, self._judging)
+        other.resume(self.state())
+        memo[id(self)] = other
+        return other
+
+    def state(self) -> dict[str, Floats | int]:
+        """Return all that changes from step to step: copies of the arrays, and the number of the step."""
+        arrays = {name: value.copy() for name, value in vars(self).items() if isinstance(value, np.ndarray)}
+        return {**arrays, "_now": self._now}
+
+    def resume(self, state: Mapping[str, Floats | int]) -> None:
+        """Go on from a state; the compiled program keeps the places of the arrays, so that they are filled."""
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                getattr(self, name)[...] = value
+            else:
+                self._now = value
+
+    def begin(self, places: Places, columns: Columns) -> Seen:
+        """Begin episodes of some environments at once; what the others show is not to be used."""
+        lanes = self._states.shape[2]
+        # Lanes without an environment repeat the last one, so that each has a run that goes on.
+        spare = np.arange(self.count, self._states.shape[0] * lanes)
+        last = np.flatnonzero(places == self.count - 1)
+        every = np.concatenate([np.arange(places.size), np.repeat(last, spare.size)])
+        blocks, own = np.divmod(np.concatenate([places, spare[: spare.size * last.size]]), lanes)
+        # The last row is the step at which the episode begins: the drawn columns do not have it.
+        self._states[blocks, :-1, own] = columns.states.T[every]
+        self._states[blocks, self._start, own] = float(self._now)
+        self._parameters[blocks, :, own] = columns.parameters.T[every]
+        self._own[blocks, :, own] = 0.0
+        self._own[blocks, : columns.goals.shape[0], own] = columns.goals.T[every]
+        # Delayed commands of the episode before must not reach this one.
+        self._commands[blocks, :, own] = 0.0
+        self._chosen[:] = 0.0
+        self._chosen[places] = 1.0
+        return self._call(0)
+
+    def step(self) -> Seen:
+        """Take ``actions`` for a sample period, and show what follows."""
+        self._chosen[:] = 1.0
+        return self._call(self._clock.steps_per_sample)
+
+    def numbers(self, place: int) -> dict[str, float]:
+        """Return the state of one environment as the engine has it, in SI units, by path such as ``state.angle``."""
+        block, lane = divmod(place, self._states.shape[2])
+        return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
+
+    def _call(self, steps: int) -> Seen:
+        clock = self._clock
+        self._now += steps
+        self._go_on(
+            self._judging.error_weight,
+            self._judging.gas_weight,
+            self._now,
+            steps,
+            clock.step_count,
+            clock.steps_per_sample,
+            clock.signal_delay,
+            clock.command_delay,
+        )
+        # Copies, because the kernel writes the same arrays at the next step.
+        rewards, errors, supplied = self._outcomes[:_FIRST_FLAG].copy()
+        failed, through = self._outcomes[_FIRST_FLAG:] != 0.0
+        return Seen(self._observations.astype(np.float32), rewards, errors, supplied, failed, through)

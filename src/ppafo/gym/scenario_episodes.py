@@ -1,0 +1,161 @@
+"""Episodes of a scenario: as its file has it, or drawn from what is not known about it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ppafo.control.walking.assistance import TorqueProfile
+from ppafo.engine.lanes import Clock, Floats
+from ppafo.engine.program import Program
+from ppafo.engine.rows import numbers
+from ppafo.engine.run import batch_of
+from ppafo.errors import ScenarioError, UnitError
+from ppafo.gym.lanes import Columns, FromOutside, Places, episode_program
+from ppafo.gym.tasks import Goal
+from ppafo.parameters import load_parameter_set
+from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
+from ppafo.simulation.ensemble.columns import absolute, check_columns
+from ppafo.simulation.ensemble.planning import plan_ensemble
+from ppafo.simulation.loading import set_name
+from ppafo.simulation.numbers import chosen_path, declared_numbers, number_at, with_numbers
+from ppafo.simulation.plan import plan_run
+from ppafo.simulation.scenario import LARGEST_SEED, Scenario
+from ppafo.studies.varying import VariedPath, in_its_unit, varied_path
+from ppafo.units import parse_quantity
+
+Ranges = Mapping[str, tuple[str | float, str | float]]
+"""Lowest and highest value by dotted path, as texts with units."""
+
+MOST_DRAWS = 100
+"""Draws of one episode until one is a run of the program; where none is, too much varies."""
+_NO_PROFILE = TorqueProfile(peak_torque=0.0, peak_time=0.5, rise_time=1.0, fall_time=1.0)
+"""The torque of a stride, where an episode has no strides."""
+_SEED = "sensors.seed"
+
+
+@dataclass(frozen=True, slots=True)
+class ScenarioEpisodes:
+    """Episodes of a scenario; ``ranges`` in SI by path are drawn evenly, and so is the angle to turn to, ``targets``.
+
+    Without ``ranges`` each is the scenario as it stands, noise included, and turns to the middle of ``targets``. Values
+    of the paths in ``gauge`` count from the atmosphere of their episode.
+    """
+
+    base: Scenario
+    program: Program
+    clock: Clock
+    ranges: Mapping[str, tuple[float, float]]
+    targets: tuple[float, float]
+    plain: Columns
+    gauge: frozenset[str] = frozenset()
+
+    def draw(self, generators: Sequence[np.random.Generator]) -> tuple[Columns, Floats]:
+        """Return an episode for each generator, and what was drawn of each (numbers, episodes) in SI.
+
+        Drawn again where a draw breaks a rule of scenarios, or asks for another program, as a chamber that is too quick
+        does. ScenarioError where nothing fits.
+        """
+        count = len(generators)
+        columns, values = self.plain.repeated(count), np.zeros((len(self.ranges), count))
+        if not self.ranges:
+            return columns, values
+        left, reason = np.arange(count), ""
+        for _ in range(MOST_DRAWS):
+            for number in left.tolist():
+                generator = generators[number]
+                drawn = (generator.uniform(*ends) for ends in self.ranges.values())
+                # A seed is drawn as all numbers are, and has to be whole.
+                values[:, number] = [
+                    float(np.floor(value)) if path == _SEED else value
+                    for path, value in zip(self.ranges, drawn, strict=True)
+                ]
+                columns.goals[0, number] = generator.uniform(*self.targets)
+            left, reason = self._plan(columns, values, left)
+            if not left.size:
+                return columns, values
+        raise ScenarioError(f"{self.base.name}: {MOST_DRAWS} draws of an episode do not fit it: {reason}; vary less")
+
+    def shown(self, drawn: Floats) -> Scenario:
+        """Return the scenario of what was drawn of one episode (numbers,) in SI."""
+        numbers = dict(zip(self.ranges, drawn.tolist(), strict=True))
+        return with_numbers(self.base, absolute(self.base, numbers, self.gauge))
+
+    def _plan(self, columns: Columns, values: Floats, left: Places) -> tuple[Places, str]:
+        """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
+        given = dict(zip(self.ranges, values[:, left], strict=True))
+        plan = plan_ensemble(check_columns(self.base, given, self.gauge))
+        reason = next(iter(plan.reasons.values()), "another program, step or delay")
+        for members, batch in plan.batches:
+            if episode_program(batch) == (self.program, self.clock):
+                columns.parameters[:, left[members]] = batch.parameters
+                columns.states[:, left[members]] = batch.states
+                # What is left has another program or clock, cannot go with the others, and is drawn again.
+                left = np.where(np.isin(np.arange(left.size), members), -1, left) if members.size else left
+        return left[left >= 0], reason
+
+
+def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tuple[str, str]) -> ScenarioEpisodes:
+    """Return the episodes of a scenario: what its parameter set has an interval for, ``vary`` and the seed are drawn.
+
+    ScenarioError for a path or range that cannot be.
+    """
+    base = base.controlled_by(FromOutside())
+    lowest, highest = (parse_quantity(text, "rad", base.device.supply.atmospheric_pressure) for text in targets)
+    ranges: dict[str, tuple[float, float]] = {}
+    gauge: set[str] = set()
+    if randomise:
+        ranges, gauge = intervals_of(base)
+        varies = ATMOSPHERE_PATH in {*ranges, *vary}
+        # Where the atmosphere varies as well, a gauge pressure keeps its distance from it.
+        atmosphere = base.device.supply.atmospheric_pressure
+        gauge = gauge - set(vary) if varies else set()
+        ranges |= {path: (ranges[path][0] - atmosphere, ranges[path][1] - atmosphere) for path in gauge}
+        for path, ends in vary.items():
+            varied, ranges[path] = _range(base, path, ends, varies)
+            gauge |= {path} if varied.is_gauge else set()
+        # Each episode has noise of its own, unless the caller says how the seed varies.
+        ranges.setdefault(_SEED, (0.0, float(LARGEST_SEED)))
+    batch = batch_of(plan_run(base))
+    program, clock = episode_program(batch)
+    middle = Goal(angle=0.5 * (lowest + highest), profile=_NO_PROFILE)
+    plain = Columns(batch.parameters, batch.states, np.array([numbers(middle)]).T)
+    return ScenarioEpisodes(base, program, clock, ranges, (lowest, highest), plain, frozenset(gauge))
+
+
+def intervals_of(base: Scenario) -> tuple[dict[str, tuple[float, float]], set[str]]:
+    """Return the ends of each interval of the scenario's parameter set, about the scenario's value, in SI by path.
+
+    And the paths of those that are given in gauge.
+    """
+    origin = base.origin
+    folder = Path() if origin.file is None else Path(origin.file).parent
+    parameter_set = load_parameter_set(set_name(origin.parameter_set, folder))
+    atmosphere, declared = atmospheric_pressure(parameter_set), parameter_set.declarations()
+    known, ranges, gauge = declared_numbers(base), {}, set()
+    for path, entry in parameter_set.numbers.items():
+        own = chosen_path(path, base)
+        if entry.uncertainty and own in known:
+            # The upper end in the unit of the entry, so that a gauge pressure is converted as its value is.
+            above = entry.model_copy(update={"value": entry.value + entry.uncertainty})
+            ends = [entry_in_si(text, declared[path], atmosphere) for text in (entry, above)]
+            value, half = number_at(base, own), ends[1] - ends[0]
+            ranges[own] = (value - half, value + half)
+            gauge |= {own} if gauge_link(own, entry.value, entry.unit) else set()
+    return ranges, gauge
+
+
+def _range(
+    base: Scenario, path: str, ends: tuple[str | float, str | float], atmosphere_varies: bool
+) -> tuple[VariedPath, tuple[float, float]]:
+    varied = varied_path(path, base)
+    try:
+        varied = in_its_unit(varied, ends) if atmosphere_varies else varied
+        lowest, highest = (varied.level(end) for end in ends)
+    except (UnitError, ValueError) as error:
+        raise ScenarioError(f"vary: {path} = {ends!r}: {error}; give the lowest and the highest value") from error
+    if lowest > highest:
+        raise ScenarioError(f"vary: {path} = {ends!r}: give the lowest value before the highest")
+    return varied, (lowest, highest)

@@ -1,0 +1,221 @@
+"""What one environment and many have in common: their settings, spaces, episodes and lanes."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.errors import ScenarioError, SimulationError, nearest_name
+from ppafo.gym.lanes import Environments, Judging, Places, Seen
+from ppafo.gym.scenario_episodes import Ranges, ScenarioEpisodes, scenario_episodes
+from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Task
+from ppafo.gym.walk_episodes import WalkEpisodes, walk_episodes
+from ppafo.model.controlled import TORQUE
+from ppafo.parameters.device import Device
+from ppafo.parameters.overrides import over
+from ppafo.plugins import Plugins, name_plugins
+from ppafo.simulation.loading import load_scenario
+from ppafo.walking.loading import load_walk
+from ppafo.walking.walk import lasting
+
+FLAWED_SENSORS = (
+    "sensors.delay=3 ms",
+    "sensors.angle_noise=0.2 deg",
+    "sensors.pressure_noise=0.1 psi_d",
+    "sensors.angle_resolution=0.1 deg",
+    "sensors.pressure_resolution=0.05 psi_d",
+)
+"""Delay, noise and resolution of the sensors of the scenario torque-task-slow-valve."""
+FLAWED_WALK_SENSORS = (
+    *FLAWED_SENSORS[1:],
+    "sensors.force_noise=5 N",
+    "sensors.force_resolution=1 N",
+    *(
+        f"faults.{sensor}.{setting}"
+        for sensor in ("heel", "toe", "angle", "pressure_1", "pressure_2")
+        for setting in ("kind=distorted", "time=0 s", "delay=3 ms")
+    ),
+)
+"""Late from the beginning, which is a fault with a delay and nothing else."""
+DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "torque": ("torque-task-proportional", FLAWED_SENSORS),
+    "angle": (
+        "step-response",
+        ("motion.kind=free", "controller.rate=1 kHz", "run.duration=1 s", *FLAWED_SENSORS),
+    ),
+    "walk": ("proportional", FLAWED_WALK_SENSORS),
+}
+"""Scenario or walk of each task where none is given, and the overrides that make it."""
+VARIED: Mapping[str, Ranges] = {"torque": {"reference.level": ("1 N m", "4.5 N m")}}
+"""What is drawn in these beside what the parameter set has intervals for."""
+TARGETS = ("40 deg", "110 deg")
+WALKING_TIME = 6.0
+"""Length of an episode on a leg that walks [s]."""
+CONTINUOUS, ON_OFF = "continuous", "on_off"
+PHYSICAL, SCALED = "physical", "scaled"
+COMMANDS = 3
+"""Of a pair of on/off valves: -1, 0 and 1."""
+LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
+"""Bounds of the requested rate [N m/s] and of the forces [N] that are observed."""
+HEADROOM = 2.0
+"""Largest pressure that is observed, over the highest supply pressure: a vane that is turned compresses its gas."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What environments are made with beside their task; ``PneumaticEnv`` says what each is."""
+
+    scenario: str | Path | None = None
+    overrides: Sequence[str] = ()
+    actions: str = CONTINUOUS
+    randomise: bool = True
+    vary: Ranges | None = None
+    targets: tuple[str, str] = TARGETS
+    duration: float | None = None
+    error_weight: float | None = None
+    gas_weight: float | None = None
+    frame_skip: int = 1
+    observations: str = PHYSICAL
+    plugins: Plugins | str | Path = ()
+
+    def __post_init__(self) -> None:
+        # Before a scenario is loaded that names what is in them.
+        name_plugins(self.plugins)
+        _check_word("actions", self.actions, (CONTINUOUS, ON_OFF))
+        _check_word("observations", self.observations, (PHYSICAL, SCALED))
+        if not (isinstance(self.frame_skip, int) and self.frame_skip >= 1):
+            raise ScenarioError(f"frame_skip = {self.frame_skip!r}: must be a whole number of samples, at least 1")
+
+
+def _check_word(name: str, word: Any, allowed: tuple[str, str]) -> None:
+    if word not in allowed:
+        hint = nearest_name(word, allowed)
+        raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
+
+
+def settings_of(arguments: Mapping[str, Any]) -> Settings:
+    """Return settings by name; ScenarioError for a name that is none."""
+    names = [field.name for field in fields(Settings)]
+    for name in arguments:
+        if name not in names:
+            hint = nearest_name(name, names)
+            raise ScenarioError(f"an environment has no argument '{name}'{hint}; it has {', '.join(names)}")
+    return Settings(**arguments)
+
+
+class World:
+    """What one environment and many have in common: episodes, spaces, and lanes for as many as are asked for."""
+
+    def __init__(self, task: str, settings: Settings) -> None:
+        self.settings = settings
+        self.task = TASKS[task]
+        usual, flaws = DEFAULTS[task]
+        is_usual = settings.scenario is None
+        file = usual if settings.scenario is None else settings.scenario
+        words = over(flaws if is_usual else (), settings.overrides, ScenarioError)
+        varied = VARIED.get(task, {}) if settings.vary is None and is_usual else settings.vary or {}
+        duration = settings.duration
+        self.episodes: ScenarioEpisodes | WalkEpisodes
+        if self.task.walks:
+            if varied:
+                raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
+            walk = load_walk(file, words)
+            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
+            self.episodes = walk_episodes(walk, settings.randomise, seconds)
+        else:
+            own = () if duration is None else (f"run.duration={float(duration)!r} s",)
+            chosen = load_scenario(file, over(words, own, ScenarioError))
+            if task == "torque" and chosen.controlled != TORQUE:
+                raise ScenarioError(
+                    f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
+                    "another scenario, or the task 'angle'"
+                )
+            self.episodes = scenario_episodes(chosen, settings.randomise, varied, settings.targets)
+        bounds = observed_bounds(self.task, self.episodes.base.device)
+        self.judging = Judging(
+            error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,
+            gas_weight=self.task.gas_weight if settings.gas_weight is None else settings.gas_weight,
+            bounds=bounds,
+        )
+        self.observation_space = gymnasium.spaces.Box(*bounds.astype(np.float32), dtype=np.float32)
+        self._middle, self._half = 0.5 * (bounds[0] + bounds[1]), 0.5 * (bounds[1] - bounds[0])
+        self.is_scaled = settings.observations == SCALED
+        if self.is_scaled:
+            self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, bounds.shape[1:], np.float32)
+        self.is_continuous = settings.actions == CONTINUOUS
+        self.action_space: Any = gymnasium.spaces.Discrete(COMMANDS)
+        if self.is_continuous:
+            self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1 + self.task.walks,), np.float32)
+
+    def __reduce__(self) -> "tuple[type[World], tuple[str, Settings]]":
+        """Pickle by what it was made of: programs and what they are compiled to are found again."""
+        return World, (self.task.name, self.settings)
+
+    def __copy__(self) -> "World":
+        """Return this world itself: nothing in it changes from step to step."""
+        return self
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "World":
+        """Return this world itself: an environment copies its spaces, with their generators, on its own."""
+        return self
+
+    def lanes(self, count: int) -> Environments:
+        """Return lanes for some environments."""
+        return Environments(self.episodes.program, self.episodes.clock, self.task, count, self.judging)
+
+    def begin(
+        self, lanes: Environments, places: Places, generators: Sequence[np.random.Generator]
+    ) -> tuple[Seen, Floats]:
+        """Draw and begin episodes of some environments; return what is seen of all, and what was drawn."""
+        columns, drawn = self.episodes.draw(generators)
+        return self._shown(lanes.begin(places, columns)), drawn
+
+    def take(self, lanes: Environments, actions: Any) -> Seen:
+        """Return what follows from actions that are held for ``frame_skip`` samples, or to the end of an episode.
+
+        Rewards are added up. SimulationError for an action that is no finite number.
+        """
+        taken = lanes.actions
+        if self.is_continuous:
+            taken[:] = np.reshape(actions, taken.shape)
+        else:
+            # Vent valve first: where there is none, the last column is the command, which the next line sets.
+            taken[:, -1] = 0.0
+            taken[:, 0] = np.subtract(actions, 1)
+        if not np.isfinite(taken).all():
+            bad = int(np.flatnonzero(~np.isfinite(taken).all(axis=1))[0])
+            raise SimulationError(f"the action of environment {bad} is {taken[bad]}; it must be finite")
+        seen = lanes.step()
+        for _ in range(self.settings.frame_skip - 1):
+            seen = seen.then(lanes.step())
+        return self._shown(seen)
+
+    def _shown(self, seen: Seen) -> Seen:
+        if self.is_scaled:
+            seen.observations[:] = np.clip((seen.observations - self._middle) / self._half, -1.0, 1.0)
+        return seen
+
+
+def observed_bounds(task: Task, device: Device) -> Floats:
+    """Lowest and highest value (2, observed) of each observed number, in the units of the task's view."""
+    pressure = HEADROOM * max(device.supply.pressure, device.supply.dorsiflexion_pressure)
+    torque = device.actuator.torque_constant * pressure
+    known = {
+        "angle": (-np.pi, np.pi),
+        "pressure_1": (0.0, pressure / BAR),
+        "pressure_2": (0.0, pressure / BAR),
+        "torque": (-torque, torque),
+        "requested": (-torque, torque) if task.unit == "N m" else (-np.pi, np.pi),
+        "requested_rate": (-LARGEST_RATE, LARGEST_RATE),
+        "heel_force": (0.0, LARGEST_FORCE),
+        "toe_force": (0.0, LARGEST_FORCE),
+        "since_strike": (0.0, LONGEST_SINCE),
+        "command": (-1.0, 2.0),
+    }
+    names = [path.rpartition(".")[2] for path in task.observed_paths]
+    # Rounded as the space has them, so that what is cut off at a bound lies within it.
+    return np.array([known[name] for name in names], dtype=np.float32).T.astype(np.float64, order="C")

@@ -1,0 +1,139 @@
+"""Every fault that the plant of a walk may have, as its file names it, with the numbers that it takes."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from ppafo.model.declaration import Quantity
+
+
+@dataclass(frozen=True, slots=True)
+class PlantFault:
+    """A fault as ``[faults]`` of a walk knows it: the part that fails, how, in words, and its numbers.
+
+    ``fields`` has the field of ``PlantFaults`` that a number fills, by the name of the number; a field of one chamber
+    is ``chamber_1.opening``.
+    """
+
+    part: str
+    kind: str
+    summary: str
+    quantities: tuple[Quantity, ...]
+    fields: Mapping[str, str]
+
+
+TIME = Quantity("time", "s", "when it fails", None, 0.0, 1.0e6)
+"""The number that every fault has."""
+
+
+def _of_chambers(
+    part: str, kind: str, summary: str, by_field: Mapping[str, Quantity], time_field: str
+) -> list[PlantFault]:
+    """Return the fault of the part of chamber 1 and of chamber 2, ``valve_1`` and ``valve_2``.
+
+    ``by_field`` has its numbers beside the time by the field of ``ChamberFaults`` that each fills.
+    """
+    quantities = {time_field: TIME, **by_field}
+    return [
+        PlantFault(
+            part=f"{part}_{chamber}",
+            kind=kind,
+            summary=f"{summary} {chamber}",
+            quantities=tuple(quantities.values()),
+            fields={quantity.name: f"chamber_{chamber}.{field}" for field, quantity in quantities.items()},
+        )
+        for chamber in (1, 2)
+    ]
+
+
+_FAULTS = (
+    *_of_chambers(
+        "valve",
+        "stuck",
+        "stays at one opening, whatever it is commanded: the valve of chamber",
+        {"opening": Quantity("opening", "1", "1 open to the supply, -1 to the atmosphere, 0 shut", 1.0, -1.0, 1.0)},
+        "stuck_time",
+    ),
+    PlantFault("valve", "swapped", "feeds the other chamber", (TIME,), {"time": "swapped_time"}),
+    PlantFault(
+        "valve",
+        "slow",
+        "follows late: it takes a command only once in each such time",
+        (TIME, Quantity("delay", "s", "that time", 0.1, 0.0, 10.0)),
+        {"time": "slow_time", "delay": "slow_delay"},
+    ),
+    *_of_chambers("hose", "off", "is open to the atmosphere: the hose of chamber", {}, "off_time"),
+    *_of_chambers(
+        "hose",
+        "kinked",
+        "is narrow: the hose of chamber",
+        {"kinked_share": Quantity("share", "1", "what is left of its conductance", 0.1, 0.0, 1.0)},
+        "kinked_time",
+    ),
+    *_of_chambers(
+        "regulator",
+        "high",
+        "gives another pressure: the regulator of chamber",
+        {"pressure": Quantity("pressure", "Pa_a", "that pressure", 9.286959e5, 1.0e4, 1.0e8)},
+        "high_time",
+    ),
+    *_of_chambers(
+        "regulator",
+        "creeping",
+        "gives more and more: the regulator of chamber",
+        {"rate": Quantity("rate", "Pa/s", "what it gives more in each second", 6.894757e4, -1.0e7, 1.0e7)},
+        "creep_time",
+    ),
+    *_of_chambers(
+        "regulator",
+        "frozen",
+        "lets little through: the regulator of chamber",
+        {"frozen_share": Quantity("share", "1", "what is left of its flow", 0.1, 0.0, 1.0)},
+        "frozen_time",
+    ),
+    PlantFault(
+        "bottle",
+        "empty",
+        "its pressure falls to atmospheric",
+        (TIME, Quantity("lag", "s", "time in which most of it is gone", 0.2, 1.0e-3, 1.0e3)),
+        {"time": "empty_time", "lag": "empty_lag"},
+    ),
+    PlantFault(
+        "vane",
+        "leaking",
+        "leaks more between the chambers",
+        (TIME, Quantity("factor", "1", "its leak over a sound one's", 50.0, 0.0, 1.0e4)),
+        {"time": "leak_time", "factor": "leak_factor"},
+    ),
+    PlantFault(
+        "controller",
+        "late",
+        "runs only once in each such time",
+        (TIME, Quantity("delay", "s", "that time", 0.02, 0.0, 10.0)),
+        {"time": "late_time", "delay": "late_delay"},
+    ),
+    PlantFault(
+        "controller",
+        "jittering",
+        "misses samples at random",
+        (TIME, Quantity("share", "1", "share of samples that it misses", 0.3, 0.0, 1.0)),
+        {"time": "jitter_time", "share": "jitter_share"},
+    ),
+    PlantFault(
+        "controller",
+        "brown_out",
+        "is without power for a time, with all valves, and starts anew",
+        (TIME, Quantity("duration", "s", "for how long", 0.3, 0.0, 1.0e6)),
+        {"time": "brown_out_time", "duration": "brown_out_duration"},
+    ),
+)
+
+
+def _by_part(faults: Iterable[PlantFault]) -> dict[str, dict[str, PlantFault]]:
+    by_part: dict[str, dict[str, PlantFault]] = {}
+    for fault in faults:
+        by_part.setdefault(fault.part, {})[fault.kind] = fault
+    return by_part
+
+
+PLANT_FAULTS = _by_part(_FAULTS)
+"""Every fault of the plant, by part and by kind."""

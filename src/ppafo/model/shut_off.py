@@ -1,0 +1,78 @@
+"""The shut-off valve of the safe state: normally closed, with a watchdog that takes the power of all valves away."""
+
+from typing import NamedTuple
+
+from ppafo.model.declaration import Quantity
+
+NEVER = 1.0e9
+"""Time [s] of what does not happen."""
+
+SHUT_OFF = (
+    Quantity("area", "m^2", "area of the shut-off valve, 0 where none is fitted", 0.0, 0.0, 1.0e-3),
+    Quantity("discharge_coefficient", "1", "its discharge coefficient", 0.7, 0.01, 1.0),
+    Quantity("delay", "s", "time from the alarm to a vented line", 0.02, 0.0, 1.0),
+    Quantity(
+        "silence",
+        "s",
+        "its watchdog lets it shut, for good, where the controller is silent for longer",
+        0.01,
+        0.0,
+        1.0e9,
+    ),
+    Quantity("mass", "kg", "its mass", 0.06, 0.0, 1.0),
+    Quantity("power", "W", "what holds it open, as long as the device helps", 0.5, 0.0, 100.0),
+)
+"""What a walk says of a shut-off valve; mass and power of a miniature 3/2 solenoid with a holding circuit, assumed."""
+
+
+class ShutOff(NamedTuple):
+    """Shut-off valve, normally closed 3/2: conductance [kg/(s Pa)], 0 where none is fitted, and delay [s].
+
+    Its watchdog cuts the power of all valves where the controller is silent for longer than
+    ``silence`` [s]; ``NEVER`` where there is none.
+    """
+
+    conductance: float
+    delay: float
+    silence: float
+
+
+NOT_FITTED = ShutOff(0.0, 0.0, NEVER)
+
+
+class Unpowered(NamedTuple):
+    """For how long [s] the shut-off valve has had no power, and for how long the controller has been silent.
+
+    It has none since the controller stopped, was in a brown-out, or was silent for longer than the watchdog allows.
+    """
+
+    since: float
+    silent: float
+
+
+POWERED = Unpowered(0.0, 0.0)
+
+
+def vents_line(shut_off: ShutOff, unpowered: Unpowered) -> bool:
+    """True where the shut-off valve has let the line behind it out to the atmosphere."""
+    return (unpowered.since > shut_off.delay) & (shut_off.conductance > 0.0)
+
+
+def is_silenced(shut_off: ShutOff, unpowered: Unpowered) -> bool:
+    """True where the watchdog has taken the power of all valves away."""
+    return unpowered.silent > shut_off.silence
+
+
+def next_unpowered(
+    shut_off: ShutOff, unpowered: Unpowered, runs: bool, stopped: bool, brown_out: bool, period: float
+) -> Unpowered:
+    """How long the valve has had no power after a sample at which the controller ``runs`` or not, a ``period`` [s] on.
+
+    The power is gone where the controller has ``stopped`` the device, and at once in a ``brown_out``. A watchdog that
+    has acted stays: what the controller would do when it comes back is not known.
+    """
+    silenced = is_silenced(shut_off, unpowered)
+    silent = unpowered.silent if silenced else (0.0 if runs | brown_out else unpowered.silent + period)
+    # The same test with the new silence: the sample that exceeds the limit already takes the power.
+    since = unpowered.since + period if stopped | (silent > shut_off.silence) else 0.0
+    return Unpowered(NEVER if brown_out else since, silent)

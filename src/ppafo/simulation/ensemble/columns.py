@@ -1,0 +1,104 @@
+"""Columns of numbers in the place of those of a scenario, checked once: nobody asks again which number a path names."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.errors import ScenarioError, nearest_name
+from ppafo.model.catalog import find_effects
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.graph import ATMOSPHERE_PATH
+from ppafo.parameters.overrides import either, in_two_forms, one_path
+from ppafo.simulation.declaration import TEXTS
+from ppafo.simulation.numbers import ORIFICES, declared_numbers, moving_together, other_form
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+
+_TEXTS = (
+    *TEXTS,
+    "gas.species",
+    "supply.relieving",
+    "motion.kind",
+    "controller.kind",
+    "reference.kind",
+    "motion.profile.kind",
+    "motion.shank.kind",
+    "motion.shank.gait",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations.
+
+    ``given`` are the paths that are no followers.
+    """
+
+    base: Scenario
+    values: Mapping[str, Floats]
+    declared: Mapping[str, Quantity]
+    given: frozenset[str]
+
+    @property
+    def runs(self) -> int:
+        """Number of runs."""
+        return next(iter(self.values.values())).size
+
+
+def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> Columns:
+    """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for.
+
+    Those of the paths in ``gauge`` count from the atmosphere of their run.
+    """
+    if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
+        raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
+    # Effects of other packages are known by their paths once they are loaded.
+    find_effects(columns)
+    # valve.area and valves.NAME.area are one number of the chosen valve.
+    paths = {given: one_path(given, base.device.valve_name) for given in columns}
+    declared = declared_numbers(base)
+    values: dict[str, Floats] = {}
+    for given, path in paths.items():
+        _check_path(base, given, path, declared)
+        if path in values:
+            raise ScenarioError(f"{base.name}: '{given}' and '{path}' are the same value; give one of them")
+        values[path] = np.ascontiguousarray(columns[given], dtype=np.float64)
+    shapes = {path: column.shape for path, column in values.items()}
+    if len(set(shapes.values())) != 1 or any(len(shape) != 1 or shape[0] == 0 for shape in shapes.values()):
+        raise ScenarioError(
+            f"{base.name}: an ensemble needs columns of one length, one value for each run, not {shapes or 'none'}"
+        )
+    pair = in_two_forms(values)
+    if pair is not None:
+        raise ScenarioError(f"{base.name}: '{pair[0]}' and '{pair[1]}' vary: {either(pair[0])}")
+    for section in ORIFICES:
+        form = [f"{section}.{name}" for name in other_form(base.device, section)]
+        missing = [path for path in form if path not in values]
+        if missing and len(missing) < len(form):
+            raise ScenarioError(
+                f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
+            )
+    every = moving_together(base, absolute(base, values, gauge))
+    return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
+
+
+def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:
+    """Return the columns with absolute pressures in place of those that count from the atmosphere of their run."""
+    atmosphere = columns.get(ATMOSPHERE_PATH, base.device.supply.atmospheric_pressure)
+    return {path: column + atmosphere if path in gauge else column for path, column in columns.items()}
+
+
+def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Quantity]) -> None:
+    if path in declared:
+        return
+    if path in _TEXTS:
+        raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
+    if base.controller.kind == PYTHON_CONTROLLER and path.startswith("controller."):
+        raise ScenarioError(
+            f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
+            "a module with a KIND has them (docs/how-to/extend.md)"
+        )
+    hint = nearest_name(path, declared) or f"; for example {', '.join(list(declared)[:6])}"
+    raise ScenarioError(f"{base.name}: there is no number '{given}' that could vary{hint}")

@@ -1,0 +1,121 @@
+"""Entries of a library of C, which Python calls as it calls the functions of the composed text.
+
+Handing an array to C costs Python about a microsecond, a number a twentieth of that. So the arrays of an entry are
+packed into one block of memory, once where they stay the same.
+"""
+
+import ctypes
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.compilers import CompilerError
+from ppafo.engine.entries import FLOAT, INT, entry_types
+from ppafo.errors import one_line
+
+PACKED = "_packed"
+"""Stands behind the name of an entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""
+ROUNDS_AS_WRITTEN = "ppafo_rounds_as_written"
+"""Name of a function of every library: 1 where each operation is rounded by itself."""
+_NO_FLOATS, _FLOATS = ctypes.c_double * 0, np.dtype(np.float64)
+_NUMBERS: dict[str, Any] = {FLOAT: ctypes.c_double, INT: ctypes.c_int64}
+
+
+class Parameters(NamedTuple):
+    """Parameters of an entry: the dimensions of its arrays, which come first, and the types of its numbers."""
+
+    dimensions: tuple[int, ...]
+    numbers: tuple[str, ...]
+
+
+def parameters_of(source: str) -> dict[str, Parameters]:
+    """Return the parameters of each entry of a composed text, by its name."""
+    return {
+        name: Parameters(
+            # "float64[:, ::1]": the last index runs quickest.
+            tuple(kind.count(":") - 1 for kind in types if kind not in _NUMBERS),
+            tuple(kind for kind in types if kind in _NUMBERS),
+        )
+        for name, types in entry_types(source).items()
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class NativeEntry:
+    """An entry of a library, called as Python calls it: arrays, then numbers.
+
+    ``function`` takes its arrays, of these dimensions, one after another as ``layout`` writes each ``ppafo_array``.
+    """
+
+    function: Any
+    dimensions: tuple[int, ...]
+    layout: struct.Struct
+
+    def __call__(self, *arguments: Any) -> None:
+        """Call it with arrays, and the numbers that follow them."""
+        count = len(self.dimensions)
+        self.function(self._packed(arguments[:count]), *arguments[count:])
+
+    def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
+        """The entry as a function of what follows these arrays, which it keeps.
+
+        TypeError for what C would misread: arrays of other numbers or dimensions, or that lie otherwise in memory.
+        """
+        called: partial[None] = partial(self.function, self._packed(arrays))
+        called.arrays = arrays  # type: ignore[attr-defined]
+        return called
+
+    def _packed(self, arrays: Sequence[Any]) -> bytes:
+        numbers: list[int] = []
+        for array, dimensions in zip(arrays, self.dimensions, strict=True):
+            if array.dtype != _FLOATS or array.ndim != dimensions:
+                problem = f"not one of {array.dtype} {array.shape}"
+                raise TypeError(f"an array of floats in {dimensions} dimensions is needed, {problem}")
+            # Refuses what is read-only, or does not lie row after row.
+            numbers.append(ctypes.addressof(_NO_FLOATS.from_buffer(array)))
+            numbers += array.shape
+        return self.layout.pack(*numbers)
+
+
+def load_entries(library: Path, parameters: Mapping[str, Parameters]) -> dict[str, NativeEntry]:
+    """Return the entries of a library by name.
+
+    OSError where it cannot be loaded, AttributeError where it lacks one, CompilerError where its arithmetic is not
+    IEEE 754's; an environment variable or a wrapper can make any compiler leave it.
+    """
+    loaded = ctypes.CDLL(str(library))
+    # (1 + 2^-30)(1 - 2^-30) - 1 rounds to 0 where the product is rounded by itself, and to -2^-60 where it is fused.
+    small = 2.0**-30
+    numbers = map(ctypes.c_double, (1.0 + small, 1.0 - small, -1.0, small * small))
+    # One product tells whether the compiler fuses or reorders, whatever its flags were.
+    if not loaded[ROUNDS_AS_WRITTEN](*numbers):
+        raise CompilerError(
+            "the compiler joins or reorders sums and products, so that results would differ from other compilers' "
+            "(look for -ffp-contract or -ffast-math in its wrapper or in the environment)"
+        )
+    entries = {}
+    for name, (dimensions, types) in parameters.items():
+        function = loaded[f"{name}{PACKED}"]
+        function.restype = None
+        function.argtypes = [ctypes.c_void_p, *(_NUMBERS[kind] for kind in types)]
+        # An array is a pointer and its extents; the rest of three extents is padding.
+        layout = struct.Struct("".join(f"P{count}q{8 * (3 - count)}x" for count in dimensions))
+        entries[name] = NativeEntry(function, dimensions, layout)
+    return entries
+
+
+def fill_module(module: ModuleType, library: Path, parameters: Mapping[str, Parameters]) -> None:
+    """Give a module the entries of a library; CompilerError where it has none that could be called."""
+    try:
+        module.__dict__.update(load_entries(library, parameters))
+    except OSError as error:
+        raise CompilerError(f"the library of a compiled model cannot be loaded: {one_line(error)}") from error
+    except AttributeError:
+        raise CompilerError("the library of a compiled model lacks its functions") from None
