@@ -46,7 +46,8 @@ def walk_with_and_without(
     """
     from dataclasses import replace
 
-    from ppafo.analyses.walk.answer import LONG, finding_of, reporter, wearers_finding
+    from ppafo.analyses.walk.answer import LONG, finding_of, reporter
+    from ppafo.analyses.walk.wearers import wearers_finding
     from ppafo.errors import ArgumentError
     from ppafo.simulation.scenario import Scenario
     from ppafo.walking.loading import check_duration_once, load_walk
