@@ -1,4 +1,4 @@
-"""A walk with and without the device, in words, tables, figures and files."""
+"""A walk of one wearer with and without the device, in words, tables and figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,18 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.document import (
-    Row,
-    csv_of,
-    metrics_table,
-    toes,
-    walk_data,
-)
+from ppafo.analyses.walk.bottle import bottle_data, bottle_files, bottle_parts, bottle_remark
+from ppafo.analyses.walk.document import ShownNumber, csv_of, metrics_table, toes, walk_data
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
 from ppafo.analyses.walk.task_sequence import (
-    bottle_data,
-    bottle_parts,
-    bottle_remark,
     task_sequence_data,
     task_sequence_files,
     task_sequence_parts,
@@ -42,9 +34,7 @@ from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import (
-    Comparison,
-)
+from ppafo.walking.walk import Comparison
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,24 +68,30 @@ def torque_loop_data(worn: WalkResult) -> dict[str, Any]:
 
 SCHEMA_VERSION = 1
 REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
-_ROWS: tuple[Row, ...] = (
-    ("body_mass", "Body mass of the wearer", "mass", 1),
-    ("gas", "Gas per stride", "gas mass", 3),
-    ("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
-    ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
-    ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
-    ("torque_error", "Torque error where one is requested, RMS", "torque", 2),
-    ("peak_torque", "Peak torque", "torque", 1),
-    (LARGEST_TORQUE, "... limit of the controller", "torque", 1),
-    (REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
-    ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
-    ("toe_landing", "Strides that begin on the toes", "fraction", 0),
-    ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
-    ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
-    ("counted_strides", "Strides with these means", "", 0),
+_NUMBERS = (
+    ShownNumber(name="body_mass", title="Body mass of the wearer", quantity="mass", digits=1),
+    ShownNumber(name="gas", title="Gas per stride", quantity="gas mass", digits=3),
+    ShownNumber(name="total_gas", title="Gas of the whole walk", quantity="gas mass", digits=2),
+    ShownNumber(
+        name="positive_push_off_work", title="Positive work on the wearer in push-off", quantity="energy", digits=2
+    ),
+    ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
+    ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
+    ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
+    ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
+    ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
+    ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
+    ShownNumber(name="lowest_toes", title="Lowest toes over the ground in mid-swing", quantity="body length", digits=1),
+    ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
+    ShownNumber(
+        name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
+    ),
+    ShownNumber(
+        name="angle_difference", title="Ankle against healthy, RMS over the stride", quantity="angle", digits=1
+    ),
+    ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
-"""Metric, title, kind of quantity and digits behind the point of each row."""
+"""Metrics as the table of a walk shows them."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
@@ -152,6 +148,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             "mean-stride.csv": partial(mean_stride_csv, worn),
             "mean-stride-off.csv": partial(mean_stride_csv, bare),
             **task_sequence_files(comparison),
+            **bottle_files(worn),
         },
         live=partial(live_part, [configuration]),
     )
@@ -235,7 +232,7 @@ def comparison_table(comparison: Comparison) -> list[Column]:
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
-    return metrics_table(_ROWS, columns)
+    return metrics_table(_NUMBERS, columns)
 
 
 def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:

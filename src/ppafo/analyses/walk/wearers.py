@@ -1,4 +1,4 @@
-"""A walk of many wearers: who they are and what they get, in words, quantiles and a figure."""
+"""A walk of many wearers: what they get, as quantiles, and who they are, in words, a table and a figure."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.document import csv_of, number_texts, versions, walk_document
+from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, versions, walk_document
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS
@@ -19,6 +19,7 @@ from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Number, Population
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Fractions of the wearers that are below what the table shows."""
 WEARERS_FORMAT = "ppafo wearers"
 WEARERS_SCHEMA_VERSION = 1
 _WEARERS_CAPTION = (
@@ -29,7 +30,7 @@ _WEARERS_CAPTION = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wearers:
-    """Walks of many wearers, in the form that is printed and kept."""
+    """Result of one walk of many wearers, in the form that is printed and kept."""
 
     population: Population
 
@@ -69,9 +70,9 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
     configuration = population.scenario
     tables = {**population.outcomes, **population.traits}
     rows = []
-    for name, shown in SHOWN.items():
+    for name, (title, quantity, digits) in SHOWN.items():
         values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
-        rows.append(number_texts((name, *shown), values))
+        rows.append(number_texts(ShownNumber(name=name, title=title, quantity=quantity, digits=digits), values))
     remarks = [*person_remarks(configuration)]
     if population.vented:
         remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
@@ -108,7 +109,7 @@ def wearers_csv(population: Population) -> bytes:
 
 
 def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
-    """Return mean and quantiles of every number over the wearers, in SI units, with unit and meaning."""
+    """Return the quantiles of every number in SI units, with unit and meaning."""
     return {
         name: {
             "unit": number.unit,
