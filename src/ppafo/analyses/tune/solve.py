@@ -11,14 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.tune.answer import (
-    FRESH_DRAWS,
-    INFEASIBLE,
-    Ceiling,
-    Setting,
-    Start,
-)
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
+from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
