@@ -80,8 +80,9 @@ def validate(
     from ppafo.validation.agreement import ReplaySettings, compare_recording
     from ppafo.validation.causes import causes_of
     from ppafo.validation.compared import parse_thresholds
+    from ppafo.validation.initial import parse_initial
     from ppafo.validation.measured import Measured, read_measured
-    from ppafo.validation.replay import MOTIONS, parse_initial
+    from ppafo.validation.replay import MOTIONS
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)

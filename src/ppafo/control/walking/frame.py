@@ -4,7 +4,6 @@ The phases of the gait say which torque is requested, safety watches, the law fo
 the law, and what it remembers where another task of the gait begins.
 """
 
-import collections
 import functools
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -19,6 +18,7 @@ from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
+from ppafo.model.declaration import row_with
 from ppafo.model.sensors import GaitMeasurement
 
 
@@ -80,14 +80,6 @@ def law_that_walks_update(
     return command, LawState(
         phase=assessment.phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law
     )
-
-
-def row_with(name: str, row: Any, **classes: type) -> Any:
-    """Return a NamedTuple class of a name with the fields of ``row``, of which those named have the given classes."""
-    namedtuple: Any = collections.namedtuple
-    varied = namedtuple(name, row._fields, module=__name__)
-    varied.__annotations__ = {**row.__annotations__, **classes}
-    return varied
 
 
 def shared_settings(law: ControllerKind) -> set[str]:
