@@ -4,6 +4,7 @@ A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
 ``area: Annotated[float, Number("m^2", "area of the opening")]``.
 """
 
+import collections
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -90,6 +91,15 @@ def quantities_of(section: type) -> tuple[Quantity, ...]:
         elif (number := number_of(hint)) is not None:
             found.append(replace(number, name=name))
     return tuple(found)
+
+
+def row_with(name: str, row: Any, **hints: Any) -> Any:
+    """Return a NamedTuple class like ``row``, whose named fields have other types; new ones stand behind its own."""
+    namedtuple: Any = collections.namedtuple
+    annotations = {**row.__annotations__, **hints}
+    made = namedtuple(name, annotations, module=row.__module__)
+    made.__annotations__ = annotations
+    return made
 
 
 def number_of(hint: Any) -> Quantity | None:

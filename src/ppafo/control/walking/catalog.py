@@ -7,7 +7,6 @@ A law with ideas of its own of the phases is a module of this folder with a ``Co
 ``update`` watches the sensors with ``safety.monitor`` and passes its command through ``safety.safe_command``.
 """
 
-import collections
 import functools
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
@@ -27,7 +26,7 @@ from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, ThresholdClock,
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.declaration import Number, quantities_of, row_with
 from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
@@ -89,14 +88,6 @@ def law_that_walks_update(
     return command, LawState(
         phase=assessment.phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law
     )
-
-
-def row_with(name: str, row: Any, **classes: type) -> Any:
-    """Return a NamedTuple class like ``row``, whose named fields have the given classes."""
-    namedtuple: Any = collections.namedtuple
-    made = namedtuple(name, row._fields, module=__name__)
-    made.__annotations__ = {**row.__annotations__, **classes}
-    return made
 
 
 def shared_settings(law: ControllerKind) -> set[str]:

@@ -21,7 +21,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import Scenario, vane_motion
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -107,6 +107,10 @@ class Relation:
     is_share: bool = False
 
 
+Rule = tuple[str, str, tuple[str, ...]]
+"""A rule of settings: the setting that is named, the condition as text in C, the settings that it holds in order."""
+
+
 @dataclass(frozen=True, slots=True)
 class Switch:
     """Settings of which any ``is_above`` 0, or none: the other case is another program."""
@@ -141,7 +145,7 @@ class Library:
 
     ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
     ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
-    ``keeps_times`` where a file could have its times. ``following`` adds the function that lets settings follow others,
+    ``rules`` are between its times, as in a file. ``following`` adds the function that lets settings follow others,
     None where none does, and ``defaults`` names the settings whose default does so, which has no range; ``links`` say
     what follows what. ``words`` fill the page. ``surface`` is how it is called.
     """
@@ -159,7 +163,7 @@ class Library:
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
     surface: Surface = LOOP
-    keeps_times: bool = True
+    rules: tuple[Rule, ...] = ()
 
     @property
     def name(self) -> str:
@@ -214,7 +218,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
     program = library.program
     outputs = ["time", *program.outputs]
     # The last argument of the loop of a run in C, where it has both kinds of steps.
-    in_parts = ", run->needs_parts" if program.chooses_parts else ""
+    in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
     relations = _relations(library)
     table = []
@@ -309,13 +313,13 @@ def conditions_of(library: Library) -> list[tuple[str, str]]:
     return [*ranges, *_relations(library)]
 
 
-RULES_OF_TIMES = (
+RULES_OF_TIMES: tuple[Rule, ...] = (
     ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
     ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
     ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
     ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
 )
-"""Rules of the times of a scenario (``simulation/clock.py``): setting named, rule, settings in it."""
+"""Rules of the times of a scenario (``simulation/clock.py``)."""
 
 
 _IS_WHOLE = """
@@ -337,11 +341,9 @@ def _relations(library: Library) -> list[tuple[str, str]]:
             slack = repr(relation.tolerance)
             other = f"{other} * (1.0 {sign} {slack})" if relation.is_share else f"{other} {sign} {slack}"
         relations.append((f"settings->{relation.name} {_SIGNS[relation.relation]} {other}", relation.name))
-    # A plant alone has no times of a file, and a walk checks its own.
-    rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
     return [
         *relations,
-        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules),
+        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in library.rules),
     ]
 
 
@@ -370,13 +372,9 @@ _TRAPS_OF_WALK = """\
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     """What the page of the library says of this scenario, in which settings follow others by ``links``."""
-    motion = scenario.motion
-    moves = f"prescribed, `{motion.profile.kind}`" if isinstance(motion, PrescribedMotion) else "free"
-    if isinstance(motion, FreeMotion) and motion.leg is not None:
-        moves = f"free with the foot of a leg, whose shank is led, `{motion.leg.shank.kind}`"
     fixed = [
         f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
-        f"the reference, `{scenario.reference.kind}`, and the motion, {moves}",
+        f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
         *_fixed_of_device(scenario.device, scenario.gas_model is not None, scenario.supply_lines is not None),
         _at_zero(scenario.device, scenario.sensors.flaws),
         "whether `run_output_interval` is a whole number of steps of the engine",
