@@ -55,6 +55,7 @@ class Reported:
 
 
 _AT_BOUND = 1.0e-6
+"""Distance to a bound, in scales of the number, up to which it has ended there."""
 
 
 def result_of(

@@ -124,6 +124,7 @@ def refuse_first(said: str, *checks: tuple[bool, str]) -> None:
 
 
 _FITS = 1.0e-6
+"""Time [s] by which a sample may pass the start of an experiment: rounding of a clock."""
 
 
 def scenario_of(experiment: Experiment) -> Scenario:

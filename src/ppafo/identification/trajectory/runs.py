@@ -47,7 +47,9 @@ Indices = NDArray[np.intp]
 FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over any other run's; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
+"""Tolerance of the second run, by whose difference the error of the first is told."""
 _FITS = 1.0e-6
+"""Fraction of a record, and time [s], by which a sample may be off: rounding of a clock."""
 
 _ZERO_OF_ANGLE = math.radians(1.0)
 """Angle [rad] from a stop within which a sensor shows the stop."""
