@@ -23,15 +23,8 @@ from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.residuals import Block
-from ppafo.identification.trajectory.problem import (
-    GAIN_OF,
-    TIME_OFFSET,
-    ZERO_OF,
-    Experiment,
-    Number,
-    scenario_of,
-    with_numbers,
-)
+from ppafo.identification.trajectory.experiment import Experiment, scenario_of
+from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, Number, with_numbers
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
