@@ -7,7 +7,8 @@ import numpy as np
 
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
