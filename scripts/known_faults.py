@@ -27,7 +27,7 @@ if not __package__:
     sys.path[0] = str(Path(__file__).parents[1])
 
 import ppafo
-from ppafo.analyses.validate.solve import Validation, in_words
+from ppafo.analyses.validate.result import Validation, in_words
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import PpafoError
 from ppafo.rig.experiments import record

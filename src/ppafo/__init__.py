@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from ppafo.analyses.tune.problem import load_tuning as load_tuning
     from ppafo.analyses.tune.question import tune as tune
     from ppafo.analyses.validate.question import validate as validate
-    from ppafo.analyses.validate.solve import Validation as Validation
+    from ppafo.analyses.validate.result import Validation as Validation
     from ppafo.errors import ArgumentError as ArgumentError
     from ppafo.errors import DataError as DataError
     from ppafo.errors import IdentificationError as IdentificationError
@@ -144,7 +144,7 @@ _HOMES = {
     "ppafo.analyses.sweep.statistic": ("estimate",),
     "ppafo.analyses.tune.problem": ("list_tunings", "load_tuning"),
     "ppafo.analyses.validate.question": ("validate",),
-    "ppafo.analyses.validate.solve": ("Validation",),
+    "ppafo.analyses.validate.result": ("Validation",),
     "ppafo.running": ("simulate", "simulate_many"),
     "ppafo.signals": ("Channel", "Recording"),
     "ppafo.simulation.loading": ("list_scenarios",),

@@ -1,4 +1,7 @@
-"""One thread for the linear algebra of small matrices, whose threads would wait for each other at full load."""
+"""Threads of the libraries of linear algebra: one for the small matrices of a fit, a search or a study.
+
+Where every processor runs models, several threads of a small product would only wait for each other.
+"""
 
 from collections.abc import Callable
 from functools import wraps
@@ -11,15 +14,15 @@ Result = TypeVar("Result")
 
 
 def on_one_thread(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
-    """Return the function with one thread for each library of linear algebra that is loaded, while it runs.
+    """Return a function that does the same while each library of linear algebra (BLAS) that is loaded has one thread.
 
-    Libraries and their number of threads are the process's: they are as before once it returns. Runs of the engine
-    have threads of their own, which stay.
+    The limit is the whole process's, and is as before once the function returns or raises. Runs of the engine have
+    threads of their own, which stay.
     """
 
     @wraps(function)
-    def limited(*given: Arguments.args, **named: Arguments.kwargs) -> Result:
+    def on_one(*arguments: Arguments.args, **options: Arguments.kwargs) -> Result:
         with threadpool_limits(limits=1, user_api="blas"):
-            return function(*given, **named)
+            return function(*arguments, **options)
 
-    return limited
+    return on_one

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.identification.bench.free_decay import course
+from ppafo.identification.bench.slowing import Slowing, course
 
 AT = 37
 """Index of the sample that is spoilt."""
@@ -40,7 +40,7 @@ class Table:
 def decay() -> Table:
     """A free decay for ``identify``."""
     time = np.arange(400) * 0.01
-    angle = np.degrees(0.4 + course(np.maximum(time - 0.2, 0.0), 2.5, 0.4, 0.3)[0])
+    angle = np.degrees(0.4 + course(np.maximum(time - 0.2, 0.0), 2.5, Slowing(0.4, 0.3)).swept)
     return Table({"time": time, "angle": angle + np.random.default_rng(1).normal(0.0, 0.1, time.size)})
 
 

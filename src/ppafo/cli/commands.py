@@ -12,7 +12,7 @@ from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
-_TOOLS, _WALKING = "ppafo.cli.verbs.tools", "ppafo.cli.verbs.walking"
+_EXPORTS, _WALKING = "ppafo.cli.verbs.exports", "ppafo.cli.verbs.walking"
 _SETS, _GAITS = f"{_DEVICE}:sets_list", f"{_WALKING}:gait_list"
 _STUDIES = "ppafo.studies.loading:STUDY_FILES", "ppafo.analyses.sweep.solve:studies_of_the_package"
 
@@ -115,18 +115,18 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
             f"{_ANALYSES}.walk.question:walk_with_and_without",
             first_line="Simulate walking with the device, without it, and healthy.",
             library="ppafo.walking.loading:FILE",
-            listing="ppafo.analyses.walk.answer:list_files",
-            default_folder="ppafo.analyses.walk.answer:default_folder",
+            listing="ppafo.analyses.walk.command:list_files",
+            default_folder="ppafo.analyses.walk.command:default_folder",
         ),
     },
     "tools": {
         "export": Group(
             "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
             {
-                "c": _of_scenario(f"{_TOOLS}:export_c"),
+                "c": _of_scenario(f"{_EXPORTS}:export_c"),
                 "controller": _of_scenario("ppafo.processor.commands:export_controller"),
                 "firmware": _of_scenario("ppafo.processor.commands:export_firmware"),
-                "fmu": _of_scenario(f"{_TOOLS}:export_fmu"),
+                "fmu": _of_scenario(f"{_EXPORTS}:export_fmu"),
                 "opensim": Command("ppafo.cli.opensim:export_opensim", library="ppafo.walking.loading:FILE"),
                 "figure": Command("ppafo.cli.figure:export_figure"),
             },

@@ -8,17 +8,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings, less, time_if_any
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, time_if_any
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import HELPS, PUSH_OFF
-from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
+from ppafo.signals.meter import REQUESTED, STEADY, WALK, Course, MeterKind, Sample, StrideSample
 
 SETTLING = 2
 """First strides that are left out of averages: the controller learns the stride time in them."""
+NOT_YET = -1.0
+"""Time [s] of what has not happened."""
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class StrideQuantity:
     """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
 
     unit: str
@@ -26,22 +28,26 @@ class Quantity:
     total: str
 
 
-PER_STRIDE: dict[str, Quantity] = {
-    "gas": Quantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
-    "positive_push_off_work": Quantity(
+PER_STRIDE: dict[str, StrideQuantity] = {
+    "gas": StrideQuantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
+    "positive_push_off_work": StrideQuantity(
         "J", "positive work of T_ex while the foot rolls over the toes", "walk.positive_push_off_work"
     ),
-    "net_push_off_work": Quantity("J", "net work of T_ex while the foot rolls over the toes", "walk.net_push_off_work"),
-    "toe_clearance": Quantity("m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"),
-    "toe_landing": Quantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
+    "net_push_off_work": StrideQuantity(
+        "J", "net work of T_ex while the foot rolls over the toes", "walk.net_push_off_work"
+    ),
+    "toe_clearance": StrideQuantity(
+        "m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"
+    ),
+    "toe_landing": StrideQuantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
 }
-
-NOT_YET = -1.0
-"""Time of what has not happened."""
 
 
 class StrideTotals(NamedTuple):
-    """Totals since the start, or what a stride adds to them: gas [kg], works [J], height [m], landings."""
+    """Gas from the supply [kg], works of T_ex [J], clearances of the toes [m] and landings on them, since some moment.
+
+    Fields have the names of ``PER_STRIDE``.
+    """
 
     gas: float
     positive_push_off_work: float
@@ -50,131 +56,148 @@ class StrideTotals(NamedTuple):
     toe_landing: float
 
 
-class StrideNow(NamedTuple):
-    """The stride under way: totals at its strike, 1 where it lacked help; error in push-off [(N m)^2], samples of it.
+class CurrentStride(NamedTuple):
+    """The stride under way: totals since the start of the walk at its strike, and what its samples have shown.
 
-    ``is_whole`` is 1 of one that began with a strike, which the walk itself does not, ``on_toes`` of one that began on
-    the toes: the totals at its strike have that landing already.
+    ``is_whole`` is 1 of one that began with a strike, which the walk itself does not; ``on_toes`` of one that began on
+    the toes: the totals at its strike have that landing already. ``lacked_help`` is 1 where a sample had less help.
+    ``squared_errors`` [(N m)^2] are those of the torque, summed over its ``push_off_samples``.
     """
 
     is_whole: float
     on_toes: float
-    begun: StrideTotals
-    was_vented: float
-    squares: float
-    samples: float
+    at_strike: StrideTotals
+    lacked_help: float
+    squared_errors: float
+    push_off_samples: float
 
 
-class Counted(NamedTuple):
-    """Whole strides: how many there are, had help and count for means; their sums and errors."""
+class EndedStrides(NamedTuple):
+    """How many strides were ``whole``, had help throughout, and are ``averaged``: those with help but the first.
+
+    Over the averaged ones: sums of what each adds to the totals, of squared errors of the torque in push-off
+    [(N m)^2], and of the samples there.
+    """
 
     whole: float
     helped: float
-    counted: float
+    averaged: float
     sums: StrideTotals
-    squares: float
-    samples: float
+    squared_errors: float
+    push_off_samples: float
 
 
 class Strides(NamedTuple):
-    """A walk up to a sample: ``strikes``, gas [kg] from the supply at the first sample and now, its strides.
+    """A walk up to a sample: heel strikes, gas [kg] from the supply at the first sample and now, its strides.
 
-    ``safe_time`` [s] is the time of the first sample with less help, below 0 without one.
+    ``safe_time`` [s] is the time of the first sample with less help, ``NOT_YET`` without one.
     """
 
     strikes: float
     first_gas: float
     gas: float
-    stride: StrideNow
-    counted: Counted
+    current: CurrentStride
+    ended: EndedStrides
     safe_time: float
 
 
-def totals_at(now: StrideSample) -> StrideTotals:
-    """Totals since the start."""
+def totals_at(sample: StrideSample) -> StrideTotals:
+    """Totals since the start of the walk at a sample of it."""
     return StrideTotals(
-        gas=now.supplied_mass,
-        positive_push_off_work=now.positive_push_off_work,
-        net_push_off_work=now.net_push_off_work,
-        toe_clearance=now.clearances,
-        toe_landing=now.toe_landings,
+        gas=sample.supplied_mass,
+        positive_push_off_work=sample.positive_push_off_work,
+        net_push_off_work=sample.net_push_off_work,
+        toe_clearance=sample.clearances,
+        toe_landing=sample.toe_landings,
     )
 
 
-def sum_with(sums: StrideTotals, now: StrideTotals, begun: StrideTotals, on_toes: float) -> StrideTotals:
-    """Sums with the sums of a stride that went from one to the other; ``on_toes`` is 1 where it began on the toes."""
+def sums_with_stride(sums: StrideTotals, at_strike: StrideTotals, at_end: StrideTotals, on_toes: float) -> StrideTotals:
+    """Sums over strides with one more, of which the totals at its strike and at its end are given.
+
+    ``on_toes`` is 1 where it began on the toes: that landing is its own, and not the one with which the next begins.
+    """
+    # Field by field: compiled code has no loop over a row.
     return StrideTotals(
-        gas=sums.gas + (now.gas - begun.gas),
+        gas=sums.gas + (at_end.gas - at_strike.gas),
         positive_push_off_work=sums.positive_push_off_work
-        + (now.positive_push_off_work - begun.positive_push_off_work),
-        net_push_off_work=sums.net_push_off_work + (now.net_push_off_work - begun.net_push_off_work),
-        toe_clearance=sums.toe_clearance + (now.toe_clearance - begun.toe_clearance),
+        + (at_end.positive_push_off_work - at_strike.positive_push_off_work),
+        net_push_off_work=sums.net_push_off_work + (at_end.net_push_off_work - at_strike.net_push_off_work),
+        toe_clearance=sums.toe_clearance + (at_end.toe_clearance - at_strike.toe_clearance),
         toe_landing=sums.toe_landing + on_toes,
     )
 
 
+def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> CurrentStride:
+    """A stride that begins at a sample, of which nothing is counted yet."""
+    return CurrentStride(
+        is_whole=is_whole,
+        on_toes=on_toes,
+        at_strike=totals_at(sample),
+        lacked_help=0.0,
+        squared_errors=0.0,
+        push_off_samples=0.0,
+    )
+
+
 def _start(_course: Course, sample: Sample) -> Strides:
-    nothing = StrideTotals(
+    no_sums = StrideTotals(
         gas=0.0, positive_push_off_work=0.0, net_push_off_work=0.0, toe_clearance=0.0, toe_landing=0.0
     )
     return Strides(
         strikes=sample.stride.strides,
         first_gas=sample.stride.supplied_mass,
         gas=sample.stride.supplied_mass,
-        stride=StrideNow(
-            is_whole=0.0, on_toes=0.0, begun=totals_at(sample.stride), was_vented=0.0, squares=0.0, samples=0.0
-        ),
-        counted=Counted(whole=0.0, helped=0.0, counted=0.0, sums=nothing, squares=0.0, samples=0.0),
+        current=begun_stride(sample.stride, 0.0, 0.0),
+        ended=EndedStrides(whole=0.0, helped=0.0, averaged=0.0, sums=no_sums, squared_errors=0.0, push_off_samples=0.0),
         safe_time=sample.stride.time if sample.stride.level > HELPS else NOT_YET,
     )
 
 
 def _update(strides: Strides, _course: Course, sample: Sample) -> Strides:
     # Counts are floats in the state of a run: half way between two of them is safe from rounding.
-    strikes = sample.stride.strides - strides.strikes > 0.5
-    on_toes = sample.stride.toe_landings - strides.stride.begun.toe_landing
-    begun = StrideNow(
-        is_whole=1.0, on_toes=on_toes, begun=totals_at(sample.stride), was_vented=0.0, squares=0.0, samples=0.0
-    )
-    stride = begun if strikes else strides.stride
-    is_first = sample.stride.level > HELPS and strides.safe_time < 0.0
+    is_strike = sample.stride.strides - strides.strikes > 0.5
+    on_toes = sample.stride.toe_landings - strides.current.at_strike.toe_landing
+    begun = begun_stride(sample.stride, 1.0, on_toes)
+    is_first_without_help = sample.stride.level > HELPS and strides.safe_time < 0.0
     return Strides(
         strikes=sample.stride.strides,
         first_gas=strides.first_gas,
         gas=sample.stride.supplied_mass,
-        stride=go_on(stride, sample),
-        counted=count(strides.counted, strides.stride, sample) if strikes else strides.counted,
-        safe_time=sample.stride.time if is_first else strides.safe_time,
+        current=stride_with_sample(begun if is_strike else strides.current, sample),
+        ended=ended_with_stride(strides.ended, strides.current, sample) if is_strike else strides.ended,
+        safe_time=sample.stride.time if is_first_without_help else strides.safe_time,
     )
 
 
-def go_on(stride: StrideNow, sample: Sample) -> StrideNow:
+def stride_with_sample(stride: CurrentStride, sample: Sample) -> CurrentStride:
     """The stride under way with one sample more."""
     error = sample.reference - sample.torque
     pushes = sample.stride.phase == PUSH_OFF
-    return StrideNow(
+    return CurrentStride(
         is_whole=stride.is_whole,
         on_toes=stride.on_toes,
-        begun=stride.begun,
-        was_vented=1.0 if sample.stride.level > HELPS else stride.was_vented,
-        squares=stride.squares + (error * error if pushes else 0.0),
-        samples=stride.samples + (1.0 if pushes else 0.0),
+        at_strike=stride.at_strike,
+        lacked_help=1.0 if sample.stride.level > HELPS else stride.lacked_help,
+        squared_errors=stride.squared_errors + (error * error if pushes else 0.0),
+        push_off_samples=stride.push_off_samples + (1.0 if pushes else 0.0),
     )
 
 
-def count(counted: Counted, stride: StrideNow, sample: Sample) -> Counted:
-    """The strides with the one that ends at the first sample after a heel strike."""
+def ended_with_stride(ended: EndedStrides, stride: CurrentStride, sample: Sample) -> EndedStrides:
+    """The strides that have ended with the one that ends at ``sample``, the first after a heel strike."""
     # A stride with less help in a part of it is no example; in the first ones the controller still learns their time.
-    now = totals_at(sample.stride)
-    helps = stride.is_whole > 0.5 and stride.was_vented < 0.5
-    counts = helps and counted.whole >= float(SETTLING)
-    return Counted(
-        whole=counted.whole + stride.is_whole,
-        helped=counted.helped + (1.0 if helps else 0.0),
-        counted=counted.counted + (1.0 if counts else 0.0),
-        sums=sum_with(counted.sums, now, stride.begun, stride.on_toes) if counts else counted.sums,
-        squares=counted.squares + (stride.squares if counts else 0.0),
-        samples=counted.samples + (stride.samples if counts else 0.0),
+    is_helped = stride.is_whole > 0.5 and stride.lacked_help < 0.5
+    is_averaged = is_helped and ended.whole >= float(SETTLING)
+    at_end = totals_at(sample.stride)
+    sums = sums_with_stride(ended.sums, stride.at_strike, at_end, stride.on_toes) if is_averaged else ended.sums
+    return EndedStrides(
+        whole=ended.whole + stride.is_whole,
+        helped=ended.helped + (1.0 if is_helped else 0.0),
+        averaged=ended.averaged + (1.0 if is_averaged else 0.0),
+        sums=sums,
+        squared_errors=ended.squared_errors + (stride.squared_errors if is_averaged else 0.0),
+        push_off_samples=ended.push_off_samples + (stride.push_off_samples if is_averaged else 0.0),
     )
 
 
@@ -184,38 +207,36 @@ METER = MeterKind("strides", Strides, _start, _update)
 def mean_of(total: Floats, count: Floats) -> Floats:
     """A sum over how many there are, in its unit; nan for none."""
     # Both sides of a choice are computed, in the lanes too: the divisor is never 0.
-    found: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
-    return found
+    mean: Floats = choose(count > 0.0, total / larger(count, 1.0), math.nan)
+    return mean
 
 
 def _push_off_error(readings: Readings) -> Floats:
-    counted = readings.meters["strides"].counted
-    found: Floats = root(mean_of(counted.squares, counted.samples))
-    return found
+    """RMS error of the torque [N m] in the push-offs of the averaged strides."""
+    ended = readings.meters["strides"].ended
+    error: Floats = root(mean_of(ended.squared_errors, ended.push_off_samples))
+    return error
 
 
 def _kind(name: str, unit: str, summary: str, read: Callable[[Readings], Floats], *needs: str) -> MetricKind:
+    """A metric of a walk; ``needs`` is what it needs beside one."""
     return MetricKind(name, unit, summary, (), None, read, (METER,), needs=(WALK, *needs))
 
 
-def _mean(name: str, *needs: str) -> MetricKind:
+def _mean(name: str) -> MetricKind:
     """A mean over the strides with help, without the first ones; in a task sequence it would be over other strides."""
     quantity = PER_STRIDE[name]
-    read = ReadAt((f"meters.strides.counted.sums.{name}", "meters.strides.counted.counted"), mean_of)
-    return _kind(name, quantity.unit, f"{quantity.summary}, mean", read, STEADY, *needs)
+    read = ReadAt((f"meters.strides.ended.sums.{name}", "meters.strides.ended.averaged"), mean_of)
+    return _kind(name, quantity.unit, f"{quantity.summary}, mean", read, STEADY)
 
 
 METRICS = (
-    _mean("gas"),
-    _mean("positive_push_off_work"),
-    _mean("net_push_off_work"),
-    _mean("toe_clearance"),
-    _mean("toe_landing"),
+    *(_mean(name) for name in PER_STRIDE),
     _kind(
         "counted_strides",
         "-",
         "strides over which the means are taken",
-        ReadAt(("meters.strides.counted.counted",)),
+        ReadAt(("meters.strides.ended.averaged",)),
         STEADY,
     ),
     _kind(
@@ -224,20 +245,20 @@ METRICS = (
         "RMS of requested torque less actuator torque in push-off",
         _push_off_error,
         STEADY,
-        REQUEST,
+        REQUESTED,
     ),
-    _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.counted.whole",))),
+    _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.ended.whole",))),
     _kind(
         "helped_strides",
         "-",
         "whole strides with help from strike to strike",
-        ReadAt(("meters.strides.counted.helped",)),
+        ReadAt(("meters.strides.ended.helped",)),
     ),
     _kind(
         "vented_strides",
         "-",
         "whole strides with less help (lifted only, paused or stopped) in at least a part of them",
-        ReadAt(("meters.strides.counted.whole", "meters.strides.counted.helped"), less),
+        ReadAt(("meters.strides.ended.whole", "meters.strides.ended.helped"), less),
     ),
     _kind(
         "total_gas",

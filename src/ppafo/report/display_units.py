@@ -66,6 +66,11 @@ def quantity_of_unit(si_unit: str) -> str:
     return _OF_UNIT.get(si_unit, "")
 
 
+def si_unit(quantity: str) -> str:
+    """Return the unit in SI of a quantity, as files write it; empty for a plain number."""
+    return QUANTITIES[quantity][0] if quantity else ""
+
+
 def _unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown: the set's, where it writes one, else the table's."""
     si_unit, unit = QUANTITIES[quantity]

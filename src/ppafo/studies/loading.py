@@ -96,7 +96,7 @@ def load_study(
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What messages call a file, where relative paths in it begin, and its bytes; none of data."""
+    """What messages call a file, where relative paths in it begin, and its bytes, none where it came as data."""
 
     file: str
     folder: Path
@@ -113,38 +113,45 @@ def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[
 
 
 def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source) -> Study:
+    """Return the study of a file, with everything in SI units; StudyError for what cannot be run as it is written.
+
+    ``document`` is the file as plain data, which the study keeps.
+    """
     repeated = first_twice([configuration.name for configuration in parsed.configurations])
     if repeated is not None:
         raise StudyError(f"there are two configurations named '{repeated}'; give each its own name")
     configurations = tuple(_configuration(configuration, source.folder) for configuration in parsed.configurations)
     _check_requests(parsed)
     _check_set_or_varied(parsed, configurations)
-    places = {entry.path: _place(entry, configurations, parsed) for entry in parsed.vary}
-    moving = [entry for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
-    varied = [_axis_or_drawn(entry, places[entry.path], configurations) for entry in moving]
-    own = tuple(drawn for drawn in varied if isinstance(drawn, Drawn))
-    # Noise comes last among what is drawn; a grid alone is run once, with the noise that its scenarios write.
-    drawn, scores = own, _scores(parsed, own)
     scenarios = [configuration.scenario for configuration in configurations]
-    if own:
-        drawn, scores = with_noise(own, scores, scenarios, [entry.path for entry in parsed.vary])
-    units = {path: varied_path.quantity.unit or "-" for path, varied_path in places.items()}
-    same = _followers(parsed, places)
+    varied_paths = {entry.path: _common_path(entry, configurations, parsed) for entry in parsed.vary}
+    independent = [
+        _axis_or_drawn(entry, varied_paths[entry.path], configurations)
+        for entry in parsed.vary
+        if not isinstance(entry, declared.SameAs)
+    ]
+    drawn = tuple(number for number in independent if isinstance(number, Drawn))
+    scores = _scores(parsed, drawn)
+    # A grid alone is run once, with the noise that its scenarios write.
+    if drawn:
+        drawn, scores = with_noise(drawn, scores, scenarios, [entry.path for entry in parsed.vary])
     # What follows a gauge pressure counts from the atmosphere of its run as well.
-    gauge = {path for path, varied_path in places.items() if varied_path.is_gauge}
+    followed = _followed_paths(parsed, varied_paths)
+    gauge = {path for path, varied in varied_paths.items() if varied.is_gauge}
+    gauge |= {path for path, other in followed.items() if other in gauge}
     return Study(
         name=parsed.name,
         description=" ".join(parsed.description.split()),
         configurations=configurations,
-        axes=tuple(axis for axis in varied if isinstance(axis, Axis)),
+        axes=tuple(axis for axis in independent if isinstance(axis, Axis)),
         drawn=drawn,
-        same=same,
+        same=followed,
         scores=scores,
         sample=_sample(parsed, drawn),
         outputs=valid_outputs(parsed.outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
-        units=units | {number.path: "-" for number in drawn if number.path not in units},
-        gauge=frozenset(gauge | {path for path, other in same.items() if other in gauge}),
+        units=_units(varied_paths, drawn),
+        gauge=frozenset(gauge),
         only={entry.path: entry.only for entry in parsed.vary if entry.only},
         document=document,
         text=source.text,
@@ -180,6 +187,7 @@ def _configuration(entry: declared.Configuration, folder: Path, overrides: Seque
 
 
 def _check_requests(parsed: declared.StudyFile) -> None:
+    """Refuse a study that keeps nothing, varies nothing, or one path twice, or the length of what is kept over time."""
     outputs = parsed.outputs
     if not (outputs.metrics or outputs.trajectories or outputs.bands):
         known = ", ".join(list(METRICS)[:4])
@@ -195,7 +203,9 @@ def _check_requests(parsed: declared.StudyFile) -> None:
         raise StudyError(f"'{repeated}' is varied twice; give it only one [[vary]]")
 
 
-def _place(entry: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile) -> VariedPath:
+def _common_path(
+    entry: declared.Varied, configurations: Sequence[Configuration], parsed: declared.StudyFile
+) -> VariedPath:
     """Return the path with its declaration, which must be the same in all configurations that vary it."""
     names = [configuration.name for configuration in configurations]
     for name in entry.only:
@@ -203,52 +213,59 @@ def _place(entry: declared.Varied, configurations: Sequence[Configuration], pars
             hint = nearest_name(name, names)
             raise StudyError(f"vary '{entry.path}': only: there is no configuration '{name}'{hint}")
     with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
-        places = [varied_path(entry.path, each.scenario) for each in _varying(entry, configurations)]
-    if any(place != places[0] for place in places):
+        first, *others = (varied_path(entry.path, each.scenario) for each in _varying(entry, configurations))
+    if any(other != first for other in others):
         raise StudyError(f"vary '{entry.path}': has different units, limits or atmospheres in different configurations")
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
     if isinstance(entry, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
-        return places[0]
+        return first
     with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
-        first = _varying(entry, configurations)[0].scenario
-        is_stated = isinstance(entry, declared.Stated)
-        texts = [f"0 {stated_normal(places[0], first)[1]}"] if is_stated else texts_of(entry)
-        return in_its_unit(places[0], texts)
+        if isinstance(entry, declared.Stated):
+            _, unit = stated_normal(first, _varying(entry, configurations)[0].scenario)
+            return in_its_unit(first, [f"0 {unit}"])
+        return in_its_unit(first, texts_of(entry))
 
 
 def _axis_or_drawn(
     entry: declared.Varied, varied_path: VariedPath, configurations: Iterable[Configuration]
 ) -> Axis | Drawn:
+    """Return the values of a grid or a list, or the distribution of a path, in SI units."""
     with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
         if not isinstance(entry, declared.Stated):
             return axis_or_distribution(entry, varied_path)
         # One draw is run in every configuration, so all of them must mean the same distribution.
-        units = {stated_normal(varied_path, each.scenario)[0] for each in _varying(entry, configurations)}
-        if len(units) > 1:
+        distributions = {stated_normal(varied_path, each.scenario)[0] for each in _varying(entry, configurations)}
+        if len(distributions) > 1:
             raise UnitError(
                 "the parameter sets of the configurations state different values; use 'only', or give the values"
             )
-        stated = units.pop()
+        stated = distributions.pop()
         return Drawn(entry.path, Above(stated, varied_path.atmosphere) if varied_path.is_gauge else stated)
 
 
-def _followers(parsed: declared.StudyFile, places: Mapping[str, VariedPath]) -> dict[str, str]:
+def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:
     """Return the path that a path follows, by path; refuses one that does not vary, or has another unit."""
-    own = [entry.path for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
-    same: dict[str, str] = {}
+    independent = [entry.path for entry in parsed.vary if not isinstance(entry, declared.SameAs)]
+    followed: dict[str, str] = {}
     for entry in parsed.vary:
         if not isinstance(entry, declared.SameAs):
             continue
-        if entry.same_as not in own:
-            hint = nearest_name(entry.same_as, own) or f"; available: {', '.join(own) or 'none'}"
+        if entry.same_as not in independent:
+            hint = nearest_name(entry.same_as, independent) or f"; available: {', '.join(independent) or 'none'}"
             raise StudyError(f"vary '{entry.path}': same_as = '{entry.same_as}' does not vary independently here{hint}")
-        unit, other = places[entry.path].quantity.unit, places[entry.same_as].quantity.unit
+        unit, other = varied_paths[entry.path].quantity.unit, varied_paths[entry.same_as].quantity.unit
         if unit != other:
             raise StudyError(
                 f"vary '{entry.path}': same_as = '{entry.same_as}' is in '{other or '-'}', this path in '{unit or '-'}'"
             )
-        same[entry.path] = entry.same_as
-    return same
+        followed[entry.path] = entry.same_as
+    return followed
+
+
+def _units(varied_paths: Mapping[str, VariedPath], drawn: Iterable[Drawn]) -> dict[str, str]:
+    """Return the unit in SI of all that varies, by path; the noise, which no [[vary]] has, is a plain number."""
+    units = {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()}
+    return units | {number.path: "-" for number in drawn if number.path not in units}
 
 
 def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) -> list[Configuration]:
@@ -257,6 +274,7 @@ def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) ->
 
 
 def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None:
+    """Return the lower Cholesky factor of the correlation of the normal scores; None where none are correlated."""
     if not parsed.correlations:
         return None
     paths = [number.path for number in drawn]
@@ -287,6 +305,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None
 
 
 def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Sample:
+    """Return how the distributions are drawn; without any, one run at each point of the grid."""
     if not drawn:
         if parsed.sample is not None:
             raise StudyError("[sample] is given, but nothing has a distribution; omit it")

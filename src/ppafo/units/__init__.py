@@ -12,6 +12,10 @@ Four rules go beyond arithmetic:
 
 A volume flow becomes a mass flow by the reference condition and the gas behind it (``reference.py``): ``L/min (ANR,
 air)``.
+
+>>> pressure = parse_quantity("65 psi_g", "Pa_a")
+>>> f"{pressure:.0f} Pa absolute, {from_si(pressure, 'psi_g', 'Pa_a', 101325.0):.0f} psi gauge"
+'549484 Pa absolute, 65 psi gauge'
 """
 
 from ppafo.units.definitions import ParsedUnit, known_units, unit_by_pint

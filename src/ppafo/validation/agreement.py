@@ -33,8 +33,9 @@ from ppafo.validation.compared import (
     Thresholds,
     parse_thresholds,
 )
+from ppafo.validation.initial import INITIAL_REMEDIES
 from ppafo.validation.measured import Measured, supply_gauge
-from ppafo.validation.replay import INITIAL_REMEDIES, Motion, Replay, Replayed, replay_recording
+from ppafo.validation.replay import Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""

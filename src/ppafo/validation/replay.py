@@ -1,16 +1,17 @@
 """The model on the inputs of a recording, from its first state: command, supply, external torque or recorded angle."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
+from ppafo.engine.lanes import Batch, Floats
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.errors import DataError, PpafoError, SimulationError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, PpafoError, SimulationError
 from ppafo.parameters.device import Device
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -20,18 +21,20 @@ from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import Start
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
-from ppafo.units import parse_quantity
-from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
+from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import Measured
 
 Motion = Literal["free", "measured", "locked", "leg"]
+"""What the vane does: as the model demands, as the recorded angle says, nothing, or as with a foot on it."""
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
 
 MAXIMUM_STEPS = 20_000_000
-_WHOLE = 1.0e-9
+"""Steps of one replay; what takes more has its times in another unit, or is to be split."""
 _RECORD_INTERVAL = 2.5e-4
 """Seconds between two records of the model, or less: fine enough to be shifted in time and read between."""
+_ROUNDING = 1.0e-9
+"""Fraction of a step [-] by which a whole number of steps may miss an interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,59 +61,89 @@ class Replay:
     leg: Leg | None = None
 
 
-def replay_recording(wanted: Replay) -> Replayed:
-    """Return the model on the inputs of a recording; SimulationError where it diverges."""
-    found = replay_together([wanted])[0]
-    if isinstance(found, PpafoError):
-        raise found
-    return found
+def replay_recording(request: Replay) -> Replayed:
+    """Return the model on the inputs of a recording; SimulationError where it diverges, DataError for bad inputs."""
+    replayed = replay_together([request])[0]
+    if isinstance(replayed, PpafoError):
+        raise replayed
+    return replayed
 
 
-def replay_together(wanted: Sequence[Replay]) -> list[Replayed | PpafoError]:
-    """Return many replays, or why one cannot be made; all of one program, clock and inputs are one batch."""
-    found: dict[int, Replayed | PpafoError] = {}
-    planned: dict[int, tuple[Run, StepInputs, Batch]] = {}
-    groups: dict[tuple[Any, ...], list[int]] = {}
-    for place, one in enumerate(wanted):
-        followed = followed_channels(one.measured, one.motion)
-        inputs = RecordedInputs(one.measured.recording, followed, float(one.measured.recording.time[0]))
+def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
+    """Return many replays in their order, or the error of one that cannot be made or diverges.
+
+    All of one program, clock and inputs are run side by side.
+    """
+    ended: dict[int, Replayed | PpafoError] = {}
+    planned: dict[int, _Planned] = {}
+    alike: dict[Hashable, list[int]] = {}
+    for number, request in enumerate(requests):
         try:
-            run = _plan(one)
-            steps = step_inputs(inputs, one.device, run)
+            planned[number] = _planned(request)
         except PpafoError as error:
-            found[place] = error
+            ended[number] = error
             continue
-        batch = batch_of(run)
-        planned[place] = run, steps, batch
-        table = [(name, series.tobytes()) for name, series in steps.parameters.items()]
-        command = b"" if steps.command is None else steps.command.tobytes()
-        groups.setdefault((batch.program, batch.clock, command, tuple(table)), []).append(place)
-    for places in groups.values():
-        first, steps, batch = planned[places[0]]
-        parameters = np.concatenate([planned[place][2].parameters for place in places], axis=1)
-        states = np.concatenate([planned[place][2].states for place in places], axis=1)
-        outcome = replay(replace(batch, parameters=parameters, states=states), steps)
-        rows = state_row_numbers(first)
-        for element, place in enumerate(places):
-            record, ends = outcome.record[:, :, element], outcome.states[:, element]
-            found[place] = _replayed(wanted[place], planned[place][0], rows, record, ends)
-    return [found[place] for place in range(len(wanted))]
+        alike.setdefault(planned[number].kind(), []).append(number)
+    for numbers in alike.values():
+        ended.update(zip(numbers, _run_together([planned[number] for number in numbers]), strict=True))
+    return [ended[number] for number in range(len(requests))]
 
 
-def _replayed(
-    one: Replay, run: Run, rows: Mapping[str, int], record: Floats, ends: Floats
-) -> Replayed | SimulationError:
-    failed = float(ends[rows["result.failure_time"]])
-    if failed < NEVER_FAILED or not np.isfinite(record).all():
-        until = min(failed, run.step * run.step_count)
+@dataclass(frozen=True, slots=True)
+class _Planned:
+    """A replay that can be run: what was requested, the run, the inputs of its steps, and it as a batch of one."""
+
+    request: Replay
+    run: Run
+    inputs: StepInputs
+    batch: Batch
+
+    def kind(self) -> Hashable:
+        """Return what is equal for replays that run side by side: the program, the clock, and all inputs."""
+        command = None if self.inputs.command is None else self.inputs.command.tobytes()
+        parameters = tuple((path, series.tobytes()) for path, series in self.inputs.parameters.items())
+        return self.batch.program, self.batch.clock, command, parameters
+
+
+def _planned(request: Replay) -> _Planned:
+    """Return the plan of a replay; PpafoError where the recording or the device does not allow one."""
+    recording = request.measured.recording
+    followed = followed_channels(request.measured, request.motion)
+    run = _plan(request)
+    inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
+    return _Planned(request, run, inputs, batch_of(run))
+
+
+def _run_together(together: Sequence[_Planned]) -> list[Replayed | SimulationError]:
+    """Return replays of one kind, run side by side."""
+    first = together[0]
+    batch = replace(
+        first.batch,
+        parameters=np.concatenate([planned.batch.parameters for planned in together], axis=1),
+        states=np.concatenate([planned.batch.states for planned in together], axis=1),
+    )
+    result = replay(batch, first.inputs)
+    rows = state_row_numbers(first.run)
+    return [
+        _replayed(planned, rows, result.record[:, :, lane], result.states[:, lane])
+        for lane, planned in enumerate(together)
+    ]
+
+
+def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: Floats) -> Replayed | SimulationError:
+    """Return one replay from its record (records, rows) and its last state (rows,); the error where it diverged."""
+    request, run = planned.request, planned.run
+    failure_time = float(ends[rows["result.failure_time"]])
+    if failure_time < NEVER_FAILED or not np.isfinite(record).all():
+        until = min(failure_time, run.step * run.step_count)
         remedy = "check the volumes, the inertia and the valve of the set (ppafo sets audit)"
         if ends[rows["result.too_many_parts"]]:
             remedy = TOO_MANY_PARTS
         return SimulationError(
-            f"{one.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}"
+            f"{request.measured.file}: the model diverged {until:.6g} s after the first sample; {remedy}"
         )
-    inputs = followed_channels(one.measured, one.motion)
-    return Replayed(_recording(one.measured, run, record), run.step, inputs)
+    followed = followed_channels(request.measured, request.motion)
+    return Replayed(_recording(request.measured, run, rows, record), run.step, followed)
 
 
 def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
@@ -120,44 +153,49 @@ def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
     return (COMMAND, *followed, *([ANGLE] if motion == "measured" else []))
 
 
-def replayed_scenario(one: Replay) -> Scenario:
-    """Return the run of a recording: of a vane that is unconstrained, locked or on a leg."""
-    recording, start = one.measured.recording, one.start
-    duration = recording.duration + max(one.extra, sample_period(recording.time))
-    highest = with_highest_supply(one.device, recording, recording.names)
-    given: FreeMotion | PrescribedMotion | None = locked_vane(start.angle) if one.motion == "locked" else None
-    if one.motion == "leg":
+def replayed_scenario(request: Replay) -> Scenario:
+    """Return the run of a recording: of a vane that is unconstrained, locked or on a leg.
+
+    A recorded angle is prescribed only once the run is planned.
+    """
+    recording, start = request.measured.recording, request.start
+    motion: FreeMotion | PrescribedMotion | None = None
+    if request.motion == "locked":
+        motion = locked_vane(start.angle)
+    elif request.motion == "leg":
         # The leg on the test fixture is the scenario's of figure 7.
-        fixture = load_scenario("step-response").motion
-        leg = one.leg or (fixture.leg if isinstance(fixture, FreeMotion) else None)
-        given = FreeMotion(start.angle, start.angular_velocity, leg=leg)
-    return replay_scenario(recording, highest, start, duration, one.measured.file, given)
+        leg = request.leg or vane_motion(load_scenario("step-response")).leg
+        motion = FreeMotion(start.angle, start.angular_velocity, leg=leg)
+    highest = with_highest_supply(request.device, recording, recording.names)
+    duration = recording.duration + max(request.extra, sample_period(recording.time))
+    return replay_scenario(recording, highest, start, duration, request.measured.file, motion)
 
 
-def _plan(one: Replay) -> Run:
-    """The run of a vane that is unconstrained, locked or on a leg, with steps fine enough for a prescribed one too."""
-    scenario = replayed_scenario(one)
+def _plan(request: Replay) -> Run:
+    """Return the run of a replay: whole samples long, in steps fine enough for a prescribed angle too."""
+    scenario = replayed_scenario(request)
     run = plan_run(scenario)
     if run.step_count > MAXIMUM_STEPS:
         raise DataError(
-            f"{one.measured.file}: {scenario.run.duration:.4g} s would take {run.step_count} steps of {run.step:.2g} "
-            f"s, at most {MAXIMUM_STEPS} are allowed; split the recording into parts, or give the unit of its times "
-            "where they are not seconds"
+            f"{request.measured.file}: {scenario.run.duration:.4g} s would take {run.step_count} steps of "
+            f"{run.step:.2g} s, at most {MAXIMUM_STEPS} are allowed; split the recording into parts, or give the unit "
+            "of its times where they are not seconds"
         )
-    supply = one.device.supply
+    supply = request.device.supply
     plant = run.plant._replace(supply_pressure=supply.pressure, dorsiflexion_pressure=supply.dorsiflexion_pressure)
     samples = math.ceil(run.step_count / run.steps_per_sample)
     # Steps between two records divide a sample, so that the model is known at every regular sample.
-    most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _WHOLE)))
+    most = max(1, int(_RECORD_INTERVAL / run.step * (1.0 + _ROUNDING)))
     every = max(count for count in range(1, most + 1) if run.steps_per_sample % count == 0)
     run = replace(run, plant=plant, record_every=every, step_count=samples * run.steps_per_sample)
-    return with_prescribed_angle(run, one.start.angle) if one.motion == "measured" else run
+    return with_prescribed_angle(run, request.start.angle) if request.motion == "measured" else run
 
 
-def _recording(measured: Measured, run: Run, record: Floats) -> Recording:
-    rows = state_row_numbers(run)
-    angle, masses = record[:, rows["state.angle"]], (record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]])
-    pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, *masses)
+def _recording(measured: Measured, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
+    """Return a record of states as channels, on the clock of the recording that was replayed."""
+    angle = record[:, rows["state.angle"]]
+    mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]
+    pressure_1, pressure_2 = pressures_of(run.program.actuator, run.plant, angle, mass_1, mass_2)
     channels = {
         "angle": (angle, "rad"),
         "pressure_1": (pressure_1, "Pa"),
@@ -170,29 +208,3 @@ def _recording(measured: Measured, run: Run, record: Floats) -> Recording:
     times = measured.recording.time[0] + interval * np.arange(record.shape[0], dtype=np.float64)
     values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
     return Recording(f"{measured.recording.label}, replayed", times, values, kind="simulated")
-
-
-_UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
-_EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
-INITIAL_REMEDIES = {name: f'give its initial value, --initial "{example}"' for name, example in _EXAMPLES.items()}
-"""What to do about a channel that a replay would start from and that was not recorded."""
-
-
-def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
-    """Return initial values in SI by channel from texts such as ``pressure_1=0 psi_g``."""
-    values = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        if not equals:
-            raise DataError(
-                f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE, for example '{_EXAMPLES[ANGLE]}'"
-            )
-        if name not in _UNITS:
-            hint = nearest_name(name, _UNITS)
-            raise DataError(
-                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; "
-                f"available: {', '.join(_UNITS)}"
-            )
-        with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
-            values[name] = parse_quantity(value, _UNITS[name], atmosphere)
-    return values

@@ -47,15 +47,15 @@ def metered(columns: dict[str, np.ndarray], first: int = 0) -> Strides:
 @pytest.mark.parametrize("first", [0, 10])
 def test_sums_over_strides_are_those_of_the_recording(first: int) -> None:
     columns = totals()
-    counted = metered(columns, first).counted
+    ended = metered(columns, first).ended
     paths = {item.total: item.total.rpartition(".")[2] for item in PER_STRIDE.values()}
     recorded = {path: columns[name][first:] for path, name in paths.items()}
     found = per_stride(recorded, stride_starts(columns["strides"][first:]))
-    assert counted.counted == found["gas"].size - SETTLING > 0
+    assert ended.averaged == found["gas"].size - SETTLING > 0
     for name, values in found.items():
-        assert getattr(counted.sums, name) == pytest.approx(values[SETTLING:].sum()), name
+        assert getattr(ended.sums, name) == pytest.approx(values[SETTLING:].sum()), name
 
 
 def test_a_landing_on_the_toes_is_that_of_the_stride_that_it_begins() -> None:
     # Strides begin at 25, 35, 45 and 55 after the first two; the landing at 65 begins one that does not end.
-    assert metered(totals()).counted.sums.toe_landing == 2.0
+    assert metered(totals()).ended.sums.toe_landing == 2.0

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk.answer import comparison_table, wearers_finding
+from ppafo.analyses.walk.answer import comparison_table
+from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Part, text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population

@@ -1,5 +1,6 @@
 """From a problem to a parameter set: read the recordings, apply the procedures in order, put the values in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -32,75 +33,79 @@ from ppafo.units.shown import shown_in
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
     """Return the outcome of a problem whose paths begin in ``folder``; ``file`` is what messages call it.
 
-    Raises the errors of ``identify``.
+    The procedures go first, in the order in which each leans on those before it, then the section [trajectory]. Raises
+    the errors of ``identify``.
     """
+    given = _Given(problem, folder, file)
     before = _base_set(problem, folder)
     with shown_in(before.shown):
-        return _solved(problem, before, folder, file, progress)
+        valve = chosen_valve(before, problem.device.valve)
+        tasks = _tasks(given, before)
+        used = _uses(tasks, before, valve, file)
+        tolerances = tolerances_of(problem.bench, file)
+        current, results = before, list[BenchResult]()
+        for task in tasks:
+            result = run_procedure(task.sources, task.procedure, Setting(current, valve, task.place, tolerances))
+            results.append(result)
+            # The next procedure leans on what this one found; the new set is made of the old one at the end.
+            current = with_estimates(current, result.estimates).parameter_set
+        estimates = [estimate for result in results for estimate in result.estimates]
+        fitted = None
+        if problem.trajectory is not None:
+            setting = FitSetting(
+                read=lambda experiment: given.source(experiment.recording, experiment.columns, current),
+                folder=folder,
+                file=f"{file}: trajectory",
+                parameter_set=current,
+                valve=problem.device.valve,
+                bench={estimate.path: estimate for estimate in estimates},
+                used=used,
+                tolerances=tolerances,
+            )
+            fitted = solve_section(problem.trajectory, setting, progress)
+            estimates += fitted.fit.estimates
+        new_set = with_estimates(before, estimates, valve)
+        identification = Identification(problem.name, tuple(results), fitted, before, new_set)
+        named = replace(new_set, parameter_set=_named_set(identification, problem))
+        return replace(identification, new_set=named)
 
 
-def _solved(problem: ProblemFile, before: ParameterSet, folder: Path, file: str, progress: Report) -> Identification:
-    valve = chosen_valve(before, problem.device.valve)
-    current, results = before, list[BenchResult]()
-    tasks = [
-        _Task(
-            use,
-            tuple(_source(folder, name, use.columns, problem, before, file) for name in use.recordings),
-            f"{file}: procedure {number}, {use.kind}",
-        )
-        for number, use in sorted(
-            enumerate(problem.procedure, start=1), key=lambda pair: PROCEDURES.index(pair[1].kind)
-        )
-    ]
-    # One recording may serve two procedures, which ask it other things, but not one procedure twice.
-    found: list[Use] = []
-    for kind in PROCEDURES:
-        uses = [
-            Use(f"recording {number} of procedure {kind}", source.trace, source.recording, frozenset(), *times)
-            for task in tasks
-            if task.item.kind == kind
-            for times in [window_of(task.item, Setting(before, valve, task.place))]
-            for number, source in enumerate(task.sources, start=1)
-        ]
-        twice = double_use(uses)
-        if twice:
-            raise IdentificationError(f"{file}: {twice}")
-        found += uses
-    used = tuple(found)
-    stated = tolerances_of(problem.bench, file)
-    for task in tasks:
-        result = run_procedure(task.sources, task.item, Setting(current, valve, task.place, stated))
-        results.append(result)
-        # The next procedure leans on what this one found; the new set is made of the old one at the end.
-        current = with_estimates(current, result.estimates).parameter_set
-    of_bench = [estimate for result in results for estimate in result.estimates]
-    setting = FitSetting(
-        lambda use: _source(folder, use.recording, use.columns, problem, current, file),
-        folder,
-        f"{file}: trajectory",
-        current,
-        problem.device.valve,
-        {estimate.path: estimate for estimate in of_bench},
-        used,
-        stated,
-    )
-    fitted = None if problem.trajectory is None else solve_section(problem.trajectory, setting, progress)
-    estimates = (*of_bench, *(() if fitted is None else fitted.fit.estimates))
-    new_set = with_estimates(before, estimates, valve)
-    outcome = Identification(problem.name, tuple(results), fitted, before, new_set)
-    return replace(outcome, new_set=replace(new_set, parameter_set=_name_set(outcome, problem)))
+@dataclass(frozen=True, slots=True)
+class _Given:
+    """A problem as it was given: where its paths begin, and what messages call its file."""
+
+    problem: ProblemFile
+    folder: Path
+    file: str
+
+    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> Source:
+        """Return the recording that the problem names, read through one of its column maps where it says one.
+
+        The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
+        """
+        path = self.folder / name
+        atmosphere = atmospheric_pressure(parameter_set)
+        if path.is_dir():
+            raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
+        if columns is None:
+            return source_of(path, read_recording(path, atmosphere=atmosphere))
+        molar_mass = number_in_si(parameter_set, "gas.molar_mass")
+        gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
+        column_map, map_name = self.problem.columns[columns], f"{self.file}:{columns}"
+        return source_of(path, read_foreign(path, column_map, None, atmosphere, map_name, gas))
 
 
 @dataclass(frozen=True, slots=True)
 class _Task:
     """A procedure with its recordings, and what messages call it."""
 
-    item: ProcedureProblem
+    procedure: ProcedureProblem
     sources: tuple[Source, ...]
     place: str
 
 
 def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
+    """Return the set on which a problem begins, with its overrides: one beside the problem's file, or one by name."""
     name = problem.device.set
     beside = folder / name
     base = load_parameter_set(beside if beside.suffix == ".toml" else name)
@@ -109,32 +114,64 @@ def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
     return with_overrides(base, overrides, valve)
 
 
-def _source(
-    folder: Path, name: str, columns: str | None, problem: ProblemFile, parameter_set: ParameterSet, file: str
-) -> Source:
-    path = folder / name
-    atmosphere = atmospheric_pressure(parameter_set)
-    if path.is_dir():
-        raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
-    if columns is not None:
-        molar_mass = number_in_si(parameter_set, "gas.molar_mass")
-        gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
-        recording = read_foreign(path, problem.columns[columns], None, atmosphere, f"{file}:{columns}", gas)
-    else:
-        recording = read_recording(path, atmosphere=atmosphere)
-    return source_of(path, recording)
+def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
+    """Return the procedures in the order in which they are applied, each with its recordings."""
+    numbered = enumerate(given.problem.procedure, start=1)
+    return [
+        _Task(
+            procedure,
+            tuple(given.source(name, procedure.columns, before) for name in procedure.recordings),
+            f"{given.file}: procedure {number}, {procedure.kind}",
+        )
+        for number, procedure in sorted(numbered, key=lambda pair: PROCEDURES.index(pair[1].kind))
+    ]
+
+
+def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[Use, ...]:
+    """Return what the procedures use of which recording.
+
+    One recording may serve two procedures, which ask it other things; IdentificationError where it serves one twice.
+    """
+    uses: list[Use] = []
+    for kind in PROCEDURES:
+        of_kind: list[Use] = []
+        for task in tasks:
+            if task.procedure.kind == kind:
+                first, last = window_of(task.procedure, Setting(before, valve, task.place))
+                of_kind += [
+                    Use(
+                        by=f"recording {number} of procedure {kind}",
+                        trace=source.trace,
+                        recording=source.recording,
+                        channels=frozenset(),
+                        first=first,
+                        last=last,
+                    )
+                    for number, source in enumerate(task.sources, start=1)
+                ]
+        used_twice = double_use(of_kind)
+        if used_twice:
+            raise IdentificationError(f"{file}: {used_twice}")
+        uses += of_kind
+    return tuple(uses)
 
 
 _FILES_IN_TITLE = 4
+"""Recordings that the title of the new set names; its notes name all."""
 _REPORTED = "reported."
+"""Beginning of the paths of what others report of their device."""
 
 
-def _name_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
+def _named_set(identification: Identification, problem: ProblemFile) -> ParameterSet:
+    """Return the new set with name, title, citation and notes that say from which recordings its values come.
+
+    What others report of another device is left out of a set that has values of this one.
+    """
     old, new = identification.new_set.parameter_set, identification.new_set
     files = recording_files(problem)
     left_out = len(files) - _FILES_IN_TITLE
     shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {left_out} more" if left_out > 0 else "")
-    is_changed = "identified" if new.written or new.fitted else "no value identified"
+    outcome = "identified" if new.written or new.fitted else "no value identified"
     changes = f" with {', '.join(problem.device.overrides)}" if problem.device.overrides else ""
     origins = (
         f"Values with origin 'identified' or 'fitted' come from the problem '{problem.name}', on the set '{old.name}'"
@@ -157,7 +194,7 @@ def _name_set(identification: Identification, problem: ProblemFile) -> Parameter
         old,
         file=f"{problem.name}.toml",
         name=problem.name,
-        title=problem.title or f"{old.title}, {is_changed} on {old.name} from {shown}",
+        title=problem.title or f"{old.title}, {outcome} on {old.name} from {shown}",
         citation=problem.citation or old.citation,
         # The new set may go anywhere, where the path of a file would not lead to its parent.
         parent=problem.device.set if problem.device.set in list_sets() else "",
@@ -167,10 +204,9 @@ def _name_set(identification: Identification, problem: ProblemFile) -> Parameter
 
 def recording_files(problem: ProblemFile) -> list[str]:
     """Return the names of the recordings of a problem, with the folder where two have one name."""
-    named = [name for use in problem.procedure for name in use.recordings]
-    named += (
-        [] if problem.trajectory is None else [experiment.recording for experiment in problem.trajectory.experiments]
-    )
+    named = [name for procedure in problem.procedure for name in procedure.recordings]
+    if problem.trajectory is not None:
+        named += [experiment.recording for experiment in problem.trajectory.experiments]
     paths = dict.fromkeys(map(Path, named))
     names = [path.name for path in paths]
     return ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]

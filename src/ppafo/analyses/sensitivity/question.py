@@ -59,8 +59,9 @@ def sensitivity(
     confidence
     """
     name_plugins(plugins)
+    from ppafo.analyses.sensitivity.answer import finding_of
     from ppafo.analyses.sensitivity.methods import METHODS
-    from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, Settings, analyse, finding_of
+    from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, Settings, analyse
     from ppafo.errors import StudyError, nearest_name
     from ppafo.studies.draws import drawn_in
     from ppafo.study.runs import Runs, Tally

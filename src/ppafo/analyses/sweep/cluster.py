@@ -1,23 +1,29 @@
-"""The chunks of a study computed on a cluster."""
+"""The chunks of a study computed by the workers of a Dask scheduler, which may be anywhere on a network."""
 
 import asyncio
 import socket
 from collections.abc import Callable, Iterable
 from concurrent.futures import CancelledError
 from importlib import import_module
+from itertools import islice
 from typing import Any
 from uuid import uuid4
 
-from ppafo.errors import PpafoError, StudyError, one_line, reason
+from ppafo.errors import StudyError, one_line, reason
 from ppafo.storage.places import place_at
 from ppafo.study.blocks import chunk_count
 from ppafo.study.store import Finished, Task, note_file, work_on_chunk
 
 _TASKS_PER_THREAD = 3
 """Tasks that wait at the scheduler for every thread of the workers: enough to keep them busy, few for 10^9 runs."""
-_SECONDS_TO_ANSWER, _SECONDS_TO_CONNECT = 5, 30
-"""How long a computer has to say that something listens there, and how long a scheduler to greet a client."""
+_FEWEST_TASKS = 4
+"""Tasks that wait there before the first worker has come."""
+_SECONDS_TO_ANSWER = 5
+"""How long a computer has to say that something listens there."""
+_SECONDS_TO_CONNECT = 30
+"""How long a scheduler has to greet a client."""
 _OVER_SOCKETS = ("tcp://", "tls://", "ws://", "wss://")
+"""Beginnings of addresses behind which something must listen; an address without any is one of TCP."""
 
 
 def check_scheduler(address: str) -> None:
@@ -34,11 +40,12 @@ def check_scheduler(address: str) -> None:
 
 
 def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
-    """Compute chunks on the workers of the scheduler at an address; ``finish`` hears of each one.
+    """Compute the chunks of these numbers on the workers of the scheduler at an address; ``finish`` hears of each one.
 
-    A chunk whose worker dies is given to another one by the scheduler. StudyError where the scheduler itself is lost.
+    They finish in any order. A chunk whose worker dies is given to another one by the scheduler. StudyError where the
+    scheduler itself is lost.
     """
-    # A client that did not connect complains once more when it is collected: whether one can is tried before.
+    # A client that did not connect complains once more when it is collected: whether it can connect is tried before.
     check_scheduler(address)
     distributed = _library()
     try:
@@ -49,10 +56,10 @@ def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish:
         with client:
             _compute(client, distributed, task, numbers, finish)
     except (CancelledError, OSError) as error:
-        names, chunks = place_at(task.address).names(), range(chunk_count(task.study))
-        kept = sum(note_file(number) in names for number in chunks)
+        names, count = place_at(task.address).names(), chunk_count(task.study)
+        kept = sum(note_file(number) in names for number in range(count))
         raise StudyError(
-            f"--scheduler {address}: the connection was lost; {kept} of {len(chunks)} chunks are finished and kept in "
+            f"--scheduler {address}: the connection was lost; {kept} of {count} chunks are finished and kept in "
             f"{task.address}: start a scheduler and run the same command again, which resumes the study"
         ) from error
 
@@ -60,20 +67,22 @@ def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish:
 def _compute(
     client: Any, distributed: Any, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]
 ) -> None:
-    queue, left = distributed.as_completed(loop=client.loop), iter(numbers)
+    """Keep some chunks waiting at the scheduler, one more for each that is finished, until all are.
+
+    StudyError for a chunk on which workers die; what is wrong with the study itself is raised as it was there.
+    """
+    futures, remaining = distributed.as_completed(loop=client.loop), iter(numbers)
     # Keys of this session alone: a scheduler answers an equal key with what an earlier task returned.
-    sweep = f"{task.study.name}-{uuid4().hex[:8]}"
+    session = f"{task.study.name}-{uuid4().hex[:8]}"
 
     def submit(count: int) -> None:
-        for _, number in zip(range(count), left, strict=False):
-            queue.add(client.submit(work_on_chunk, task, number, key=f"{sweep}-{number}", pure=False))
+        for number in islice(remaining, count):
+            futures.add(client.submit(work_on_chunk, task, number, key=f"{session}-{number}", pure=False))
 
-    submit(max(4, _TASKS_PER_THREAD * sum(client.nthreads().values())))
-    for future in queue:
+    submit(max(_FEWEST_TASKS, _TASKS_PER_THREAD * sum(client.nthreads().values())))
+    for future in futures:
         try:
             finished: Finished = future.result()
-        except PpafoError:
-            raise
         except distributed.scheduler.KilledWorker as error:
             raise StudyError(f"chunk {future.key}: its workers died repeatedly: {one_line(error)}") from error
         future.release()
@@ -82,6 +91,7 @@ def _compute(
 
 
 def _library() -> Any:
+    """Return the module ``distributed``; StudyError, with the line that installs it, where it is not installed."""
     try:
         return import_module("distributed")
     except ModuleNotFoundError as error:
@@ -89,9 +99,8 @@ def _library() -> Any:
 
 
 def _unreachable(address: str, error: Exception) -> StudyError:
-    return StudyError(
-        f"--scheduler {address}: cannot be reached: {one_line(reason(error) if isinstance(error, OSError) else error)}"
-    )
+    said = reason(error) if isinstance(error, OSError) else error
+    return StudyError(f"--scheduler {address}: cannot be reached: {one_line(said)}")
 
 
 async def _reach(address: str, distributed: Any) -> None:

@@ -65,19 +65,13 @@ def sweep_into_folder(
     >>> print(sweep_into_folder("torque-task-uncertainty", draws=4, out=Path("four")).said[0])
     torque-task-uncertainty: 8 runs: 8 completed
     """
-    from dataclasses import replace
-
-    from ppafo.analyses.sweep.answer import write_report
-    from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
-    from ppafo.analyses.sweep.statistic import MOST_DRAWS, estimate
     from ppafo.errors import StudyError
     from ppafo.report.drawing import load_drawing
-    from ppafo.storage.result_folder import check_owned_folder, marked_folder
     from ppafo.studies.draws import study_of
 
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
     load_drawing()
-    of_statistic: dict[str, Any] = {
+    optional: dict[str, Any] = {
         "width": width,
         "also": tuple(also) or None,
         "configuration": configuration,
@@ -85,29 +79,64 @@ def sweep_into_folder(
         "confidence": confidence,
         "maximum_failed": maximum_failed,
     }
-    named = {name: value for name, value in of_statistic.items() if value is not None}
+    # What is not given has the default of ``estimate``.
+    of_statistic = {name: value for name, value in optional.items() if value is not None}
     if statistic is None:
-        unused = [*(["metric"] if metric is not None else []), *named]
+        unused = [*(["metric"] if metric is not None else []), *of_statistic]
         if unused:
             raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
         chosen = study_of(study, overrides, draws, seed)
         folder = out or Path("out") / chosen.name
-        try:
-            swept = sweep(chosen, threads=threads, out=folder, scheduler=scheduler, agreed=agreed, progress=progress)
-            write_report(swept.found)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(INTERRUPTED if is_begun(chosen, folder) else INTERRUPTED_AT_ONCE) from None
-        return swept
+        return _rows_into_folder(chosen, folder, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
     if scheduler is not None:
         raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
     chosen = study_of(study, overrides)
-    target = Path(out or Path("out") / f"{chosen.name}-{metric}")
-    check_owned_folder(target, marked_folder("sweep"))
-    most = MOST_DRAWS if draws is None else draws
-    estimated = estimate(
-        chosen, metric=metric, statistic=statistic, seed=seed, draws=most, threads=threads, progress=progress, **named
+    if draws is not None:
+        of_statistic["draws"] = draws
+    return _statistic_into_folder(
+        chosen,
+        Path(out or Path("out") / f"{chosen.name}-{metric}"),
+        metric=metric,
+        statistic=statistic,
+        seed=seed,
+        threads=threads,
+        progress=progress,
+        **of_statistic,
     )
-    estimated.save(target)
-    return replace(estimated, found=replace(estimated.found, folder=str(target)))
+
+
+def _rows_into_folder(
+    study: Study,
+    folder: str | Path,
+    *,
+    threads: int | None,
+    scheduler: str | None,
+    agreed: bool,
+    progress: Report | None,
+) -> Finding[StudyResults]:
+    """Run every row of a study and write it with its report; an interrupt says how to go on."""
+    from ppafo.analyses.sweep.answer import write_report
+    from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
+
+    try:
+        swept = sweep(study, threads=threads, out=folder, scheduler=scheduler, agreed=agreed, progress=progress)
+        write_report(swept.found)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(INTERRUPTED if is_begun(study, folder) else INTERRUPTED_AT_ONCE) from None
+    return swept
+
+
+def _statistic_into_folder(study: Study, folder: Path, **asked: Any) -> Finding[Estimate]:
+    """Estimate a statistic and write it into a folder that is absent, empty or of another study; see ``estimate``."""
+    from dataclasses import replace
+
+    from ppafo.analyses.sweep.statistic import estimate
+    from ppafo.storage.result_folder import check_owned_folder, marked_folder
+
+    # Before anything is drawn: a folder of something else must cost no time.
+    check_owned_folder(folder, marked_folder("sweep"))
+    estimated = estimate(study, **asked)
+    estimated.save(folder)
+    return replace(estimated, found=replace(estimated.found, folder=str(folder)))

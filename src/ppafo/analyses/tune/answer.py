@@ -2,222 +2,120 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
-
-from ppafo.analyses.tune.problem import Gains, Problem, Term
+from ppafo.analyses.tune.figure import search_panels, task_panels
+from ppafo.analyses.tune.problem import Problem
+from ppafo.analyses.tune.result import FRESH_DRAWS, Setting, Start, Tuned, agreement
 from ppafo.errors import count_of
-from ppafo.metrics import Metric
-from ppafo.metrics.metric import controlled_in
-from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
-from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Column, Finding, Part, columns_of
-from ppafo.report.kind import TIME, Interval, Kind, of_metric
-from ppafo.report.panels import Mark, Panel
-from ppafo.report.setting_names import label_of
-from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
-from ppafo.simulation.simulate import Result
+from ppafo.report.kind import of_metric
 from ppafo.studies.distributions import fraction_text
-from ppafo.studies.draws import Limit
 from ppafo.units import percentage
 from ppafo.units.shown import in_units
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-INFEASIBLE = 1.0e6
-"""Where the costs of candidates begin that break a constraint."""
-
-
-@dataclass(frozen=True, slots=True)
-class Start:
-    """Where one start ended: fractions of the way (gains,), cost, candidates tried, best cost of each generation.
-
-    ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
-    """
-
-    fractions: tuple[float, ...]
-    cost: float
-    candidates: int
-    generations: tuple[float, ...]
-    is_settled: bool
-
-
-def agreement(starts: Sequence[Start]) -> float:
-    """Return the largest difference of a fraction of the way between the best start and those as good as it.
-
-    As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
-    """
-    best = starts[0]
-    # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
-    beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
-    as_good = [start for start in starts if start.cost <= best.cost + 0.01 * abs(beyond)]
-    return max(float(np.max(np.abs(np.subtract(start.fractions, best.fractions)))) for start in as_good)
-
-
-FRESH_DRAWS = 1024
-"""Draws that the search never saw, over which the result is judged in the end."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ceiling:
-    """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
-
-    ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
-    keep them, or the other draws do.
-    """
-
-    fraction: float
-    explains: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Setting:
-    """Gains [SI] and what they give.
-
-    ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
-    over the draws of the search; ``fresh`` the same over draws that the search did not use (empty without draws).
-    ``objective`` belongs to the search; what is called fresh, to the fresh draws (the same again without draws).
-    ``share_of_noise`` is the fraction of the variance over the fresh draws that is due to sensor noise, by metric.
-    ``metrics`` belong to ``result``, one run of the nominal device.
-    """
-
-    gains: Gains
-    values: Mapping[str, float]
-    fresh: Mapping[str, float]
-    objective: float
-    violation: float
-    share_without_value: float
-    fresh_violation: float
-    fresh_share_without_value: float
-    torque_ceiling: Ceiling
-    share_of_noise: Mapping[str, Interval]
-    metrics: Mapping[str, Metric]
-    result: Result = field(compare=False, repr=False)
-
-    @property
-    def is_feasible_in_search(self) -> bool:
-        """True where all constraints are kept and no run fails over what the search saw."""
-        return self.violation == 0.0 and self.share_without_value == 0.0
-
-    @property
-    def is_feasible(self) -> bool:
-        """True where all constraints are kept and no run fails, over fresh draws too."""
-        return self.is_feasible_in_search and self.fresh_violation == 0.0 and self.fresh_share_without_value == 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Tuned:
-    """What a search came to; numbers in SI. ``starts`` are best first; ``runs`` counts all simulated runs.
-
-    ``overrides`` make the tuned scenario of its file; ``bounds_reached`` are the gains that ended at a bound, and at
-    which: a better one may lie beyond.
-    """
-
-    tuning: str
-    scenario: str
-    verdict: str
-    is_feasible: bool
-    overrides: list[str]
-    bounds_reached: dict[str, Literal["minimum", "maximum"]]
-    scales: dict[str, float]
-    goals: list[Term]
-    constraints: list[Limit]
-    robust: dict[str, str | None] | None
-    effort: dict[str, Any]
-    before: Setting
-    after: Setting
-    starts: list[Start]
-    runs: int
-    remarks: list[str]
-    problem: Problem = field(compare=False, repr=False)
-
-    @property
-    def lines(self) -> list[str]:
-        """The gains found, as overrides ``PATH=VALUE`` to paste."""
-        return self.problem.lines(self.after.gains)
-
-
 _DIFFERENT = 0.1
 """Fraction of the way between the bounds from which on two starts are said to have ended in different places."""
-_COURSE = "Left: the best objective so far in each start. Right: where the gains lie between their bounds."
+_SEARCH_CAPTION = "Left: the best objective so far in each start. Right: where the gains lie between their bounds."
 
 
 @in_units(lambda problem, *_: problem.scenario.device.shown)
 def finding_of(
     problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
 ) -> Finding[Tuned]:
-    """Return what a search came to; it has passed where the gains satisfy all constraints, over fresh draws too."""
-    found = [(gain.path, gain.bound_reached(after.gains[gain.path])) for gain in problem.searched]
-    reached = {path: bound for path, bound in found if bound is not None}
-    overrides = over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)
-    said, file = verdict(problem, before, after), problem.scenario.origin.file or problem.scenario.name
-    options = " ".join(f'--set "{line}"' for line in overrides)
-    verb = "simulate" if not problem.scenario.walks else "walk"
-    remarks = _remarks(problem, after, starts, runs, reached)
-    gains = []
-    for gain in problem.searched:
-        numbers = (gain.before, after.gains[gain.path], gain.minimum, gain.maximum)
-        end = f"at its {reached[gain.path]}" if gain.path in reached else ""
-        gains.append((gain.path, *map(gain.place.quote, numbers), end))
-    listed = ", ".join(f'"{line}"' for line in overrides)
-    pasted = (
-        f"# {said}\n\n# on the command line\n{options}\n\n# in a study file\noverrides = [{listed}]\n\n"
-        f"# in Python\nppafo.{verb}({problem.scenario.name!r}, {'overrides=' * (verb == 'walk')}[{listed}])\n"
-    )
+    """Return what a search came to; it has passed where the gains satisfy all constraints, over fresh draws too.
+
+    ``scales`` are those of the goals [SI], ``starts`` best first, ``runs`` all that were simulated.
+    """
+    tuned = _tuned(problem, scales, before, after, starts, runs)
     return Finding(
         name="tune",
         kicker="Tuning",
         title=problem.name,
-        said=(said, *([problem.description] if problem.description else [])),
+        said=(tuned.verdict, *([problem.description] if problem.description else [])),
         parts=(
-            Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), gains)),
+            _gains_part(tuned),
             Part(
                 "Before and after",
-                _metrics(problem, before, after),
-                panels=partial(_task, before, after),
+                _metric_columns(problem, before, after),
+                panels=partial(task_panels, before, after),
                 name="task",
                 caption="The nominal device.",
                 size=(6.9, 2.1),
             ),
             Part(
                 "The search",
-                remarks=remarks,
-                panels=partial(_search_panels, problem, before, after, starts),
+                remarks=tuned.remarks,
+                panels=partial(search_panels, problem, before, after, starts),
                 name="search",
-                caption=_COURSE,
+                caption=_SEARCH_CAPTION,
                 across=2,
                 size=(4.4, max(2.6, 0.9 + 0.4 * len(problem.searched))),
             ),
-            Part("To use the gains", code=f"ppafo {verb} {file} {options}"),
+            Part("To use the gains", code=_command(tuned)),
         ),
-        found=Tuned(
-            tuning=problem.name,
-            scenario=problem.scenario.name,
-            verdict=said,
-            is_feasible=after.is_feasible,
-            overrides=list(overrides),
-            bounds_reached=reached,
-            scales=scales,
-            goals=list(problem.goals),
-            constraints=list(problem.constraints),
-            robust=None
-            if problem.spread is None
-            else {"study": problem.spread.study or None, "measure": problem.spread.measure},
-            effort=problem.effort.model_dump(),
-            before=before,
-            after=after,
-            starts=starts,
-            runs=runs,
-            remarks=remarks,
-            problem=problem,
-        ),
+        found=tuned,
         passed=after.is_feasible,
-        files={"overrides.txt": pasted.encode},
+        files={"overrides.txt": _pasted(tuned).encode},
+    )
+
+
+def _tuned(
+    problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
+) -> Tuned:
+    """Return what a search came to as data, with the verdict and the remarks in words."""
+    bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
+    reached = {path: bound for path, bound in bounds.items() if bound is not None}
+    spread = problem.spread
+    return Tuned(
+        tuning=problem.name,
+        scenario=problem.scenario.name,
+        verdict=verdict(problem, before, after),
+        is_feasible=after.is_feasible,
+        overrides=list(over(problem.overrides, problem.lines(after.gains), valve=problem.scenario.device.valve_name)),
+        bounds_reached=reached,
+        scales=scales,
+        goals=list(problem.goals),
+        constraints=list(problem.constraints),
+        robust=None if spread is None else {"study": spread.study or None, "measure": spread.measure},
+        effort=problem.effort.model_dump(),
+        before=before,
+        after=after,
+        starts=starts,
+        runs=runs,
+        remarks=_remarks(problem, after, starts, runs, reached),
+        problem=problem,
+    )
+
+
+def _gains_part(tuned: Tuned) -> Part:
+    """Return the gains with their bounds, as people write them."""
+    rows = []
+    for gain in tuned.problem.searched:
+        numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
+        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
+        rows.append((gain.path, *map(gain.place.quote, numbers), end))
+    return Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows))
+
+
+def _options(tuned: Tuned) -> str:
+    return " ".join(f'--set "{line}"' for line in tuned.overrides)
+
+
+def _command(tuned: Tuned) -> str:
+    """Return the line that runs the scenario with the gains found."""
+    scenario = tuned.problem.scenario
+    return f"ppafo {scenario.motion.motion_kind.command} {scenario.origin.file or scenario.name} {_options(tuned)}"
+
+
+def _pasted(tuned: Tuned) -> str:
+    """Return the gains found to paste on a command line, into a study file and into Python."""
+    listed = ", ".join(f'"{line}"' for line in tuned.overrides)
+    call = tuned.problem.scenario.motion.motion_kind.python_call(tuned.scenario, listed)
+    return (
+        f"# {tuned.verdict}\n\n# on the command line\n{_options(tuned)}\n\n# in a study file\n"
+        f"overrides = [{listed}]\n\n# in Python\n{call}\n"
     )
 
 
@@ -261,7 +159,7 @@ def _by_ceiling(problem: Problem, after: Setting) -> str:
     )
 
 
-def _metrics(problem: Problem, before: Setting, after: Setting) -> list[Column]:
+def _metric_columns(problem: Problem, before: Setting, after: Setting) -> list[Column]:
     """Return a row for each metric of the goals and constraints."""
     names, spread = problem.metrics, problem.spread
     limits = [
@@ -331,80 +229,3 @@ def _remarks(
 
 def _number(name: str, value: float | None) -> str:
     return "" if value is None or math.isnan(value) else of_metric(name).number(value)
-
-
-_SHOWN = (
-    ("command", Kind("Valve command")),
-    ("supplied_mass", Kind("Gas supplied", "kg", "gas mass")),
-)
-
-
-def _task(before: Setting, after: Setting) -> list[Panel]:
-    """Return what is controlled, command and gas over time with the gains before and after, on the nominal device."""
-    panels = []
-    controlled = controlled_in(after.result.recording) or CONTROLLED[TORQUE]
-    words, unit = controlled.words, controlled.level.unit
-    lead = (controlled.channel, Kind(words[:1].upper() + words[1:], unit, quantity_of_unit(unit)))
-    for row, (channel, kind) in enumerate((lead, *_SHOWN)):
-        marks = []
-        for setting, colour, label in ((before, VERMILION, "before"), (after, BLUE, "after")):
-            recording = setting.result.recording
-            style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
-            marks.append(Mark("line", recording.time, recording[channel], label=label, colour=colour, style=style))
-        recording = after.result.recording
-        if not row and controlled.reference in recording:
-            dashed = {"linestyle": "--", "linewidth": 1.2}
-            reference = Mark("line", recording.time, recording[controlled.reference], (), "reference", BLACK, dashed)
-            marks.append(reference)
-        panels.append(Panel(TIME, kind, marks, legend="" if row else "above"))
-    return panels
-
-
-def _search_panels(problem: Problem, before: Setting, after: Setting, starts: Sequence[Start]) -> list[Panel]:
-    return [_course(before, starts), _places(problem, after, starts)]
-
-
-def _course(before: Setting, starts: Sequence[Start]) -> Panel:
-    """Return the cost of each start over its generations."""
-    marks = []
-    for number, start in enumerate(starts):
-        costs = np.array(start.generations)
-        costs[costs >= INFEASIBLE] = np.nan  # no candidate keeps the constraints yet
-        colour = COLOURS[number % len(COLOURS)]
-        marks.append(Mark("line", np.arange(costs.size), costs, colour=colour, style={"linewidth": 1.3}))
-    dashed = {"linestyle": "--", "linewidth": 1.0}
-    marks.append(Mark("level", (), before.objective, colour=GREY, style=dashed))
-
-    def scale(axes: "Axes") -> None:
-        if axes.dataLim.ymin > 0.0:
-            axes.set_yscale("log")
-
-    return Panel(Kind("Generation"), Kind(), marks, "Objective, best so far; dashed: before", then=scale)
-
-
-def _places(problem: Problem, after: Setting, starts: Sequence[Start]) -> Panel:
-    """Return where the gains lie between their bounds: before, after, and where each start ended."""
-    searched = problem.searched
-    rows = np.arange(len(searched))[::-1]
-    ends = [
-        gain.fraction(float(gain.value(np.array(start.fractions[row]))))
-        for start in starts
-        for row, gain in enumerate(searched)
-    ]
-    first = [float(np.clip(gain.fraction(gain.before), -0.05, 1.05)) for gain in searched]
-    last = [gain.fraction(after.gains[gain.path]) for gain in searched]
-    dots: dict[str, Any] = {"linestyle": "", "marker": "o", "markersize": 7}
-    ticks: dict[str, Any] = {"linestyle": "", "marker": "|", "markersize": 11}
-    marks = (
-        *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
-        Mark("line", ends, np.tile(rows, len(starts)), colour=GREY, style=ticks),
-        Mark("line", first, rows, label="before", colour=VERMILION, style=dots),
-        Mark("line", last, rows, label="after", colour=BLUE, style=dots),
-    )
-
-    def name_gains(axes: "Axes") -> None:
-        axes.set_yticks(rows, [label_of(gain.path) for gain in searched])
-        axes.set_ylim(-0.6, len(searched) - 0.4)
-        axes.set_xticks([0.0, 1.0], ["minimum", "maximum"])
-
-    return Panel(Kind(), Kind(), marks, "Between bounds", then=name_gains)

@@ -11,8 +11,8 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
-    from ppafo.analyses.tune.answer import Tuned
     from ppafo.analyses.tune.problem import Problem
+    from ppafo.analyses.tune.result import Tuned
     from ppafo.report.finding import Finding
 
 TuningLike = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
@@ -43,8 +43,9 @@ def tune(
     name_plugins(plugins)
     from dataclasses import replace
 
-    from ppafo.analyses.tune.answer import FRESH_DRAWS, finding_of
+    from ppafo.analyses.tune.answer import finding_of
     from ppafo.analyses.tune.problem import Problem, load_tuning
+    from ppafo.analyses.tune.result import FRESH_DRAWS
     from ppafo.analyses.tune.solve import crossed, judge, rows_of_gains, scales_of, search, setting_of
     from ppafo.errors import StudyError
     from ppafo.studies.distributions import Floats

@@ -11,7 +11,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
-    from ppafo.analyses.validate.solve import Validation
+    from ppafo.analyses.validate.result import Validation
     from ppafo.report.finding import Finding
     from ppafo.signals import Recording
     from ppafo.storage.column_map import ColumnMap
@@ -22,6 +22,8 @@ Recorded = Annotated["Recording | str | Path", Word("RECORDING")]
 Motion = Annotated[str, Word("free|measured|locked|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]
+LARGEST_DELAY = 1.0
+"""Seconds; a recording that is later than this was not recorded with its command."""
 
 
 @checked("parameter_set", "recordings", "valve", "overrides")
@@ -70,15 +72,17 @@ def validate(
     ppafo2011 agrees with 1 recording: every RMS error is within its limit; nothing but noise is left
     """
     name_plugins(plugins)
-    from ppafo.analyses.validate.solve import LARGEST_DELAY, Validation, finding_of
+    from ppafo.analyses.validate.answer import finding_of
+    from ppafo.analyses.validate.result import Validation
     from ppafo.errors import DataError, nearest_name, one_line
     from ppafo.parameters import load_device
     from ppafo.storage.column_map import column_map_of
     from ppafo.validation.agreement import ReplaySettings, compare_recording
     from ppafo.validation.causes import causes_of
     from ppafo.validation.compared import parse_thresholds
+    from ppafo.validation.initial import parse_initial
     from ppafo.validation.measured import Measured, read_measured
-    from ppafo.validation.replay import MOTIONS, parse_initial
+    from ppafo.validation.replay import MOTIONS
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)

@@ -1,28 +1,16 @@
-"""A walk of one wearer with and without the device, or of many wearers, in words, tables and figures."""
+"""A walk of one wearer with and without the device, in words, tables and figures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.walk.document import (
-    Row,
-    csv_of,
-    metrics_table,
-    number_texts,
-    toes,
-    versions,
-    walk_data,
-    walk_document,
-)
+from ppafo.analyses.walk.bottle import bottle_data, bottle_files, bottle_parts, bottle_remark
+from ppafo.analyses.walk.document import ShownNumber, csv_of, metrics_table, toes, walk_data
 from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
 from ppafo.analyses.walk.task_sequence import (
-    bottle_data,
-    bottle_parts,
-    bottle_remark,
     task_sequence_data,
     task_sequence_files,
     task_sequence_parts,
@@ -33,137 +21,20 @@ from ppafo.documents.json_text import plain
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
-from ppafo.progress import Progress, Report
 from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
-from ppafo.signals.recording import Floats
 from ppafo.simulation.oscillation import gains_of
-from ppafo.simulation.scenario import UNITS
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
-from ppafo.walking import task_sequence as task_sequences
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.figures.population import population_figure
-from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
-from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import (
-    OUTCOMES,
-    SHOWN,
-    TRAITS,
-    Comparison,
-    Number,
-    Population,
-)
-from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
-
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-WEARERS_FORMAT = "ppafo wearers"
-WEARERS_SCHEMA_VERSION = 1
-_WEARERS_CAPTION = (
-    "What the wearers get, with quantiles, and how it depends on their properties. Dot: the wearer of the "
-    "configuration."
-)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Wearers:
-    """Result of one walk of many wearers, in the form that is printed and kept."""
-
-    population: Population
-
-    def json_document(self) -> dict[str, Any]:
-        """Return the quantiles over the wearers, and who they are, as plain data in SI."""
-        population = self.population
-        return {
-            "format": WEARERS_FORMAT,
-            "schema_version": WEARERS_SCHEMA_VERSION,
-            "units": UNITS,
-            "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
-            "wearers": population.count,
-            "diverged": population.diverged,
-            "vented": population.vented,
-            "paused": population.paused,
-            "minutes": population.minutes,
-            "seed": population.seed,
-            "varied": {
-                "body_mass": MASS_VARIATION,
-                "stature": STATURE_VARIATION,
-                "correlation": CORRELATION,
-                "thresholds": THRESHOLD_VARIATION,
-                "push_off_start": START_VARIATION,
-                "gait": "stride time, stance share and series coefficients by the deviations of the gait",
-                "most_deviations": MAXIMUM_DEVIATIONS,
-            },
-            "outcomes": quantiles(population.outcomes, OUTCOMES),
-            "traits": quantiles(population.traits, TRAITS),
-            "versions": versions(),
-            "configuration": walk_document(population.scenario),
-        }
-
-
-@in_units(lambda population: population.scenario.device.shown)
-def wearers_finding(population: Population) -> Finding[Wearers]:
-    """Return what many wearers get; no figure where every walk diverged."""
-    configuration = population.scenario
-    tables = {**population.outcomes, **population.traits}
-    rows = []
-    for name, shown in SHOWN.items():
-        values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
-        rows.append(number_texts((name, *shown), values))
-    remarks = [*person_remarks(configuration)]
-    if population.vented:
-        remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
-    if population.paused:
-        remarks.append(
-            f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some "
-            "strides"
-        )
-    if population.diverged:
-        remarks.append(population.message)
-    draw = partial(population_figure, population)
-    figure = Part("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
-    return Finding(
-        name="wearers",
-        kicker="Walks of many wearers",
-        title=f"{population.count} wearers with {configuration.name}",
-        said=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
-        parts=(
-            Part(columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks),
-            *([figure] if population.count else []),
-        ),
-        found=Wearers(population),
-        passed=not population.diverged,
-        files={"wearers.csv": partial(wearers_csv, population)},
-        command="walk",
-    )
-
-
-def wearers_csv(population: Population) -> bytes:
-    """Return one line for each wearer, in SI units."""
-    columns = {f"{name} [{trait.unit}]": population.traits[name] for name, trait in TRAITS.items()}
-    columns |= {f"{name} [{outcome.unit}]": population.outcomes[name] for name, outcome in OUTCOMES.items()}
-    return csv_of(columns)
-
-
-def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
-    """Return the quantiles of every number in SI units, with unit and meaning."""
-    return {
-        name: {
-            "unit": number.unit,
-            "summary": number.summary,
-            "mean": float(table[name].mean()) if table[name].size else None,
-            "quantiles": dict(zip(map(str, QUANTILES), np.quantile(table[name], QUANTILES).tolist(), strict=True))
-            if table[name].size
-            else {},
-        }
-        for name, number in numbers.items()
-    }
+from ppafo.walking.walk import Comparison
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -197,24 +68,30 @@ def torque_loop_data(worn: WalkResult) -> dict[str, Any]:
 
 SCHEMA_VERSION = 1
 REVERSALS_PER_STRIDE, LARGEST_TORQUE = "reversals_per_stride", "largest_torque"
-_ROWS: tuple[Row, ...] = (
-    ("body_mass", "Body mass of the wearer", "mass", 1),
-    ("gas", "Gas per stride", "gas mass", 3),
-    ("total_gas", "Gas of the whole walk", "gas mass", 2),
-    ("positive_push_off_work", "Positive work on the wearer in push-off", "energy", 2),
-    ("push_off_share", "... of the healthy ankle's positive work", "fraction", 1),
-    ("net_push_off_work", "Net work on the wearer in push-off", "energy", 2),
-    ("torque_error", "Torque error where one is requested, RMS", "torque", 2),
-    ("peak_torque", "Peak torque", "torque", 1),
-    (LARGEST_TORQUE, "... limit of the controller", "torque", 1),
-    (REVERSALS_PER_STRIDE, "Command reversals per stride", "", 1),
-    ("lowest_toes", "Lowest toes over the ground in mid-swing", "body length", 1),
-    ("toe_landing", "Strides that begin on the toes", "fraction", 0),
-    ("dorsiflexor_moment", "Moment of the wearer's dorsiflexors, mean", "torque", 2),
-    ("angle_difference", "Ankle against healthy, RMS over the stride", "angle", 1),
-    ("counted_strides", "Strides with these means", "", 0),
+_NUMBERS = (
+    ShownNumber(name="body_mass", title="Body mass of the wearer", quantity="mass", digits=1),
+    ShownNumber(name="gas", title="Gas per stride", quantity="gas mass", digits=3),
+    ShownNumber(name="total_gas", title="Gas of the whole walk", quantity="gas mass", digits=2),
+    ShownNumber(
+        name="positive_push_off_work", title="Positive work on the wearer in push-off", quantity="energy", digits=2
+    ),
+    ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
+    ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
+    ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
+    ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
+    ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
+    ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
+    ShownNumber(name="lowest_toes", title="Lowest toes over the ground in mid-swing", quantity="body length", digits=1),
+    ShownNumber(name="toe_landing", title="Strides that begin on the toes", quantity="fraction", digits=0),
+    ShownNumber(
+        name="dorsiflexor_moment", title="Moment of the wearer's dorsiflexors, mean", quantity="torque", digits=2
+    ),
+    ShownNumber(
+        name="angle_difference", title="Ankle against healthy, RMS over the stride", quantity="angle", digits=1
+    ),
+    ShownNumber(name="counted_strides", title="Strides with these means", quantity="", digits=0),
 )
-"""Metric, title, kind of quantity and digits behind the point of each row."""
+"""Metrics as the table of a walk shows them."""
 _EXPLAINED = (
     "'Without' is the same wearer without a device: no plate, torque or friction, and the ankle's own range of motion. "
     "'Healthy' is the gait itself. The swing has no ground: of toes that reach it only that they would drag is known. "
@@ -242,54 +119,22 @@ _LIMITS = (
 def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
-    configuration, walked, gait = worn.scenario, walk_of(worn.scenario), walk_of(worn.scenario).gait
+    configuration, motion = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    along = "" if walked.task_sequence is None else f", task sequence {walked.task_sequence.name}"
-    bottle = "" if worn.supply is None else bottle_remark(worn)
-    if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
-        on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
-        bottle = f"how long a bottle lasts: {on_it}; here its supply pressure stays as it is set"
-    remarks = [*person_remarks(configuration), bottle, *safety_remarks(worn), trust_remark(configuration)]
-    remarks += [
-        f"{result.scenario.name}: {result.status.message}" for result in (worn, bare) if not result.status.is_completed
-    ]
+    along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
-    set_up = (
-        configuration.description,
-        f"device '{configuration.device.name}', gait '{gait.name}'" + (f" ({gait.title})" if gait.title else ""),
-        law_of(configuration).summary,
-        f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
-        if configuration.origin.overrides
-        else "",
-    )
-    if walked.task_sequence is not None:
-        pictures = task_sequence_pictures(comparison)
-    else:
-        walks = {"with the device": worn, "without": bare}
-        shown = (
-            ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-            ("", "legs-moving", _MOVING, partial(animation, comparison)),
-            ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
-            ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-        )
-        # Of a mean stride there is nothing to draw where a walk has none.
-        drawn = shown if worn.averages and bare.averages else ()
-        pictures = (
-            *over_time_parts(worn),
-            *(Part(head, name=name, caption=caption, draw=draw, is_detail=True) for head, name, caption, draw in drawn),
-        )
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {gait.name}{along}", *first_lines(worn)),
+        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}", *first_lines(worn)),
         parts=(
-            Part(said=[text for text in set_up if text], is_detail=True),
+            Part(said=_set_up(configuration), is_detail=True),
             *task_sequence_parts(comparison),
-            Part(columns=comparison_table(comparison), remarks=[text for text in remarks if text]),
+            Part(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
             Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
-            *pictures,
+            *_pictures(comparison),
             Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=WalkPair(comparison),
@@ -303,8 +148,67 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             "mean-stride.csv": partial(mean_stride_csv, worn),
             "mean-stride-off.csv": partial(mean_stride_csv, bare),
             **task_sequence_files(comparison),
+            **bottle_files(worn),
         },
         live=partial(live_part, [configuration]),
+    )
+
+
+def _set_up(configuration: Scenario) -> list[str]:
+    """Return what walks: description, device, gait, law, and what was changed for this walk."""
+    gait, overrides = walk_of(configuration).gait, configuration.origin.overrides
+    title = f" ({gait.title})" if gait.title else ""
+    sentences = (
+        configuration.description,
+        f"device '{configuration.device.name}', gait '{gait.name}'{title}",
+        law_of(configuration).summary,
+        f"values changed for this walk: {', '.join(overrides)}" if overrides else "",
+    )
+    return [sentence for sentence in sentences if sentence]
+
+
+def _remarks(comparison: Comparison) -> list[str]:
+    """Return who walks, how long a bottle lasts, what was unsafe, how far to trust the walk, and what diverged."""
+    worn, bare = comparison.with_device, comparison.without_device
+    bottle = "" if worn.supply is None else bottle_remark(worn)
+    if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
+        walk_on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
+        bottle = f"how long a bottle lasts: {walk_on_it}; here its supply pressure stays as it is set"
+    remarks = (
+        *person_remarks(worn.scenario),
+        bottle,
+        *safety_remarks(worn),
+        trust_remark(worn.scenario),
+        *(
+            f"{result.scenario.name}: {result.status.message}"
+            for result in (worn, bare)
+            if not result.status.is_completed
+        ),
+    )
+    return [remark for remark in remarks if remark]
+
+
+def _pictures(comparison: Comparison) -> Sequence[Part]:
+    """Return the figures of a task sequence, or of equal strides: over time, and the mean stride where there is one."""
+    worn, bare = comparison.with_device, comparison.without_device
+    if walk_of(worn.scenario).task_sequence is not None:
+        return task_sequence_pictures(comparison)
+    over_time = over_time_parts(worn)
+    if not (worn.averages and bare.averages):
+        return over_time
+    walks = {"with the device": worn, "without": bare}
+    of_mean_stride = (
+        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
+        ("", "legs-moving", _MOVING, partial(animation, comparison)),
+        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
+        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
+    )
+    return (
+        *over_time,
+        *(
+            Part(heading, name=name, caption=caption, draw=draw, is_detail=True)
+            for heading, name, caption, draw in of_mean_stride
+        ),
     )
 
 
@@ -328,7 +232,7 @@ def comparison_table(comparison: Comparison) -> list[Column]:
     # The positive work of a healthy ankle is what the device's is a share of.
     if "positive_push_off_work" in comparison.healthy:
         columns[-1][1]["push_off_share"] = 1.0
-    return metrics_table(_ROWS, columns)
+    return metrics_table(_NUMBERS, columns)
 
 
 def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
@@ -363,39 +267,3 @@ def mean_stride_csv(result: WalkResult) -> bytes:
         columns[f"{name} [{curves.unit}]"] = curves.mean
         columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
     return csv_of(columns)
-
-
-LONG = 12.0
-"""Minutes above which a walk reports how far it is."""
-
-
-def list_files() -> list[dict[str, Any]]:
-    """Return the walks and the task sequences that come with the package: name, what it is, description."""
-    found = []
-    for library in (FILE, task_sequences.FILE):
-        files = {name: library.parse(library.read(name), name) for name in library.names()}
-        found += [
-            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
-            for name, file in files.items()
-        ]
-    return found
-
-
-def default_folder(values: Mapping[str, Any]) -> Path:
-    """Return where the command writes by default: by the name of the configuration."""
-    names = ("overrides", "gait", "task_sequence", "bottle")
-    configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
-    walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
-    along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
-    kind = "walk" if values["wearers"] is None else "wearers"
-    return Path("out") / f"{kind}-{configuration.name}{along}"
-
-
-def reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
-    """Return what hears of a walk and reports it, where there is more than ``above`` of the ``noun``."""
-
-    def forward(done: float, total: float) -> None:
-        if total > above:
-            report(Progress("walking", round(done), round(total), noun=noun))
-
-    return forward

@@ -2,7 +2,7 @@
 
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,25 +70,31 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
     }
 
 
-Row = tuple[str, str, str, int]
-"""Name of a number, title, kind of quantity and digits behind the point, as a table of a walk shows it."""
+class ShownNumber(NamedTuple):
+    """How a table of a walk shows a number: its name, title, kind of quantity and digits behind the point."""
+
+    name: str
+    title: str
+    quantity: str
+    digits: int
+
+
 WOULD_DRAG = "would drag"
 """What is said of toes that would be in the ground."""
 
 
-def number_texts(row: Row, values: Iterable[float | str | None]) -> tuple[str | None, ...]:
+def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tuple[str | None, ...]:
     """Return the title with its unit, and values [SI] as text; a text and None stay what they are."""
-    _, title, quantity, digits = row
     texts: list[str | None] = []
     for number in values:
         if number is None or isinstance(number, str):
             texts.append(number)
             continue
-        text = f"{display_value(number, quantity):.{digits}f}"
+        text = f"{display_value(number, shown.quantity):.{shown.digits}f}"
         # Without the sign of what is rounded to zero.
         texts.append(text.removeprefix("-") if float(text) == 0.0 else text)
-    unit = display_unit(quantity)
-    return (f"{title} ({unit})" if unit else title, *texts)
+    unit = display_unit(shown.quantity)
+    return (f"{shown.title} ({unit})" if unit else shown.title, *texts)
 
 
 def toes(height: float | None) -> float | str | None:
@@ -96,20 +102,25 @@ def toes(height: float | None) -> float | str | None:
     return WOULD_DRAG if height is not None and height < 0.0 else height
 
 
-def metrics_table(rows: Sequence[Row], columns: Sequence[tuple[str, Mapping[str, float | str | None]]]) -> list[Column]:
-    """Return a row for each number that one of the columns has: title and values [SI]; each column has its head."""
+def metrics_table(
+    numbers: Sequence[ShownNumber], columns: Sequence[tuple[str, Mapping[str, float | str | None]]]
+) -> list[Column]:
+    """Return a row for each number that one of the columns, head and values [SI] by name, has."""
     # A number that no walk of the table has would be a row of dashes.
-    shown = [row for row in rows if any(values.get(row[0]) is not None for _, values in columns)]
-    cells = (number_texts(row, (values.get(row[0]) for _, values in columns)) for row in shown)
+    known = [number for number in numbers if any(values.get(number.name) is not None for _, values in columns)]
+    cells = (number_texts(number, (values.get(number.name) for _, values in columns)) for number in known)
     return columns_of(["", *(head for head, _ in columns)], cells)
 
 
 def csv_of(columns: Mapping[str, Iterable[Any]]) -> bytes:
     """Return simulated columns as comma-separated text; a cell is empty where there is nothing to say."""
-    lines = ["# simulated: a model's own output, not measured", ",".join(columns)]
-    cells = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
-    lines += [
-        ",".join("" if cell is None else cell if isinstance(cell, str) else repr(cell) for cell in row)
-        for row in zip(*cells, strict=True)
-    ]
+    lists = (values.tolist() if isinstance(values, np.ndarray) else values for values in columns.values())
+    rows = (",".join(map(_cell, row)) for row in zip(*lists, strict=True))
+    lines = ["# simulated: a model's own output, not measured", ",".join(columns), *rows]
     return ("\n".join(lines) + "\n").encode()
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else repr(value)

@@ -1,124 +1,38 @@
-"""What a task sequence or a bottle adds to a walk: tables, remarks, data, files, pictures."""
+"""What a task sequence adds to a walk: the table of its segments, remarks, data, files and pictures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from ppafo.analyses.walk.document import Row, csv_of, number_texts, toes
+from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
-from ppafo.gait.gait import speed_range
-from ppafo.report.display_units import QUANTITIES
-from ppafo.report.finding import Column, Part, facts
-from ppafo.report.kind import Kind
+from ppafo.gait.gait import Gait, speed_range
+from ppafo.report.display_units import si_unit
+from ppafo.report.finding import Column, Part
 from ppafo.simulation.scenario import Scenario
-from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
-from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.task_sequence import task_sequence_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import SegmentResult
+from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.walk import Comparison
 
-_BOTTLE_CAPTION = (
-    "The supply over the walk. A regulator holds at most its set pressure, and less once the bottle has too little. "
-    "Gas at the device is what comes out of the hose."
+_NUMBERS = (
+    ShownNumber(name="start", title="from", quantity="time", digits=1),
+    ShownNumber(name="end", title="to", quantity="time", digits=1),
+    ShownNumber(name="strides", title="strides", quantity="", digits=0),
+    ShownNumber(name="helped", title="helped", quantity="", digits=0),
+    ShownNumber(name="gas", title="gas", quantity="gas mass", digits=2),
+    ShownNumber(name="net_push_off_work", title="work", quantity="energy", digits=1),
+    ShownNumber(name="lowest_toes", title="lowest toes", quantity="body length", digits=1),
+    ShownNumber(name="without", title="... without", quantity="body length", digits=1),
+    ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
+    ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
 )
-_BOTTLE_EXPLAINED = (
-    "The vapour of liquid CO2 lacks heat: from 20 degC it wants 95 kJ/kg to be gas of 25 degC behind the regulator. It "
-    "takes it from the regulator's body and from the hose, which take it from the room. Below the triple point dry ice "
-    "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
-    "hose; in truth their walls warm it, so its effect here is the largest that it can have.",
-    "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
-    "strides, or where the fluid in the bottle freezes.",
-)
-
-
-def bottle_parts(worn: WalkResult) -> tuple[Part, ...]:
-    """Return the facts of the bottle of a walk, its figure and how to read them; nothing without a bottle."""
-    supply = worn.supply
-    if supply is None:
-        return ()
-    draw, caption = partial(bottle_figure, worn), _BOTTLE_CAPTION
-    return (
-        Part("On the bottle", facts(_facts(worn, supply))),
-        Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
-        Part("How to read the bottle", said=_BOTTLE_EXPLAINED, is_detail=True),
-    )
-
-
-def bottle_remark(worn: WalkResult) -> str:
-    """Return what ended a walk on its bottle, and when."""
-    supply = worn.supply
-    assert supply is not None, "said of a walk on a bottle"
-    time = lasted(supply)
-    ended = "" if time is None else f"lasts {minutes_text(time)}: "
-    return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
-
-
-def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
-    values, peaks, motion = supply.values, worn.peak_torques, walk_of(worn.scenario)
-    bottle, balance = supply.supply.bottle, supply.balance
-    end = {name: float(series[-1]) for name, series in values.items()}
-    liquid = f", {_GAS.text(end['liquid_mass'])} of it liquid" if "liquid_mass" in values else ""
-    full = _GAS.text(supply.supply.mass)
-    walked = f"after {worn.helped.size} whole strides"
-    # Strides are counted by time, as ``ppafo bottle`` counts them.
-    if motion.task_sequence is None:
-        strides = strides_text(supply.ending.time / motion.gait.stride_time)
-        walked = f"{strides} strides, {worn.helped.size} of them whole between strikes"
-    rows = [
-        ("bottle", f"{bottle.title}, with {full} at {_WARMTH.text(supply.supply.temperature)}"),
-        ("what ended it", supply.ending.message),
-        ("when", f"{_DURATION.text(supply.ending.time)}, {walked}"),
-        ("gas used", f"{_GAS.text(balance.left_bottle)}, left {_GAS.text(end['bottle_mass'])}{liquid}"),
-        ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),
-        ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),
-        ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),
-        ("seat free of ice, at least", _SHARE.text(float(values["seat_open"].min()))),
-    ]
-    # The third stride is the first in which the controller knows the stride time.
-    if peaks.size > 3:
-        third, last = (_TORQUE.text(float(peak)) for peak in (peaks[2], peaks[-1]))
-        rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
-    return rows
-
-
-def bottle_data(worn: WalkResult) -> dict[str, Any]:
-    """Return the supply as data in SI units: what ended it, what closes, all at the end; nothing without a bottle."""
-    supply = worn.supply
-    if supply is None:
-        return {}
-    return {
-        "supply": {
-            **supply.supply.to_dict(),
-            "ending": supply.ending._asdict(),
-            "balance": supply.balance._asdict(),
-            "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
-            "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
-        }
-    }
-
-
-_DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("duration", "torque", "gas mass"))
-_SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
-_NUMBERS: tuple[Row, ...] = (
-    ("start", "from", "time", 1),
-    ("end", "to", "time", 1),
-    ("strides", "strides", "", 0),
-    ("helped", "helped", "", 0),
-    ("gas", "gas", "gas mass", 2),
-    ("net_push_off_work", "work", "energy", 1),
-    ("lowest_toes", "lowest toes", "body length", 1),
-    ("without", "... without", "body length", 1),
-    ("flat_push", "push, heel loaded", "torque", 1),
-    ("safe_time", "less help at", "time", 2),
-)
-_TASK_SEQUENCE = (
+"""Numbers of a segment, and lowest toes without the device, as the table shows them."""
+_CAPTION = (
     "The task sequence over time. Grey: every other segment. 'Without' is the same task sequence without a device."
 )
 _EXPLAINED = (
@@ -132,7 +46,9 @@ _EXPLAINED = (
 )
 _SAME_TIME = 0.05
 """Time [s] by which a recording may end before its task sequence: its samples."""
-_MEAN = (
+_SAME_SPEED = 1.0e-9
+"""Difference of speeds [m/s] that is the rounding of another unit."""
+_MEAN_CAPTION = (
     "Mean over the strides at an even speed on level ground, of all speeds together, with the standard deviation as a "
     "band."
 )
@@ -143,40 +59,45 @@ def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
         return ()
-    without = {segment.start: segment.lowest_toes for segment in bare.segments}
-    rows = [asdict(segment) | {"without": without.get(segment.start)} for segment in worn.segments]
-    numbers: dict[str, float] = {name: metric.value for name, metric in worn.metrics.items()}
-    bare_toes = bare.metrics.get("task_sequence_lowest_toes")
-    is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
-    rows.append(
-        {
-            "title": "whole task sequence" if is_whole else "as far as walked",
-            "start": 0.0,
-            "end": numbers["task_sequence_time"],
-            "strides": numbers["task_sequence_strides"],
-            "helped": sum(segment.helped for segment in worn.segments),
-            "gas": numbers["task_sequence_gas"],
-            "net_push_off_work": numbers["task_sequence_work"],
-            "lowest_toes": numbers.get("task_sequence_lowest_toes"),
-            "without": None if bare_toes is None else bare_toes.value,
-            "flat_push": numbers["task_sequence_flat_push"],
-            "safe_time": numbers.get("safe_state_time"),
-        }
-    )
-    rows = [row | {name: toes(row[name]) for name in ("lowest_toes", "without")} for row in rows]
+    bare_toes = {segment.start: segment.lowest_toes for segment in bare.segments}
+    rows = [{**asdict(segment), "without": bare_toes.get(segment.start)} for segment in worn.segments]
+    rows.append(_whole(worn, bare))
+    for row in rows:
+        row.update({name: toes(row[name]) for name in ("lowest_toes", "without")})
     table = [Column("Segment", [row["title"] for row in rows])]
     for number in _NUMBERS:
-        head, *cells = number_texts(number, (row[number[0]] for row in rows))
+        head, *cells = number_texts(number, (row[number.name] for row in rows))
         table.append(Column(str(head), cells))
+    steady, strides = worn.metrics["steady_strides"].value, worn.metrics["task_sequence_strides"].value
     means = (
-        f"The numbers below are means over the {numbers['steady_strides']:.0f} of "
-        f"{numbers['task_sequence_strides']:.0f} strides that are at an even speed on level ground."
+        f"The numbers below are means over the {steady:.0f} of {strides:.0f} strides that are at an even speed on "
+        "level ground."
     )
     return (
         Part(columns=table, marked=(len(rows) - 1,)),
         Part("How to read the task sequence", said=_EXPLAINED, is_detail=True),
         Part(said=(means,)),
     )
+
+
+def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
+    """Return the numbers of the whole task sequence, or of it as far as it was walked, by the names of a segment's."""
+    numbers = {name: metric.value for name, metric in worn.metrics.items()}
+    bare_toes = bare.metrics.get("task_sequence_lowest_toes")
+    is_whole = numbers["task_sequence_time"] >= numbers["task_sequence_planned_time"] - _SAME_TIME
+    return {
+        "title": "whole task sequence" if is_whole else "as far as walked",
+        "start": 0.0,
+        "end": numbers["task_sequence_time"],
+        "strides": numbers["task_sequence_strides"],
+        "helped": sum(segment.helped for segment in worn.segments),
+        "gas": numbers["task_sequence_gas"],
+        "net_push_off_work": numbers["task_sequence_work"],
+        "lowest_toes": numbers.get("task_sequence_lowest_toes"),
+        "without": None if bare_toes is None else bare_toes.value,
+        "flat_push": numbers["task_sequence_flat_push"],
+        "safe_time": numbers.get("safe_state_time"),
+    }
 
 
 def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
@@ -187,35 +108,32 @@ def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
         Part(
             "The task sequence",
             name="task-sequence",
-            caption=_TASK_SEQUENCE,
+            caption=_CAPTION,
             draw=partial(task_sequence_figure, worn, bare),
             is_detail=True,
         ),
-        Part("The mean stride", name="mean-stride", caption=_MEAN, draw=mean, is_detail=True),
+        Part("The mean stride", name="mean-stride", caption=_MEAN_CAPTION, draw=mean, is_detail=True),
     )
     return pictures if worn.averages and bare.averages else pictures[:1]
 
 
 def task_sequence_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
-    """Return the files of a task sequence, its segments with and without the device, and of a bottle over the walk."""
-    files: dict[str, Callable[[], bytes]] = {}
-    if walk_of(comparison.with_device.scenario).task_sequence is not None:
-        files["segments.csv"] = lambda: segments_csv(comparison.with_device.segments)
-        files["segments-off.csv"] = lambda: segments_csv(comparison.without_device.segments)
-    supply = comparison.with_device.supply
-    if supply is not None:
-        files["bottle.csv"] = lambda: marked_csv_bytes(supply.recording)
-    return files
+    """Return the files of the segments with and without the device, by name; nothing without a task sequence."""
+    worn, bare = comparison.with_device, comparison.without_device
+    if walk_of(worn.scenario).task_sequence is None:
+        return {}
+    return {
+        "segments.csv": partial(segments_csv, worn.segments),
+        "segments-off.csv": partial(segments_csv, bare.segments),
+    }
 
 
 def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     """Return one line for each segment, in SI units; a cell is empty where there is nothing to say."""
-    units = {name: QUANTITIES[quantity][0] if quantity else "-" for name, _, quantity, _ in _NUMBERS}
+    units = {number.name: si_unit(number.quantity) or "-" for number in _NUMBERS}
     names = [field.name for field in fields(SegmentResult) if field.name != "title"]
-    heads = [f"{name} [{units[name]}]" if name in units else name for name in names]
-    return csv_of(
-        {head: [getattr(segment, name) for segment in segments] for head, name in zip(heads, names, strict=True)}
-    )
+    heads = {name: f"{name} [{units[name]}]" if name in units else name for name in names}
+    return csv_of({head: [getattr(segment, name) for segment in segments] for name, head in heads.items()})
 
 
 def task_sequence_data(comparison: Comparison) -> dict[str, Any]:
@@ -240,20 +158,27 @@ def trust_remark(configuration: Scenario) -> str:
         low, high = speed_range(gait)
     except DataError:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
-    given = [segment.values["speed"] for segment in sequence.segments if "speed" in segment.values]
-    recorded = gait.walking_speed or 0.0
-    # A cadence counts steps of both feet; the speed goes with its square, as the walk ratio is constant.
-    ratios = [
-        0.5 * segment.values["cadence"] * gait.stride_time
-        for segment in sequence.segments
-        if "cadence" in segment.values
-    ]
-    speeds = [*given, *(recorded * ratio * ratio for ratio in ratios)]
+    speeds = [*_given(sequence, "speed"), *(_speed_at(cadence, gait) for cadence in _given(sequence, "cadence"))]
     # A speed at the edge, written in another unit, is not beyond it.
-    far = sorted({f"{speed:.2g}" for speed in speeds if not low - 1.0e-9 <= speed <= high + 1.0e-9})
-    if not far:
+    beyond = [speed for speed in speeds if not low - _SAME_SPEED <= speed <= high + _SAME_SPEED]
+    if not beyond:
         return ""
+    shown = ", ".join(sorted({f"{speed:.2g}" for speed in beyond}))
     return (
-        f"gait '{gait.name}' is scaled to {', '.join(far)} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
+        f"gait '{gait.name}' is scaled to {shown} m/s: beyond {low:.3g} to {high:.3g} m/s, where its angles "
         "and forces are assumed and not measured"
     )
+
+
+def _given(sequence: TaskSequence, name: str) -> list[float]:
+    """Return a number [SI] of all segments that state it."""
+    return [segment.values[name] for segment in sequence.segments if name in segment.values]
+
+
+def _speed_at(cadence: float, gait: Gait) -> float:
+    """Return the speed [m/s] of a gait at a cadence [1/s] of steps, which counts both feet.
+
+    The speed goes with the square of the cadence, as the walk ratio is constant.
+    """
+    ratio = 0.5 * cadence * gait.stride_time
+    return (gait.walking_speed or 0.0) * ratio * ratio

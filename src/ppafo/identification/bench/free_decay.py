@@ -12,36 +12,44 @@ Without an inertia only beta/I [1/s] and T_c/I [rad/s^2] follow.
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError, count_of
+from ppafo.errors import count_of
+from ppafo.identification.bench.decay import (
+    ANGLE,
+    FEWEST_SMOOTHED,
+    MINIMUM_SAMPLES,
+    PROCEDURE,
+    VELOCITY,
+    Decay,
+    decay_of,
+    smoothed_rates,
+    smoothing_width,
+)
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.slowing import Slowing, course, course_to_standstill
 from ppafo.identification.residuals import Free
-from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, check_sources, window
+from ppafo.identification.source import Source, check_sources
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.residuals import curve_mark, readings_mark
 from ppafo.report.style import GREY
-from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
 
-PROCEDURE = "free-decay"
-ANGLE = "angle"
-VELOCITY = "angular_velocity"
-"""Fitted besides the angle where it was recorded."""
-
-MINIMUM_SAMPLES = 20
-_FEWEST_SMOOTHED, _SMOOTHED_FRACTION = 5, 0.04
-_VELOCITY_MAY_DIFFER = 0.1
-_MINIMUM_OVER_NOISE = 20.0
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
-_STRIBECK = 0.1, 1.0e-3, 2.0
-"""Velocity at which half of the rise is left [rad/s]: usual, lowest and highest."""
+"""Names of the tolerances: log of 1 + q [-], w_s [rad/s], relative errors of the inertia and of the angle [-]."""
+_USUAL_RISE_VELOCITY, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY = 0.1, 1.0e-3, 2.0
+"""Velocity at which half of the rise is left [rad/s]."""
+_LEAST_SPEED, _LEAST_SWEPT = 1.0e-6, 1.0e-9
+"""Speed [rad/s] and angle [rad] from which a fit starts at least, where nothing is seen to move."""
+_MOVING = 0.03
+"""Fraction of the largest speed below which the panel of the damping shows no acceleration: it is noise there."""
 
 
 def free_decay(
@@ -65,226 +73,157 @@ def free_decay(
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
     decays = tuple(decay_of(source, start, end) for source in sources)
-    mass = inertia or 1.0
-    if inertia:
-        damping, friction, units = "friction.viscous_damping", "friction.dynamic_torque", ("N m s/rad", "N m")
-        missing = over_inertia = ""
-    else:
-        damping, friction = "free_decay.damping_over_inertia", "free_decay.friction_over_inertia"
-        units, over_inertia = ("1/s", "rad/s^2"), " over the inertia"
-        missing = "; the inertia is not known, so only ratios to it follow"
-    starts, (rate, deceleration) = _starts(decays, mass)
+    pushes = [_push_of(decay) for decay in decays]
+    law = _Law(decays, inertia or 1.0, *(_OF_THE_DEVICE if inertia else _OVER_INERTIA))
     numbers = (
-        sought(damping, rate, 0.0),
-        sought(friction, deceleration, 0.0),
-        *starts,
+        *law.sought_from(pushes),
+        *(number for place, push in enumerate(pushes) for number in _start_numbers(place, push)),
         *_near_rest(rise),
-        *tolerance(_INERTIA, inertia_deviation / mass),
+        *tolerance(_INERTIA, inertia_deviation / law.inertia),
         *within(_GAIN, tolerances.gain_of(ANGLE)),
     )
-
-    def law(at: Values) -> Floats:
-        moved = mass * (1.0 + at[_INERTIA])
-        rates = max(at[damping], 0.0) / moved, max(at[friction], 0.0) / moved
-        parts = []
-        for number, decay in enumerate(decays):
-            first, speed = at[f"start angle {number + 1}"], at[f"start speed {number + 1}"]
-            swept, left = course(decay.time, speed, *rates, math.expm1(at[_RISE]), at[_RISE_VELOCITY])
-            parts.append(first + (1.0 + at[_GAIN]) * decay.sign * swept)
-            parts += [] if decay.velocity is None else [decay.sign * left]
-        return np.concatenate(parts)
-
-    series, halves, sensors = list[Floats](), list[str](), list[str]()
-    for decay in decays:
-        moved = np.abs(decay.angle - decay.angle[0])
-        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
-        for sensor, seen in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
-            if seen is not None:
-                series.append(seen)
-                sensors += [sensor] * seen.size
-                # A law that is wrong parts the fast from the slow.
-                halves += ["the first half of the way"] * half + ["the second half of the way"] * (seen.size - half)
-    counts = [item.time.size * (1 if item.velocity is None else 2) for item in decays]
-    readings = Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
-    found, model = solve(law, readings, numbers, confidence)
-    reported = (
-        Reported(damping, units[0], f"Viscous damping{over_inertia}"),
-        Reported(friction, units[1], f"Dynamic friction{over_inertia}"),
-    )
-    values = found.by_name
-    rates = values[damping] / mass, values[friction] / mass
-    near_rest = math.expm1(values.get(_RISE, 0.0)), values.get(_RISE_VELOCITY, 0.0)
+    fit, model = solve(law, _readings(sources, decays), numbers, confidence)
+    slowing = law.slowing(fit.by_name)
     at_rest = sum(
-        float(decay.time[-1]) > course_times(values[f"start speed {number + 1}"], *rates, *near_rest)[0][-1]
-        for number, decay in enumerate(decays)
+        float(decay.time[-1]) > course_to_standstill(fit.by_name[_speed_name(place)], slowing).time[-1]
+        for place, decay in enumerate(decays)
     )
+    unknown = "" if inertia else "; the inertia is not known, so only ratios to it follow"
     return result_of(
         PROCEDURE,
         sources,
-        found,
-        reported,
-        f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {rates[0]:.4g} 1/s, T_c/I = "
-        f"{rates[1]:.4g} rad/s^2{missing}",
-        _panels(decays, model, rates, near_rest),
+        fit,
+        (law.damping, law.friction),
+        f"{count_of(len(decays), 'decay')}, {at_rest} to standstill; beta/I = {slowing.damping_rate:.4g} 1/s, T_c/I = "
+        f"{slowing.deceleration:.4g} rad/s^2{unknown}",
+        _panels(decays, model, slowing),
         "another torque acts, such as gravity, an end stop or a friction of another shape",
     )
 
 
-def _starts(decays: tuple["Decay", ...], mass: float) -> tuple[list[Free], tuple[float, float]]:
-    """Return the start of each decay, which is sought, and rough damping [N m s/rad] and friction [N m] of all."""
-    starts, rates = list[Free](), []
-    for number, decay in enumerate(decays, start=1):
-        velocity, _ = smoothed_rates(decay.time, decay.angle)
-        speed = max(float(np.abs(velocity[:_FEWEST_SMOOTHED]).max()), 1e-6)
-        swept = max(abs(float(decay.angle[-1] - decay.angle[0])), 1e-9)
-        starts.append(sought(f"start angle {number}", float(decay.angle[0]), scale=swept))
+_OF_THE_DEVICE = (
+    Reported("friction.viscous_damping", "N m s/rad", "Viscous damping"),
+    Reported("friction.dynamic_torque", "N m", "Dynamic friction"),
+)
+_OVER_INERTIA = (
+    Reported("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
+    Reported("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
+)
+
+
+class _Push(NamedTuple):
+    """What a decay starts from, roughly: angle [rad], speed [rad/s], and the angle that it sweeps in all [rad]."""
+
+    angle: float
+    speed: float
+    swept: float
+
+
+def _push_of(decay: Decay) -> _Push:
+    velocity, _ = smoothed_rates(decay.time, decay.angle)
+    speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
+    swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
+    return _Push(float(decay.angle[0]), speed, swept)
+
+
+def _angle_name(place: int) -> str:
+    """Return the name of the angle from which the decay at a place of the recordings starts."""
+    return f"start angle {place + 1}"
+
+
+def _speed_name(place: int) -> str:
+    """Return the name of the speed with which the decay at a place of the recordings starts."""
+    return f"start speed {place + 1}"
+
+
+def _start_numbers(place: int, push: _Push) -> tuple[Free, Free]:
+    """Return the start of a decay, which is sought: angle [rad] and speed [rad/s]."""
+    return (
+        sought(_angle_name(place), push.angle, scale=push.swept),
         # The direction is the push's: a speed of 0 or below would be another decay.
-        starts.append(sought(f"start speed {number}", speed, 1e-9 * speed, 10.0 * speed))
+        sought(_speed_name(place), push.speed, 1e-9 * push.speed, 10.0 * push.speed),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Law:
+    """Equation (1) of some decays with one damping and one friction; an ``inertia`` of 1 kg m^2 stands for none."""
+
+    decays: tuple[Decay, ...]
+    inertia: float
+    damping: Reported
+    friction: Reported
+
+    def __call__(self, at: Values) -> Floats:
+        """Return the angles [rad] of all decays at some numbers, each with its velocity [rad/s] where it has one."""
+        moved = self.inertia * (1.0 + at[_INERTIA])
+        slowing = Slowing(
+            max(at[self.damping.path], 0.0) / moved,
+            max(at[self.friction.path], 0.0) / moved,
+            math.expm1(at[_RISE]),
+            at[_RISE_VELOCITY],
+        )
+        series = []
+        for place, decay in enumerate(self.decays):
+            _, swept, speed = course(decay.time, at[_speed_name(place)], slowing)
+            series.append(at[_angle_name(place)] + (1.0 + at[_GAIN]) * decay.sign * swept)
+            if decay.velocity is not None:
+                series.append(decay.sign * speed)
+        return np.concatenate(series)
+
+    def sought_from(self, pushes: Sequence[_Push]) -> tuple[Free, Free]:
+        """Return damping and friction, which are sought from rough values of all decays."""
         # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
         # deceleration: half of each is a start between the two.
-        rates.append((0.5 * speed / swept, 0.25 * speed**2 / swept))
-    rate, deceleration = (mass * float(item) for item in np.median(rates, axis=0))
-    return starts, (rate, deceleration)
+        rates = [(0.5 * push.speed / push.swept, 0.25 * push.speed**2 / push.swept) for push in pushes]
+        damping_rate, deceleration = (float(median) for median in np.median(rates, axis=0))
+        return (
+            sought(self.damping.path, self.inertia * damping_rate, 0.0),
+            sought(self.friction.path, self.inertia * deceleration, 0.0),
+        )
+
+    def slowing(self, fitted: Values) -> Slowing:
+        """Return how the vane slows down with the fitted numbers, at the inertia that was given."""
+        return Slowing(
+            fitted[self.damping.path] / self.inertia,
+            fitted[self.friction.path] / self.inertia,
+            math.expm1(fitted.get(_RISE, 0.0)),
+            fitted.get(_RISE_VELOCITY, 0.0),
+        )
 
 
 def _near_rest(rise: float) -> tuple[Free, ...]:
     """Return the tolerances of seals that grip harder near standstill: by how much, and from which velocity on."""
-    most, usual = math.log1p(rise), _STRIBECK[0]
+    most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
     if not most > 0.0:
         return ()
     # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
     # logarithm, its width over the root of 12.
     return (
         Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
-        Free(_RISE_VELOCITY, usual, *_STRIBECK[1:], usual, usual),
+        Free(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
     )
 
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
-_STEPS = 240
-_SLOWEST = 1.0e-9
-"""Deceleration, over that at the start, below which none counts: without Coulomb friction there is no standstill."""
+def _readings(sources: tuple[Source, ...], decays: tuple[Decay, ...]) -> Readings:
+    """Return the samples of all decays in the order of the law, told apart by sensor and half of the way."""
+    series, sensors, halves = list[Floats](), list[str](), list[str]()
+    for decay in decays:
+        moved = np.abs(decay.angle - decay.angle[0])
+        half = int(np.searchsorted(np.maximum.accumulate(moved), 0.5 * float(moved.max())))
+        for sensor, values in ((ANGLE, decay.angle), (VELOCITY, decay.velocity)):
+            if values is not None:
+                series.append(values)
+                sensors += [sensor] * values.size
+                # A law that is wrong parts the fast from the slow.
+                halves += ["the first half of the way"] * half + ["the second half of the way"] * (values.size - half)
+    counts = [decay.time.size * (1 if decay.velocity is None else 2) for decay in decays]
+    return Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
 
 
-def course_times(
-    speed: float, damping_rate: float, deceleration: float, rise: float = 0.0, rise_velocity: float = 0.0
-) -> tuple[Floats, Floats, Floats]:
-    """Return times [s], angle swept [rad] and speed [rad/s] from the start to standstill; equation (1).
-
-    From dt = -dw / (b w + d (1 + q / (1 + (w / w_s)^2))), by Gauss's rule over the speed; b [1/s], d [rad/s^2].
-    """
-    # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
-    speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
-    middle, half = 0.5 * (speeds[1:] + speeds[:-1]), 0.5 * (speeds[:-1] - speeds[1:])
-    at = middle[:, None] + half[:, None] * _NODES
-    more = rise / (1.0 + np.square(at / rise_velocity)) if rise_velocity > 0.0 else np.zeros_like(at)
-    slowing = damping_rate * at + deceleration * (1.0 + more)
-    # Without any friction the time would be infinite.
-    slowing = np.maximum(slowing, _SLOWEST * float(slowing.max()) + 1e-300)
-    times = half * ((1.0 / slowing) @ _WEIGHTS)
-    swept = half * ((at / slowing) @ _WEIGHTS)
-    return np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds
-
-
-def course(times: Floats, speed: float, *friction: float) -> tuple[Floats, Floats]:
-    """Return angle swept [rad] and speed [rad/s] at times [s]; the other arguments as in ``course_times``."""
-    from scipy.interpolate import CubicHermiteSpline
-
-    known, swept, speeds = course_times(speed, *friction)
-    rising = np.concatenate(([True], np.diff(known) > 0.0))
-    inside = np.minimum(times, known[-1])
-    angle = CubicHermiteSpline(known[rising], swept[rising], speeds[rising])
-    return np.asarray(angle(inside)), np.asarray(angle.derivative()(inside))
-
-
-class Decay(NamedTuple):
-    """One decay: times from its start [s], angle [rad], its direction (1 or -1), and its velocity [rad/s] if known."""
-
-    time: Floats
-    angle: Floats
-    sign: float
-    velocity: Floats | None
-
-
-def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
-    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
-
-    IdentificationError where too few samples are left.
-    """
-    check_moves(source, PROCEDURE, ANGLE)
-    part = window(source.recording, start, end)
-    if len(part) < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} samples between start and end, "
-            f"there are {len(part)}"
-        )
-    swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
-    if swept < _MINIMUM_OVER_NOISE * noise:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: nothing moves: the angle changes by {swept:.3g} rad with a noise of "
-            f"{noise:.3g} rad; push the vane"
-        )
-    skipped = check_no_gap(source, PROCEDURE, part)
-    for name in (name for name in (ANGLE, VELOCITY) if name in part):
-        check_no_outlier(source, PROCEDURE, name, part)
-    velocity, _ = smoothed_rates(part.time, part[ANGLE])
-    first = 0 if start is not None else int(np.argmax(np.abs(velocity)))
-    sign = 1.0 if velocity[first] > 0.0 else -1.0
-    # A push ends a little after the highest speed of the smoothed signal; that much is left out.
-    first += 0 if start is not None else _smoothing_width(part.time.size) // 2
-    # A vane at rest has a rate of 0 but for noise; one that swings back has more.
-    back = np.flatnonzero(sign * velocity[first:] < -0.02 * np.abs(velocity).max())
-    last = first + int(back[0]) if back.size else part.time.size
-    if last - first < MINIMUM_SAMPLES:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the end or the "
-            f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
-        )
-    time, angle = part.time[first:last], part[ANGLE][first:last]
-    for plateau in plateaus(angle):
-        if is_at_limit(angle, plateau):
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {skipped + first + plateau.first + 1}, and was still moving "
-                f"before: the sensor is saturated or the vane is at a stop; give end"
-            )
-    if VELOCITY not in part:
-        return Decay(time=time - time[0], angle=angle, sign=sign, velocity=None)
-    measured = part[VELOCITY][first:last]
-    # How fast the angle changes, by the area under the velocity: another unit or another sign is no 1.
-    moved = np.concatenate(([0.0], np.cumsum(0.5 * (measured[1:] + measured[:-1]) * np.diff(time))))
-    away = angle - angle.mean()
-    gain = float(away @ moved / (away @ away))
-    if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
-        raise IdentificationError(
-            f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
-            f"check unit and sign of both"
-        )
-    return Decay(time=time - time[0], angle=angle, sign=sign, velocity=measured)
-
-
-def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
-    """Return angular velocity [rad/s] and acceleration [rad/s^2] from local parabolas, at the times of the samples."""
-    from scipy.signal import savgol_filter
-
-    # The filter wants an even clock.
-    even = np.linspace(time[0], time[-1], time.size)
-    step, width = float(even[1] - even[0]), _smoothing_width(time.size)
-    values = np.interp(even, time, angle)
-    rates = [savgol_filter(values, width, 2, deriv=order, delta=step) for order in (1, 2)]
-    velocity, acceleration = (np.interp(time, even, rate) for rate in rates)
-    return velocity, acceleration
-
-
-def _smoothing_width(count: int) -> int:
-    """Return an odd number of samples to smooth over."""
-    return max(_FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1
-
-
-def _panels(
-    decays: tuple[Decay, ...], model: Floats, rates: tuple[float, float], near_rest: tuple[float, float]
-) -> tuple[Panel, ...]:
-    angles, shown, place = list[Mark](), list[Mark](), 0
+def _panels(decays: tuple[Decay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
+    """Return the angles over time, and the accelerations over the velocity with the straight line of equation (1)."""
+    angles, rates, place = list[Mark](), list[Mark](), 0
     measured, fitted, fastest = "measured", "fitted", 0.0
     for decay in decays:
         count = decay.time.size
@@ -292,21 +231,25 @@ def _panels(
         angles.append(curve_mark(fitted, decay.time, model[place : place + count]))
         place += count if decay.velocity is None else 2 * count
         velocity, acceleration = smoothed_rates(decay.time, decay.sign * decay.angle)
-        inner = slice(_smoothing_width(count), None, max(1, count // 200))
-        moving = velocity[inner] > 0.03 * velocity.max()
-        shown.append(readings_mark(measured, velocity[inner][moving], acceleration[inner][moving]))
+        inner = slice(smoothing_width(count), None, max(1, count // 200))
+        moving = velocity[inner] > _MOVING * velocity.max()
+        rates.append(readings_mark(measured, velocity[inner][moving], acceleration[inner][moving]))
         fastest = max(fastest, float(velocity.max()))
         measured = fitted = ""  # the legend names the first decay only
-    line = np.linspace(0.0, fastest, 200)
-    shown.append(curve_mark("$-\\beta\\omega/I - T_c/I$", line, -rates[0] * line - rates[1]))
-    rise, velocity_of_rise = near_rest
-    if rise > 0.0 and velocity_of_rise > 0.0:
+    speeds = np.linspace(0.0, fastest, 200)
+    straight = slowing._replace(rise=0.0)
+    rates.append(curve_mark("$-\\beta\\omega/I - T_c/I$", speeds, -straight.at(speeds)))
+    if slowing.rise > 0.0 and slowing.rise_velocity > 0.0:
         # The formula of the legend is a straight line; what was fitted near rest bends, and has a name of its own.
-        more = rise / (1.0 + np.square(line / velocity_of_rise))
-        fit = Mark("line", line, -rates[0] * line - rates[1] * (1.0 + more), label="fit, with more friction near rest")
-        shown.append(replace(fit, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))
-    rate, acceleration_kind = Kind("Angular velocity", "rad/s"), Kind("Angular acceleration", "rad/s$^2$")
+        bent = Mark("line", speeds, -slowing.at(speeds), label="fit, with more friction near rest")
+        rates.append(replace(bent, colour=GREY, style={"linestyle": "--", "linewidth": 1.2}))
     return (
         Panel(TIME, Kind("Angle", "rad", "angle"), angles, "Free decay", legend="inside"),
-        Panel(rate, acceleration_kind, shown, "Damping", legend="inside"),
+        Panel(
+            Kind("Angular velocity", "rad/s"),
+            Kind("Angular acceleration", "rad/s$^2$"),
+            rates,
+            "Damping",
+            legend="inside",
+        ),
     )

@@ -13,6 +13,7 @@ torque gives an area [m^2] and forces, for which a set has no place.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,7 @@ from ppafo.identification.source import (
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.identification.wording import in_shown_unit
 from ppafo.report.kind import Kind
+from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
 
@@ -42,16 +44,19 @@ _TORQUE, _FORCE = "torque", "force"
 _MOVING = ("position", "angle")
 MINIMUM_SAMPLES = 6
 _MINIMUM_LEVELS = 3
+"""Different pressures without which nothing shows whether the torque is a straight line over them."""
 _MORE_THAN_FRICTION = 0.3
 """Fraction of its range by which the torque may move at one pressure, as friction turns round."""
 _PARTS = 20
 """Equal parts of the span of the pressures: readings in one of them are at one pressure."""
 _FLAT = 0.002
+"""Share of the range of the torque within which readings are the flat start of a scale that only pulls."""
 _MOVES_WITH_DIRECTION = 0.5
 """Share of its range by which a channel moves with the direction in a sweep, where that is what the direction is of."""
 _MOST_REPETITIONS = 12
 """Up to this many repetitions are groups of their own; of more, the recordings are."""
 _SIGMAS = 4.0
+"""Standard errors by which a rough friction must lie below 0 to be a wrong sign and no noise."""
 
 
 def static_torque(
@@ -66,68 +71,91 @@ def static_torque(
     """
     readings = readings_of(sources)
     names = readings.names
-    pressure, torque, branch = readings.pressure, readings.torque, readings.branch
-    slope, zero, friction, size = _straight_line(readings, ", ".join(source.name for source in sources))
+    rough = _straight_line(readings, ", ".join(source.name for source in sources))
     files = [source.name for source in sources]
     frictions = [f"friction of {file}" for file in files] if len(files) > 1 else []
     is_anew = "zero" in tolerances.each_recording and len(files) > 1
     zeros = [f"zero of the pressure sensor of {file}" for file in files] if is_anew else ["zero of the pressure sensor"]
-    load, span = names.load, float(np.abs(pressure).max())
+    span = float(np.abs(readings.pressure).max())
     numbers = (
-        sought(names.slope_path, slope),
-        sought(names.friction_path, friction, scale=size),
-        sought(names.growth_path, 0.0, scale=size / span),
-        sought(names.zero_path, zero, scale=size),
-        *(one for name in zeros for one in within(name, tolerances.zero_of_pressure)),
+        sought(names.slope_path, rough.slope),
+        sought(names.friction_path, rough.friction, scale=rough.size),
+        sought(names.growth_path, 0.0, scale=rough.size / span),
+        sought(names.zero_path, rough.zero, scale=rough.size),
+        *(number for name in zeros for number in within(name, tolerances.zero_of_pressure)),
         *within("gain of the pressure sensor", tolerances.gain_of("pressure")),
-        *within(f"gain of the {load} sensor", tolerances.gain_of(load)),
-        *(one for name in frictions for one in within(name, tolerances.friction, "friction")),
+        *within(f"gain of the {names.load} sensor", tolerances.gain_of(names.load)),
+        *(number for name in frictions for number in within(name, tolerances.friction, "friction")),
     )
 
     def law(at: Values) -> Floats:
-        true = (pressure - _of_files(at, zeros, readings.files)) / (1.0 + at["gain of the pressure sensor"])
-        held = branch * (at[names.friction_path] + at[names.growth_path] * np.abs(true))
+        pressure = (readings.pressure - _of_files(at, zeros, readings.files)) / (
+            1.0 + at["gain of the pressure sensor"]
+        )
+        held = readings.branch * (at[names.friction_path] + at[names.growth_path] * np.abs(pressure))
         held = held * (1.0 + _of_files(at, frictions, readings.files))
-        shown = (1.0 + at[f"gain of the {load} sensor"]) * (at[names.slope_path] * true - held)
+        shown = (1.0 + at[f"gain of the {names.load} sensor"]) * (at[names.slope_path] * pressure - held)
         return np.asarray(readings.weight * (shown + at[names.zero_path]))
 
-    middle = 0.5 * float(pressure.max() + pressure.min())
-    groups = (
-        np.where(branch > 0.0, "the rising branch", "the falling branch").tolist(),
-        np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
-    )
-    labelled = Readings(readings.weight * torque, [load] * torque.size, readings.recordings, groups)
-    found, weighted = solve(law, labelled, numbers, confidence)
-    left = torque - weighted / readings.weight
-    reported = (
-        Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
-        Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
-        Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
-        Reported(names.zero_path, names.unit, f"Zero of the {load} sensor", float(np.ptp(torque))),
-    )
-    values = found.by_name
-    (friction, shown), (scatter, _) = (
-        in_shown_unit(number, names.unit) for number in (values[names.friction_path], float(np.std(left)))
-    )
-    ends = np.array([pressure.min(), pressure.max()])
-    branches = {"rising": branch > 0.0, "falling": branch < 0.0}
-    # Of an actuator that slides at constant pressure the branches are its two ways.
-    ways = {"rising": "moving with the pressure", "falling": "moving against the pressure"}
-    labels = ways if names.is_in_motion else {role: f"pressure {role}" for role in branches}
-    marks = [readings_mark(labels[role], pressure[on], torque[on], role) for role, on in branches.items()]
-    marks.append(curve_mark("nominal", ends, values[names.slope_path] * ends + values[names.zero_path]))
-    axes = Kind("Pressure difference", "Pa_d", "pressure change"), Kind(load.capitalize(), names.unit, load)
+    fitted, weighted = solve(law, _weighted(readings), numbers, confidence)
+    values, residuals = fitted.by_name, readings.torque - weighted / readings.weight
+    friction, unit = in_shown_unit(values[names.friction_path], names.unit)
+    scatter, _ = in_shown_unit(float(np.std(residuals)), names.unit)
+    load = Kind(names.load.capitalize(), names.unit, names.load)
     return result_of(
         PROCEDURE,
         sources,
-        found,
-        reported,
-        f"{pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
-        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {friction:.3g} {shown}; "
-        f"scatter {scatter:.3g} {shown}",
-        with_residuals(f"Static {load}", *axes, marks, pressure, left),
+        fitted,
+        _reported(readings),
+        f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
+        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {friction:.3g} {unit}; "
+        f"scatter {scatter:.3g} {unit}",
+        with_residuals(
+            f"Static {names.load}",
+            Kind("Pressure difference", "Pa_d", "pressure change"),
+            load,
+            _marks(readings, values[names.slope_path], values[names.zero_path]),
+            readings.pressure,
+            residuals,
+        ),
         f"one {names.slope} and a {names.friction} linear in pressure do not describe them",
     )
+
+
+def _weighted(readings: "Sweeps") -> Readings:
+    """Return the loads over their noise, in groups whose own numbers are compared with those of all."""
+    pressure = readings.pressure
+    middle = 0.5 * float(pressure.max() + pressure.min())
+    groups = (
+        np.where(readings.branch > 0.0, "the rising branch", "the falling branch").tolist(),
+        np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
+    )
+    sensors = [readings.names.load] * pressure.size
+    return Readings(readings.weight * readings.torque, sensors, readings.recordings, groups)
+
+
+def _reported(readings: "Sweeps") -> tuple[Reported, ...]:
+    """Return the numbers to report; a zero of the scale may be an answer."""
+    names = readings.names
+    return (
+        Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
+        Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
+        Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
+        Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(readings.torque))),
+    )
+
+
+def _marks(readings: "Sweeps", slope: float, zero: float) -> list[Mark]:
+    """Return both branches over the pressure, and the line without friction of a slope and a zero."""
+    branches = {"rising": readings.branch > 0.0, "falling": readings.branch < 0.0}
+    # Of an actuator that slides at constant pressure the branches are its two ways.
+    ways = {"rising": "moving with the pressure", "falling": "moving against the pressure"}
+    labels = ways if readings.names.is_in_motion else {role: f"pressure {role}" for role in branches}
+    marks = [
+        readings_mark(labels[role], readings.pressure[on], readings.torque[on], role) for role, on in branches.items()
+    ]
+    ends = np.array([readings.pressure.min(), readings.pressure.max()])
+    return [*marks, curve_mark("nominal", ends, slope * ends + zero)]
 
 
 def _of_files(at: Values, names: list[str], files: Labels) -> Floats:
@@ -136,26 +164,39 @@ def _of_files(at: Values, names: list[str], files: Labels) -> Floats:
     return np.asarray(values[files] if len(names) > 1 else values)
 
 
-def _straight_line(readings: "Sweeps", names: str) -> tuple[float, float, float, float]:
-    """Return rough slope, zero, friction and its size; refuse signs that no device has. ``names`` are the files."""
+class _Rough(NamedTuple):
+    """A straight line through both branches: slope, zero, friction, and the size of the latter or of its scatter.
+
+    In units of the load, the slope over the pressure [Pa].
+    """
+
+    slope: float
+    zero: float
+    friction: float
+    size: float
+
+
+def _straight_line(readings: "Sweeps", files: str) -> _Rough:
+    """Return first guesses; IdentificationError, with the names of the files, for signs that no device has."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
     # Pressures are some 1e5 times as large as the other columns.
     scale = np.sqrt((design**2).mean(axis=0))
-    slope, zero, friction = rough = np.linalg.lstsq(design / scale, readings.torque, rcond=None)[0] / scale
+    solution = np.linalg.lstsq(design / scale, readings.torque, rcond=None)[0] / scale
+    slope, zero, friction = solution.tolist()
     if slope <= 0.0:
         raise IdentificationError(
-            f"{names}: {PROCEDURE}: the {readings.names.load} falls with the pressure difference; reverse the sign of "
+            f"{files}: {PROCEDURE}: the {readings.names.load} falls with the pressure difference; reverse the sign of "
             "one channel"
         )
-    deviation = float(np.std(readings.torque - design @ rough))
+    deviation = float(np.std(readings.torque - design @ solution))
     # Where friction is small its sign is the noise's, and no reason to refuse.
     if friction < -_SIGMAS * deviation / np.sqrt(readings.pressure.size):
         raise IdentificationError(
-            f"{names}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
+            f"{files}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
             "reverse the sign of channel 'direction'"
         )
-    return float(slope), float(zero), float(friction), max(abs(float(friction)), deviation)
+    return _Rough(slope, zero, friction, max(abs(friction), deviation))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,16 +3,18 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
-from ppafo.identification.fit import fit as estimate
+from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.residuals import Block
 from ppafo.identification.trajectory.problem import (
     ZERO_OF,
+    Experiment,
     Number,
     TrajectoryProblem,
     broken_rule,
@@ -24,6 +26,7 @@ from ppafo.identification.trajectory.problem import (
 from ppafo.identification.trajectory.runs import (
     Floats,
     Measured,
+    PreparedExperiment,
     blocks_of,
     numbers_in,
     prepare,
@@ -108,16 +111,16 @@ class TrajectoryFit:
         IdentificationError where it was not sought.
         """
         full = full_path(name, self.scenarios[0])
-        for one in self.estimates:
-            if one.path == full:
-                return one
-        hint = nearest_name(full, [item.path for item in self.estimates])
+        for estimate in self.estimates:
+            if estimate.path == full:
+                return estimate
+        hint = nearest_name(full, [estimate.path for estimate in self.estimates])
         raise IdentificationError(f"'{name}' was not fitted{hint}")
 
     @property
     def values(self) -> dict[str, float]:
         """The estimates in SI units by path."""
-        return {one.path: one.value for one in self.estimates}
+        return {estimate.path: estimate.value for estimate in self.estimates}
 
 
 def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> TrajectoryFit:
@@ -128,18 +131,11 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     numbers = numbers_of(problem)
     free = [number.free for number in numbers]
     start = np.array([number.start for number in free])
-    prepared = tuple(
-        prepare(
-            experiment,
-            numbers_in(experiment.label, numbers, start),
-            reach_of([number for number in numbers if number.acts_in(experiment.label)]),
-        )
-        for experiment in problem.experiments
-    )
-    report(Progress(f"trajectory fit: {len(free)} numbers, {len(prepared)} recordings"))
-    blocks = blocks_of(prepared, numbers, start)
-    fitted = estimate(
-        lambda points: residuals_of(prepared, numbers, points),
+    runs = tuple(_prepared(experiment, numbers, start) for experiment in problem.experiments)
+    report(Progress(f"trajectory fit: {len(free)} numbers, {len(runs)} recordings"))
+    blocks = blocks_of(runs, numbers, start)
+    fitted = fit_residuals(
+        lambda points: residuals_of(runs, numbers, points),
         free,
         blocks,
         problem.confidence,
@@ -147,71 +143,101 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         is_motion=True,
     )
     conflict = conflict_in_words(fitted, "the model lacks something") or _wandering(fitted, numbers)
-    sought = [row for row, number in enumerate(numbers) if not number.is_tolerance]
-    estimates = tuple(_estimate(problem, fitted, numbers[row], row, conflict) for row in sought)
-    tolerated = [row for row, number in enumerate(numbers) if number.is_tolerance]
+    sought = {row: number for row, number in enumerate(numbers) if not number.is_tolerance}
+    tolerated = {row: number for row, number in enumerate(numbers) if number.is_tolerance}
+    estimates = tuple(_estimate(problem, fitted, number, row, conflict) for row, number in sought.items())
     errors = np.sqrt(np.diag(fitted.covariance))
     # Tolerances are marginalised: their rows are left out, their share of the variance stays.
-    part = fitted.covariance[np.ix_(sought, sought)]
-    signals = signals_of(prepared, numbers, fitted.values[:, None])
-    scenarios = tuple(
-        with_numbers(experiment.scenario, numbers_in(experiment.label, numbers, fitted.values))
-        for experiment in prepared
+    rows = list(sought)
+    covariance = fitted.covariance[np.ix_(rows, rows)]
+    fitted_runs = _fitted_runs(problem, runs, numbers, fitted)
+    return TrajectoryFit(
+        problem=problem,
+        numbers=numbers,
+        fit=fitted,
+        estimates=estimates,
+        covariance=covariance,
+        correlation=covariance / np.outer(errors[rows], errors[rows]),
+        known=tuple(_known(fitted, number, row, float(errors[row]), estimates) for row, number in tolerated.items()),
+        channels=tuple(channel for run in fitted_runs for channel in run.channels),
+        models=tuple(run.model for run in fitted_runs),
+        measurements=tuple(run.measurement for run in fitted_runs),
+        scenarios=tuple(run.scenario for run in fitted_runs),
+        conflict=conflict,
+        remarks=_remarks(fitted, fitted_runs, estimates),
+        outliers=tuple(_left_out(fitted, blocks, {run.label: run.time for run in runs})),
     )
-    models, measurements, channels = [], [], []
-    for experiment, run, columns in zip(problem.experiments, prepared, signals, strict=True):
+
+
+def _prepared(experiment: Experiment, numbers: tuple[Number, ...], start: Floats) -> PreparedExperiment:
+    """Return an experiment with all that its runs have in common, at the numbers from which the search starts."""
+    acting = [number for number in numbers if number.acts_in(experiment.label)]
+    return prepare(experiment, numbers_in(experiment.label, numbers, start), reach_of(acting))
+
+
+class _FittedRun(NamedTuple):
+    """An experiment with the fitted numbers: its scenario, the model and the samples, and what is left of each."""
+
+    scenario: Scenario
+    model: Recording
+    measurement: Recording
+    channels: tuple[ChannelFit, ...]
+
+
+def _fitted_runs(
+    problem: TrajectoryProblem, runs: tuple[PreparedExperiment, ...], numbers: tuple[Number, ...], fitted: Fit
+) -> list[_FittedRun]:
+    """Return every experiment with the fitted numbers, in the order of the problem."""
+    fitted_runs = []
+    signals = signals_of(runs, numbers, fitted.values[:, None])
+    for experiment, run, columns in zip(problem.experiments, runs, signals, strict=True):
         modelled = {name: Channel(column[:, 0], CHANNELS[name].unit) for name, column in columns.items()}
         samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
-        models.append(Recording(f"model of {run.label}", run.time, modelled, kind="simulated"))
-        measurements.append(Recording(experiment.label, run.time, samples, kind=experiment.recording.kind))
-        channels += [
-            _channel(fitted, experiment.label, channel, columns[channel.name][:, 0]) for channel in run.channels
-        ]
-    remarks = [text for text in dict.fromkeys(broken_rule(scenario.device) for scenario in scenarios) if text]
+        fitted_runs.append(
+            _FittedRun(
+                with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)),
+                Recording(f"model of {run.label}", run.time, modelled, kind="simulated"),
+                Recording(experiment.label, run.time, samples, kind=experiment.recording.kind),
+                tuple(_channel(fitted, run.label, channel, columns[channel.name][:, 0]) for channel in run.channels),
+            )
+        )
+    return fitted_runs
+
+
+def _remarks(fitted: Fit, runs: Sequence[_FittedRun], estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """Return what a fitted device breaks of the rules of devices, and that the search did not converge."""
+    remarks = [text for text in dict.fromkeys(broken_rule(run.scenario.device) for run in runs) if text]
     if not fitted.has_converged:
         starts = ", ".join(map(_start_of, estimates))
         remarks.append(
             f"the search stopped after {fitted.evaluations} runs before it converged; give the parameters {starts}, "
             "where it ended"
         )
-    return TrajectoryFit(
-        problem=problem,
-        numbers=numbers,
-        fit=fitted,
-        estimates=estimates,
-        covariance=part,
-        correlation=part / np.outer(errors[sought], errors[sought]),
-        known=tuple(_known(fitted, numbers[row], row, float(errors[row]), estimates) for row in tolerated),
-        channels=tuple(channels),
-        models=tuple(models),
-        measurements=tuple(measurements),
-        scenarios=scenarios,
-        conflict=conflict,
-        remarks=tuple(remarks),
-        outliers=tuple(_left_out(fitted, blocks, {one.label: one.time for one in prepared})),
-    )
+    return tuple(remarks)
 
 
 def _left_out(fitted: Fit, blocks: Sequence[Block], times: Mapping[str, Floats]) -> Iterator[str]:
     """Return what is said of the outliers of each channel of each recording; ``times`` [s] are those of the samples."""
-    for one in blocks:
-        own = [row - one.rows.start for row in fitted.outliers if one.rows.start <= row < one.rows.stop]
-        if own:
-            count, first = ("1 sample" if len(own) == 1 else f"{len(own)} samples"), times[one.recording][own[0]]
-            verb = "stands out by itself and was" if len(own) == 1 else "stand out by themselves and were"
-            yield f"experiment '{one.recording}': {count} of {one.channel}, at {first:.6g} s first, {verb} left out"
+    for block in blocks:
+        samples = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
+        if samples:
+            is_one = len(samples) == 1
+            count, first = "1 sample" if is_one else f"{len(samples)} samples", times[block.recording][samples[0]]
+            verb = "stands out by itself and was" if is_one else "stand out by themselves and were"
+            yield f"experiment '{block.recording}': {count} of {block.channel}, at {first:.6g} s first, {verb} left out"
 
 
-def _start_of(item: Estimate) -> str:
+def _start_of(estimate: Estimate) -> str:
     """Return an estimate as the start that a problem file may give for it."""
-    text = f"{item.value:.4g}" if item.unit in ("", "-") else f"{item.value:.4g} {item.unit}"
-    return f'start = "{text}" of {item.path}'
+    number = f"{estimate.value:.4g}"
+    text = number if estimate.unit in ("", "-") else f"{number} {estimate.unit}"
+    return f'start = "{text}" of {estimate.path}'
 
 
 def _known(fitted: Fit, number: Number, row: int, error: float, estimates: Sequence[Estimate]) -> Known:
     """Return what a fit says of a number that is known to a tolerance, and whose interval that widens most."""
     name, free = number.free.name, number.free
-    shares = {item.path: dict(fitted.shares[item.path]).get(name, 0.0) for item in estimates}
+    shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
     widens = max(shares, key=lambda path: shares[path], default="")
     before, before_error = _in_its_unit(number, free.start, free.deviation)
     after, after_error = _in_its_unit(number, float(fitted.values[row]), error)
@@ -234,28 +260,31 @@ def _in_its_unit(number: Number, value: float, error: float) -> tuple[float, flo
     return math.exp(value), math.exp(value) * error
 
 
-def _wandering(found: Fit, numbers: tuple[Number, ...]) -> str:
+def _wandering(fitted: Fit, numbers: tuple[Number, ...]) -> str:
     """Return which channel leaves noise that wanders by more than its zero may be off; empty where none does.
 
     A sensor whose zero is known within a limit does not leave it from sample to sample: what does is the model's.
     """
-    for item in numbers:
-        noise = found.sensors.get(item.path.removeprefix(ZERO_OF)) if item.path.startswith(ZERO_OF) else None
-        limit = math.sqrt(3.0) * item.free.deviation
-        if noise is not None and math.isfinite(limit):
-            wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
-            if wander > limit:
-                shown, unit = in_shown_unit(wander, item.unit.removesuffix("_d"))
-                most, _ = in_shown_unit(limit, item.unit.removesuffix("_d"))
-                return (
-                    f"what is left of {item.path.removeprefix(ZERO_OF)} wanders by {shown:.2g} {unit}, and its zero by "
-                    f"{most:.2g} {unit} at most; the model lacks something"
-                )
+    for number in (number for number in numbers if number.path.startswith(ZERO_OF)):
+        channel = number.path.removeprefix(ZERO_OF)
+        noise, limit = fitted.sensors.get(channel), math.sqrt(3.0) * number.free.deviation
+        if noise is None or not math.isfinite(limit):
+            continue
+        wander = noise.deviation * math.sqrt(max(1.0 - noise.innovation**2, 0.0))
+        if wander > limit:
+            shown, unit = in_shown_unit(wander, number.unit.removesuffix("_d"))
+            most, _ = in_shown_unit(limit, number.unit.removesuffix("_d"))
+            return (
+                f"what is left of {channel} wanders by {shown:.2g} {unit}, and its zero by "
+                f"{most:.2g} {unit} at most; the model lacks something"
+            )
     return ""
 
 
 _OWN_SHARE = 0.2
+"""Weight [-] in a combination that is open from which a number is open itself; others only accompany it."""
 _AT_BOUND = 1.0e-6
+"""Distance to a bound, as a fraction of it, up to which a number has ended there."""
 
 
 def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int, conflict: str) -> Estimate:
@@ -263,7 +292,6 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int,
     value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
     name, free = number.free.name, number.free
     bound = next((end for end in (free.low, free.high) if abs(value - end) <= _AT_BOUND * abs(end or 1.0)), None)
-    # A number with a small weight only accompanies a combination that is open.
     combination = next((weights for weights in fitted.unidentified if abs(weights.get(name, 0.0)) >= _OWN_SHARE), None)
     verdict: Verdict = "identified"
     if combination is not None:
@@ -303,6 +331,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int,
 
 
 def _channel(fitted: Fit, experiment: str, measured: Measured, model: Floats) -> ChannelFit:
+    """Return what a channel of an experiment leaves beside the model at its samples."""
     left = measured.values - model
     return ChannelFit(
         experiment=experiment,

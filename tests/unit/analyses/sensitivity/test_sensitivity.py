@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
+from ppafo.analyses.sensitivity.answer import overlapping_pairs, remarks
 from ppafo.analyses.sensitivity.methods import METHODS
 from ppafo.analyses.sensitivity.question import sensitivity
-from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse, overlapping_pairs, remarks
+from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty

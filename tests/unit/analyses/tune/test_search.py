@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.tune.answer import INFEASIBLE, agreement
 from ppafo.analyses.tune.problem import Effort, Problem, Searched, Spread, Term
+from ppafo.analyses.tune.result import INFEASIBLE, agreement
 from ppafo.analyses.tune.solve import UNUSABLE, Crossed, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround

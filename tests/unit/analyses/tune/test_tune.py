@@ -9,9 +9,10 @@ import jsonschema
 import pytest
 
 import ppafo
-from ppafo.analyses.tune.answer import Tuned, verdict
+from ppafo.analyses.tune.answer import verdict
 from ppafo.analyses.tune.problem import json_schema, list_tunings, load_tuning
 from ppafo.analyses.tune.question import tune
+from ppafo.analyses.tune.result import Tuned
 from ppafo.errors import StudyError
 from ppafo.studies.varying import value_at
 

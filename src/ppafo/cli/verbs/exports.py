@@ -1,4 +1,4 @@
-"""Tools: a scenario or a walk for other programs and boards, and what this computer has."""
+"""A scenario or a walk for other programs: as a library in C, or as a functional mock-up unit."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Ov
     from ppafo.exports.c_library.plant import plant_library
     from ppafo.loading import load_scenario
 
-    library = {"loop": c_library, "plant": plant_library}[interface]
-    following = f"make -C {shlex.quote(str(out))} check"
-    return export(out, "export c", lambda: library(load_scenario(scenario, overrides)), lambda _: following)
+    library_of = {"loop": c_library, "plant": plant_library}[interface]
+    next_step = f"make -C {shlex.quote(str(out))} check"
+    return export(out, "export c", lambda: library_of(load_scenario(scenario, overrides)), lambda _files: next_step)
 
 
 def export_fmu(
@@ -64,18 +64,18 @@ def export_fmu(
     from ppafo.exports.fmu.unit import functional_unit
     from ppafo.loading import load_scenario
 
-    made = {"loop": closed_loop, "plant": plant_alone}[interface]
-    chosen = [host_platform()] if platforms is None else platforms.split(",")
-    # On a computer that no platform of a unit is for, it has its sources alone.
-    wanted = list(dict.fromkeys(one.strip() for one in chosen if one is not None))
+    interface_of = {"loop": closed_loop, "plant": plant_alone}[interface]
+    names = [host_platform()] if platforms is None else platforms.split(",")
+    # None is a computer that no platform of FMI stands for: its unit has sources alone.
+    chosen = list(dict.fromkeys(name.strip() for name in names if name is not None))
 
     def unit() -> Mapping[str, bytes]:
-        return functional_unit(made(load_scenario(scenario, overrides)), int(fmi), wanted)
+        return functional_unit(interface_of(load_scenario(scenario, overrides)), int(fmi), chosen)
 
-    def following(file: Path) -> str:
+    def next_step(file: Path) -> str:
         return f"fmpy simulate {shlex.quote(str(file))} --show-plot"
 
     # A folder may be named like a unit too; it then gets the unit among its files.
     if out.suffix == ".fmu" and not out.is_dir():
-        return export_file(out, lambda: next(iter(unit().values())), following(out))
-    return export(out, "export fmu", unit, lambda files: following(out / files[0]))
+        return export_file(out, lambda: next(iter(unit().values())), next_step(out))
+    return export(out, "export fmu", unit, lambda files: next_step(out / files[0]))

@@ -1,0 +1,163 @@
+"""The sensitivity of metrics in words, a table for each metric, and two panels: the indices, and how they settle."""
+
+import math
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.analyses.sensitivity.methods import METHODS
+from ppafo.analyses.sensitivity.solve import Influences, OfMetric
+from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.kind import Kind, of_metric
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.setting_names import label_of
+from ppafo.report.style import BLUE, COLOURS, ORANGE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_NEGLIGIBLE = 0.01
+"""Fraction of the largest index up to which a value does not matter."""
+_INCHES_OF_A_BAR = 0.27
+"""Height of the bars of one value."""
+_MAXIMUM_LINES = 5
+"""Values whose indices are drawn over the size of the sample."""
+_TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
+_CAPTION = (
+    "Left: the indices with their bands. Right: the largest of them, in the colours of their names, from growing "
+    "parts of the sample: whether they have converged."
+)
+
+
+def finding_of(influences: Influences) -> Finding[Influences]:
+    """Return the indices in words, a table and two panels for each metric."""
+    settings, method = influences.settings, METHODS[influences.method]
+    said = (
+        f"{influences.study}: {influences.method}, {settings.samples:,} {method.sizes_label}, {influences.runs:,} runs "
+        f"of {len(influences.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
+        f"{influences.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
+        f"{method.block_label} with a failed run is left out",
+    )
+    figure = Part(
+        "Indices and their convergence",
+        panels=partial(_panels, influences),
+        name="sensitivity",
+        caption=_CAPTION,
+        across=2,
+        size=(4.8, max(2.9, 0.9 + _INCHES_OF_A_BAR * len(influences.paths))),
+        is_detail=True,
+    )
+    return Finding(
+        name="sensitivity",
+        kicker="Sensitivity",
+        title=f"What matters in {influences.study}",
+        said=said,
+        parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
+        found=influences,
+    )
+
+
+def _panels(influences: Influences) -> list[Panel]:
+    """Return two panels for each metric: its indices, and how they settle."""
+    return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
+
+
+def _part(influences: Influences, metric: OfMetric) -> Part:
+    """Return a row for each uncertain value, the most important one first, and what these numbers leave open."""
+    kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
+    order = np.argsort(-indices.values[METHODS[influences.method].shown[0]])
+    columns = [Column("value", [influences.paths[row] for row in order])]
+    for name, values in indices.values.items():
+        columns.append(Column(_TITLES[name], [f"{round(values[row], 3) + 0.0:.3f}" for row in order]))
+        columns.append(Column("band", [f"± {indices.bands[name][row]:.3f}" for row in order]))
+    change, band = metric.change_from_5_to_95_percent, metric.band_of_change
+    ends = [None if math.isnan(change[row]) else f"± {kind.change_number(band[row], '.2g')}" for row in order]
+    shown = [None if math.isnan(change[row]) else change[row] for row in order]
+    columns += [Column("change, 5 to 95 %", shown, kind, is_change=True), Column("band", ends)]
+    heading = f"{metric.metric}: sd {kind.change(metric.standard_deviation)}"
+    if metric.dropped_blocks:
+        label = METHODS[influences.method].sizes_label
+        heading += f"; {metric.dropped_blocks:,} of {influences.settings.samples:,} {label} left out"
+    return Part(heading, columns, remarks=remarks(influences, metric))
+
+
+def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[str, str]]:
+    """Return neighbours in the order of the first index whose bands overlap: which of the two matters more is open.
+
+    Nothing is said of two that both are surely below a hundredth of the largest: neither matters.
+    """
+    name, indices = METHODS[influences.method].shown[0], metric.indices
+    # In the order of the table, in which only neighbours can be mistaken for each other.
+    values, bands = indices.values[name], indices.bands[name]
+    order = np.argsort(-values)
+    order = order[(values + bands)[order] >= _NEGLIGIBLE * np.max(values)]
+    return [
+        (influences.paths[first], influences.paths[second])
+        for first, second in pairwise(order)
+        if values[first] - bands[first] < values[second] + bands[second]
+    ]
+
+
+def remarks(influences: Influences, metric: OfMetric) -> list[str]:
+    """Return what these numbers leave open; a rest within the error of the sum may be no interaction."""
+    said = []
+    unsettled = overlapping_pairs(influences, metric)
+    if unsettled:
+        pairs = ", ".join(f"{first} and {second}" for first, second in unsettled)
+        said.append(f"not converged at this size, their bands overlap: {pairs}")
+    indices = metric.indices
+    if "first" in indices.values:
+        alone, error = float(np.sum(indices.values["first"])), float(np.linalg.norm(indices.bands["first"]))
+        rest = ": interactions, if any, are within this error"
+        if alone + error < 1.0:
+            rest = "; the rest comes from interactions"
+        said.append(f"first-order indices sum to {alone:.3f} ± {error:.2g}{rest}")
+    return said
+
+
+def _bars(influences: Influences, metric: OfMetric) -> Panel:
+    """Return the indices with their bands; the names of the largest have the colours of the panel beside."""
+    shown, indices = METHODS[influences.method].shown, metric.indices
+    labels = [label_of(path) for path in influences.paths]
+    order = np.argsort(indices.values[shown[0]])
+    places = np.arange(order.size)
+    marks = [
+        Mark(
+            "reach",
+            indices.values[name][order],
+            places + shift,
+            indices.bands[name][order],
+            _TITLES[name],
+            colour,
+            {"markersize": 5, "elinewidth": 1.4},
+        )
+        for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False)
+    ]
+
+    def name_values(axes: "Axes") -> None:
+        axes.set_yticks(places, [labels[row] for row in order])
+        for label, colour in zip(reversed(axes.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
+            label.set_color(colour)
+        axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
+
+    fraction = Kind("Fraction of the variance")
+    return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="inside", then=name_values)
+
+
+def _course(influences: Influences, metric: OfMetric) -> Panel:
+    """Return the largest indices from growing parts of the sample."""
+    method = METHODS[influences.method]
+    name, sizes = method.shown[0], [step.blocks for step in metric.settling]
+    order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]
+    marks = []
+    for colour, row in zip(COLOURS, order, strict=False):
+        values = np.array([step.indices[name][row] for step in metric.settling])
+        bands = np.array([step.bands[name][row] for step in metric.settling])
+        line = {"marker": "o", "markersize": 3.5, "linewidth": 1.2}
+        marks.append(Mark("line", sizes, values, colour=colour, style=line))
+        marks.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
+    title = f"{_TITLES[name][:1].upper()}{_TITLES[name][1:]}, {order.size} largest"
+    axis = Kind(f"{method.sizes_label[:1].upper()}{method.sizes_label[1:]}")
+    return Panel(axis, Kind(), marks, title, then=lambda axes: axes.set_xscale("log", base=2))

@@ -1,0 +1,126 @@
+"""What a tuning comes to: the gains before and after with their metrics, and where each start of the search ended."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from ppafo.analyses.tune.problem import Gains, Problem, Term
+from ppafo.metrics import Metric
+from ppafo.report.kind import Interval
+from ppafo.simulation.simulate import Result
+from ppafo.studies.draws import Limit
+
+INFEASIBLE = 1.0e6
+"""Where the costs of candidates begin that break a constraint."""
+FRESH_DRAWS = 1024
+"""Draws that the search never saw, over which the result is judged in the end."""
+_AS_GOOD = 0.01
+"""Fraction of the best cost within which another start ended as well."""
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where one start ended: fractions of the way (gains,), cost, candidates tried, best cost of each generation.
+
+    ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
+    """
+
+    fractions: tuple[float, ...]
+    cost: float
+    candidates: int
+    generations: tuple[float, ...]
+    is_settled: bool
+
+
+def agreement(starts: Sequence[Start]) -> float:
+    """Return the largest difference of a fraction of the way between the best start and those as good as it.
+
+    As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
+    ``starts`` are best first.
+    """
+    best = starts[0]
+    # Of an infeasible cost only what the violation adds is compared: a hundredth of the offset would take in all.
+    beyond = best.cost - INFEASIBLE if best.cost >= INFEASIBLE else best.cost
+    as_good = [start for start in starts if start.cost <= best.cost + _AS_GOOD * abs(beyond)]
+    return max(float(np.max(np.abs(np.subtract(start.fractions, best.fractions)))) for start in as_good)
+
+
+@dataclass(frozen=True, slots=True)
+class Ceiling:
+    """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
+
+    ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
+    keep them, or the other draws do.
+    """
+
+    fraction: float
+    explains: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """Gains [SI] and what they give.
+
+    ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
+    over the draws of the search; ``fresh`` the same over draws that the search did not use (empty without draws).
+    ``objective`` belongs to the search; what is called fresh, to the fresh draws (the same again without draws).
+    ``share_of_noise`` is the fraction of the variance over the fresh draws that is due to sensor noise, by metric.
+    ``metrics`` belong to ``result``, one run of the nominal device.
+    """
+
+    gains: Gains
+    values: Mapping[str, float]
+    fresh: Mapping[str, float]
+    objective: float
+    violation: float
+    share_without_value: float
+    fresh_violation: float
+    fresh_share_without_value: float
+    torque_ceiling: Ceiling
+    share_of_noise: Mapping[str, Interval]
+    metrics: Mapping[str, Metric]
+    result: Result = field(compare=False, repr=False)
+
+    @property
+    def is_feasible_in_search(self) -> bool:
+        """True where all constraints are kept and no run fails over what the search saw."""
+        return self.violation == 0.0 and self.share_without_value == 0.0
+
+    @property
+    def is_feasible(self) -> bool:
+        """True where all constraints are kept and no run fails, over fresh draws too."""
+        return self.is_feasible_in_search and self.fresh_violation == 0.0 and self.fresh_share_without_value == 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Tuned:
+    """What a search came to; numbers in SI. ``starts`` are best first; ``runs`` counts all simulated runs.
+
+    ``overrides`` make the tuned scenario of its file; ``bounds_reached`` are the gains that ended at a bound, and at
+    which: a better one may lie beyond.
+    """
+
+    tuning: str
+    scenario: str
+    verdict: str
+    is_feasible: bool
+    overrides: list[str]
+    bounds_reached: dict[str, Literal["minimum", "maximum"]]
+    scales: dict[str, float]
+    goals: list[Term]
+    constraints: list[Limit]
+    robust: dict[str, str | None] | None
+    effort: dict[str, Any]
+    before: Setting
+    after: Setting
+    starts: list[Start]
+    runs: int
+    remarks: list[str]
+    problem: Problem = field(compare=False, repr=False)
+
+    @property
+    def lines(self) -> list[str]:
+        """The gains found, as overrides ``PATH=VALUE`` to paste."""
+        return self.problem.lines(self.after.gains)

@@ -1,0 +1,191 @@
+"""What a validation comes to: agreement of each recording, causes of what is left, and the verdict in a sentence."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from ppafo.parameters.device import Device
+from ppafo.report.display_units import display_value, quantity_of_unit
+from ppafo.report.kind import Kind
+from ppafo.validation import ChannelAgreement
+from ppafo.validation.agreement import RecordingAgreement, ReplaySettings
+from ppafo.validation.causes import Cause, Causes
+from ppafo.validation.compared import COMPARED
+from ppafo.version import __version__
+
+LITTLE = 0.03
+"""RMS error over the full range up to which a residual beside the noise, of which no cause is known, is a remark."""
+_EXPLAINS = 0.5
+"""Residual with the nearest cause over the residual without any, up to which that cause is worth naming."""
+
+
+@dataclass(frozen=True, slots=True)
+class Validation:
+    """A parameter set and what each recording reports of it.
+
+    ``overrides`` changed the set, ``causes`` are those of what is left; ``has_limits`` is true where limits of the
+    errors were given.
+    """
+
+    parameter_set: str
+    device: Device
+    overrides: tuple[str, ...]
+    settings: ReplaySettings
+    recordings: tuple[RecordingAgreement, ...]
+    causes: Causes
+    has_limits: bool
+
+    @property
+    def passes(self) -> bool:
+        """True where every error is within its limit and, without limits given, only what any bench has is left.
+
+        A cause that is found and that not any bench has is a disagreement, however small. A residual that no single
+        cause explains is one only where it is more than ``LITTLE``, for no model has all that a device has. Of a
+        recorded angle that is followed causes are not searched.
+        """
+        causes, channels = self.causes, [channel for recording in self.recordings for channel in recording.channels]
+        is_little = causes.tried == 0 or all(channel.fraction <= LITTLE for channel in channels)
+        is_usual = causes.is_noise or (is_little if causes.found is None else causes.found.is_usual)
+        return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
+
+    def json_document(self) -> dict[str, Any]:
+        """Return errors, causes and recordings as plain data in SI."""
+        return {
+            "format": "ppafo agreement",
+            "schema_version": 1,
+            "parameter_set": self.parameter_set,
+            "device": self.device.name,
+            "valve": self.device.valve_name,
+            "overrides": list(self.overrides),
+            "longest_delay": self.settings.longest_delay,
+            "passes": self.passes,
+            "summary": verdict(self),
+            "causes": {
+                "tried": self.causes.tried,
+                "found": _cause_data(self.causes.found),
+                "nearest": _cause_data(self.causes.nearest),
+            },
+            "recordings": [_recording_data(agreement) for agreement in self.recordings],
+            "versions": {"ppafo": __version__},
+        }
+
+
+def verdict(validation: Validation) -> str:
+    """Return in one sentence whether the set agrees and, if not, by what it is off and what would explain it."""
+    count, name = len(validation.recordings), validation.device.name
+    pairs = [(channel, agreement) for agreement in validation.recordings for channel in agreement.channels]
+    worst = max((channel for channel, _ in pairs), key=lambda channel: channel.in_noise)
+    share = f"{100 * worst.fraction:.2g} % of full range"
+    size = f"{worst.channel} is off by {_times(worst.in_noise)} times its noise ({share})"
+    failed = ", ".join(
+        f"{channel.channel} in {agreement.file} ({100 * channel.fraction:.3g} %, limit {100 * channel.limit:.3g} %)"
+        for channel, agreement in pairs
+        if not channel.passes
+    )
+    why = _why(validation.causes, worst.in_noise)
+    if not validation.passes:
+        # Where no channel is beyond its limit, an unusual cause alone is what fails the set.
+        parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
+        return f"{name} does not agree: {'; '.join(parts if failed else parts[:2])}"
+    rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
+    return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
+
+
+def _why(causes: Causes, without: float) -> str:
+    """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
+
+    ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
+    wrong samples, which are seen whatever else is wrong.
+    """
+    if causes.found is not None:
+        verdict = in_words(causes.found)
+        verdict += ", as on any bench" if causes.found.is_usual else ""
+        same = ", ".join(cause.name for cause in causes.found.same)
+        return f"{verdict} (or, the same for these recordings: {same})" if same else verdict
+    if not causes.tried:
+        return ""
+    nearest = causes.nearest
+    explains = nearest is not None and (nearest.is_of_samples or nearest.left <= _EXPLAINS * without)
+    if nearest is None or not explains:
+        return "no single change explains it"
+    left = _times(nearest.left)
+    return f"no single change explains it; nearest: {in_words(nearest)}, which leaves {left} times the noise"
+
+
+def _times(size: float) -> str:
+    """Return how many times the noise, with two digits and without a power of ten."""
+    return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
+
+
+def in_words(cause: Cause) -> str:
+    """Return a cause in words, numbers of the set in the unit in which people see them."""
+    if len(cause.numbers) != 1:
+        return cause.in_words
+    ((value, unit),) = cause.numbers.values()
+    # An atmosphere in gauge pressure says nothing.
+    absolute = unit == "Pa_a"
+    quantity = "pressure change" if absolute else quantity_of_unit(unit)
+    shown = Kind("", "" if unit == "-" else unit, quantity).text(value)
+    return f"{cause.in_words} ({shown})"
+
+
+def _cause_data(cause: Cause | None) -> dict[str, Any] | None:
+    """Return a cause as plain data in SI, None for none."""
+    if cause is None:
+        return None
+    return {
+        "name": cause.name,
+        "words": in_words(cause),
+        "same": [other.name for other in cause.same],
+        "gain": cause.gain,
+        "left": cause.left,
+        "numbers": {path: value for path, (value, _) in cause.numbers.items()},
+        "is_usual": cause.is_usual,
+    }
+
+
+def kind_of_channel(channel: ChannelAgreement) -> Kind:
+    """Return the kind of the errors of a channel, which are differences."""
+    return Kind("", "", COMPARED[channel.channel].quantity)
+
+
+def _shown_rms(channel: ChannelAgreement) -> dict[str, Any]:
+    """Return the RMS error of a channel in the unit that people are shown."""
+    kind = kind_of_channel(channel)
+    return {"unit": kind.shown_unit, "rms": display_value(channel.rms, kind.quantity)}
+
+
+def _recording_data(agreement: RecordingAgreement) -> dict[str, Any]:
+    """Return the errors of a recording as plain data in SI."""
+    return {
+        "file": agreement.file,
+        "sha256": agreement.sha256,
+        "label": agreement.measured.label,
+        "kind": agreement.measured.kind,
+        "samples": len(agreement.measured),
+        "duration": agreement.measured.duration,
+        "motion": agreement.motion,
+        "inputs": list(agreement.inputs),
+        "step": agreement.step,
+        "delay": agreement.delay.correction,
+        "delay_is_at_limit": agreement.delay.is_at_limit,
+        "passes": agreement.passes,
+        "remarks": list(agreement.remarks),
+        "channels": {
+            channel.channel: {
+                "unit": channel.unit,
+                "rms": channel.rms,
+                "rms_share": channel.fraction,
+                "noise": channel.noise,
+                "limit_share": channel.limit,
+                "passes": channel.passes,
+                "full_range": channel.full_range,
+                "variation": channel.variation,
+                "rms_unaligned": channel.rms_unaligned,
+                "bias": channel.bias,
+                "largest": channel.largest,
+                "largest_time": channel.largest_time,
+                "shown": _shown_rms(channel),
+            }
+            for channel in agreement.channels
+        },
+    }

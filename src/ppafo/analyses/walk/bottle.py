@@ -1,0 +1,104 @@
+"""What a bottle adds to a walk: its facts, a remark, data, the file over the walk and its figure."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ppafo.report.finding import Part, facts
+from ppafo.report.kind import Kind
+from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
+from ppafo.walking.figures.bottle import bottle_figure
+from ppafo.walking.motion import walk_of
+from ppafo.walking.result import WalkResult
+
+_CAPTION = (
+    "The supply over the walk. A regulator holds at most its set pressure, and less once the bottle has too little. "
+    "Gas at the device is what comes out of the hose."
+)
+_EXPLAINED = (
+    "The vapour of liquid CO2 lacks heat: from 20 degC it wants 95 kJ/kg to be gas of 25 degC behind the regulator. It "
+    "takes it from the regulator's body and from the hose, which take it from the room. Below the triple point dry ice "
+    "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
+    "hose; in truth their walls warm it, so its effect here is the largest that it can have.",
+    "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
+    "strides, or where the fluid in the bottle freezes.",
+)
+_DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("duration", "torque", "gas mass"))
+_SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
+
+
+def bottle_parts(worn: WalkResult) -> tuple[Part, ...]:
+    """Return the facts of the bottle of a walk, its figure and how to read them; nothing without a bottle."""
+    supply = worn.supply
+    if supply is None:
+        return ()
+    draw, caption = partial(bottle_figure, worn), _CAPTION
+    return (
+        Part("On the bottle", facts(_facts(worn, supply))),
+        Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+        Part("How to read the bottle", said=_EXPLAINED, is_detail=True),
+    )
+
+
+def bottle_remark(worn: WalkResult) -> str:
+    """Return what ended a walk on its bottle, and when."""
+    supply = worn.supply
+    assert supply is not None, "said of a walk on a bottle"
+    time = lasted(supply)
+    ended = "" if time is None else f"lasts {minutes_text(time)}: "
+    return f"bottle {supply.supply.bottle.name}: {ended}{supply.ending.message}"
+
+
+def _facts(worn: WalkResult, supply: SupplyCourse) -> list[tuple[str, str]]:
+    """Return what ended the walk and when, the gas used, and the coldest places, each as name and value."""
+    values, motion, peaks = supply.values, walk_of(worn.scenario), worn.peak_torques
+    end = {name: float(series[-1]) for name, series in values.items()}
+    filled = f"{_GAS.text(supply.supply.mass)} at {_WARMTH.text(supply.supply.temperature)}"
+    left = _GAS.text(end["bottle_mass"])
+    if "liquid_mass" in values:
+        left += f", {_GAS.text(end['liquid_mass'])} of it liquid"
+    walked = f"after {worn.helped.size} whole strides"
+    # Strides are counted by time, as ``ppafo bottle`` counts them.
+    if motion.task_sequence is None:
+        strides = strides_text(supply.ending.time / motion.gait.stride_time)
+        walked = f"{strides} strides, {worn.helped.size} of them whole between strikes"
+    rows = [
+        ("bottle", f"{supply.supply.bottle.title}, with {filled}"),
+        ("what ended it", supply.ending.message),
+        ("when", f"{_DURATION.text(supply.ending.time)}, {walked}"),
+        ("gas used", f"{_GAS.text(supply.balance.left_bottle)}, left {left}"),
+        ("bottle at the end", f"{_WARMTH.text(end['bottle_temperature'])}, {_PRESSURE.text(end['bottle_pressure'])}"),
+        ("coldest gas behind the regulator", _WARMTH.text(float(values["outlet_temperature"].min()))),
+        ("coldest gas at the device", _WARMTH.text(float(values["gas_temperature"].min()))),
+        ("seat free of ice, at least", _SHARE.text(float(values["seat_open"].min()))),
+    ]
+    # The third stride is the first in which the controller knows the stride time.
+    if peaks.size > 3:
+        third, last = _TORQUE.text(float(peaks[2])), _TORQUE.text(float(peaks[-1]))
+        rows.append(("peak torque of a stride", f"{third} in the third, {last} in the last"))
+    return rows
+
+
+def bottle_data(worn: WalkResult) -> dict[str, Any]:
+    """Return the supply as data in SI units: what ended it, what closes, all at the end; nothing without a bottle."""
+    supply = worn.supply
+    if supply is None:
+        return {}
+    return {
+        "supply": {
+            **supply.supply.to_dict(),
+            "ending": supply.ending._asdict(),
+            "balance": supply.balance._asdict(),
+            "at_end": {name: float(values[-1]) for name, values in supply.values.items()},
+            "lowest": {name: float(np.min(values)) for name, values in supply.values.items()},
+        }
+    }
+
+
+def bottle_files(worn: WalkResult) -> dict[str, Callable[[], bytes]]:
+    """Return the file of the supply over the walk, by name; nothing without a bottle."""
+    supply = worn.supply
+    return {} if supply is None else {"bottle.csv": lambda: marked_csv_bytes(supply.recording)}

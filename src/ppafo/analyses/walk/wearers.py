@@ -1,0 +1,123 @@
+"""A walk of many wearers: what they get, as quantiles, and who they are, in words, a table and a figure."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, versions, walk_document
+from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.signals.recording import Floats
+from ppafo.simulation.scenario import UNITS
+from ppafo.units.shown import in_units
+from ppafo.walking.figures.population import population_figure
+from ppafo.walking.motion import person_remarks
+from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
+from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Number, Population
+from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Fractions of the wearers that are below what the table shows."""
+WEARERS_FORMAT = "ppafo wearers"
+WEARERS_SCHEMA_VERSION = 1
+_WEARERS_CAPTION = (
+    "What the wearers get, with quantiles, and how it depends on their properties. Dot: the wearer of the "
+    "configuration."
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Wearers:
+    """Result of one walk of many wearers, in the form that is printed and kept."""
+
+    population: Population
+
+    def json_document(self) -> dict[str, Any]:
+        """Return the quantiles over the wearers, and who they are, as plain data in SI."""
+        population = self.population
+        return {
+            "format": WEARERS_FORMAT,
+            "schema_version": WEARERS_SCHEMA_VERSION,
+            "units": UNITS,
+            "status": {"kind": "diverged" if population.diverged else "completed", "message": population.message},
+            "wearers": population.count,
+            "diverged": population.diverged,
+            "vented": population.vented,
+            "paused": population.paused,
+            "minutes": population.minutes,
+            "seed": population.seed,
+            "varied": {
+                "body_mass": MASS_VARIATION,
+                "stature": STATURE_VARIATION,
+                "correlation": CORRELATION,
+                "thresholds": THRESHOLD_VARIATION,
+                "push_off_start": START_VARIATION,
+                "gait": "stride time, stance share and series coefficients by the deviations of the gait",
+                "most_deviations": MAXIMUM_DEVIATIONS,
+            },
+            "outcomes": quantiles(population.outcomes, OUTCOMES),
+            "traits": quantiles(population.traits, TRAITS),
+            "versions": versions(),
+            "configuration": walk_document(population.scenario),
+        }
+
+
+@in_units(lambda population: population.scenario.device.shown)
+def wearers_finding(population: Population) -> Finding[Wearers]:
+    """Return what many wearers get; no figure where every walk diverged."""
+    configuration = population.scenario
+    tables = {**population.outcomes, **population.traits}
+    rows = []
+    for name, (title, quantity, digits) in SHOWN.items():
+        values = np.quantile(tables[name], QUANTILES).tolist() if tables[name].size else [None] * len(QUANTILES)
+        rows.append(number_texts(ShownNumber(name=name, title=title, quantity=quantity, digits=digits), values))
+    remarks = [*person_remarks(configuration)]
+    if population.vented:
+        remarks.append(f"safe state: the controllers of {population.vented} wearers vented both chambers permanently")
+    if population.paused:
+        remarks.append(
+            f"less help: the controllers of {population.paused} wearers lifted the foot only, or paused, for some "
+            "strides"
+        )
+    if population.diverged:
+        remarks.append(population.message)
+    draw = partial(population_figure, population)
+    figure = Part("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
+    return Finding(
+        name="wearers",
+        kicker="Walks of many wearers",
+        title=f"{population.count} wearers with {configuration.name}",
+        said=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
+        parts=(
+            Part(columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks),
+            *([figure] if population.count else []),
+        ),
+        found=Wearers(population),
+        passed=not population.diverged,
+        files={"wearers.csv": partial(wearers_csv, population)},
+        command="walk",
+    )
+
+
+def wearers_csv(population: Population) -> bytes:
+    """Return one line for each wearer, in SI units."""
+    columns = {f"{name} [{trait.unit}]": population.traits[name] for name, trait in TRAITS.items()}
+    columns |= {f"{name} [{outcome.unit}]": population.outcomes[name] for name, outcome in OUTCOMES.items()}
+    return csv_of(columns)
+
+
+def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
+    """Return the quantiles of every number in SI units, with unit and meaning."""
+    return {
+        name: {
+            "unit": number.unit,
+            "summary": number.summary,
+            "mean": float(table[name].mean()) if table[name].size else None,
+            "quantiles": dict(zip(map(str, QUANTILES), np.quantile(table[name], QUANTILES).tolist(), strict=True))
+            if table[name].size
+            else {},
+        }
+        for name, number in numbers.items()
+    }

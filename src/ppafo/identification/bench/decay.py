@@ -1,0 +1,130 @@
+"""The free decay in a recording: from the end of the push to standstill, the first reversal, or the end."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.errors import IdentificationError
+from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, window
+from ppafo.signals import Recording
+from ppafo.signals.faults import is_at_limit, noise_of, plateaus
+from ppafo.signals.recording import Floats
+
+PROCEDURE = "free-decay"
+ANGLE = "angle"
+VELOCITY = "angular_velocity"
+"""Fitted besides the angle where it was recorded."""
+MINIMUM_SAMPLES = 20
+"""Samples of a decay at least."""
+FEWEST_SMOOTHED = 5
+"""Samples that a local parabola is fitted to at least."""
+_SMOOTHED_FRACTION = 0.04
+"""Fraction of a decay that a local parabola is fitted to."""
+_REVERSAL = 0.02
+"""Rate against the push, over the largest, from which a vane swings back: at rest it has a rate of 0 but for noise."""
+_VELOCITY_MAY_DIFFER = 0.1
+"""Fraction by which the velocity may differ from the rate of the angle: another unit or another sign differs more."""
+_MINIMUM_OVER_NOISE = 20.0
+"""Range of the angle over its noise from which something moves."""
+
+
+class Decay(NamedTuple):
+    """One decay: times from its start [s], angle [rad], its direction (1 or -1), and its velocity [rad/s] if known."""
+
+    time: Floats
+    angle: Floats
+    sign: float
+    velocity: Floats | None
+
+
+def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
+    """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
+
+    IdentificationError, with the file, the sample and the remedy, where too few samples are left, where nothing moves,
+    or where the sensor is saturated or contradicts itself.
+    """
+    check_moves(source, PROCEDURE, ANGLE)
+    part = window(source.recording, start, end)
+    if len(part) < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE} needs at least {MINIMUM_SAMPLES} samples between start and end, "
+            f"there are {len(part)}"
+        )
+    swept, noise = float(np.ptp(part[ANGLE])), noise_of(part[ANGLE])
+    if swept < _MINIMUM_OVER_NOISE * noise:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE}: nothing moves: the angle changes by {swept:.3g} rad with a noise of "
+            f"{noise:.3g} rad; push the vane"
+        )
+    skipped = check_no_gap(source, PROCEDURE, part)
+    for name in (name for name in (ANGLE, VELOCITY) if name in part):
+        check_no_outlier(source, PROCEDURE, name, part)
+    rows, sign = _falling_part(source, part, start is not None)
+    _check_not_saturated(source, part[ANGLE][rows], skipped + rows.start)
+    if VELOCITY in part:
+        _check_velocity(source, part, rows)
+    velocity = part[VELOCITY][rows] if VELOCITY in part else None
+    time = part.time[rows]
+    return Decay(time=time - time[0], angle=part[ANGLE][rows], sign=sign, velocity=velocity)
+
+
+def _falling_part(source: Source, part: Recording, starts_here: bool) -> tuple[slice, float]:
+    """Return the samples from the end of the push to the first reversal, and the direction of the push, 1 or -1.
+
+    Where the caller said where the decay starts, the push is over by then.
+    """
+    velocity, _ = smoothed_rates(part.time, part[ANGLE])
+    fastest = 0 if starts_here else int(np.argmax(np.abs(velocity)))
+    sign = 1.0 if velocity[fastest] > 0.0 else -1.0
+    # A push ends a little after the highest speed of the smoothed signal; that much is left out.
+    first = fastest if starts_here else fastest + smoothing_width(part.time.size) // 2
+    back = np.flatnonzero(sign * velocity[first:] < -_REVERSAL * np.abs(velocity).max())
+    last = first + int(back[0]) if back.size else part.time.size
+    if last - first < MINIMUM_SAMPLES:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE}: only {last - first} samples lie between the highest speed and the end or the "
+            f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
+        )
+    return slice(first, last), sign
+
+
+def _check_not_saturated(source: Source, angle: Floats, before: int) -> None:
+    """Raise IdentificationError for an angle [rad] that stops at a limit; ``before`` samples of the file precede it."""
+    for plateau in plateaus(angle):
+        if is_at_limit(angle, plateau):
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
+                f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
+                f"before: the sensor is saturated or the vane is at a stop; give end"
+            )
+
+
+def _check_velocity(source: Source, part: Recording, rows: slice) -> None:
+    """Raise IdentificationError for a velocity that is not how fast the angle changes, by the area under it."""
+    time, angle, velocity = part.time[rows], part[ANGLE][rows], part[VELOCITY][rows]
+    moved = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))
+    deviation = angle - angle.mean()
+    gain = float(deviation @ moved / (deviation @ deviation))
+    if abs(gain - 1.0) > _VELOCITY_MAY_DIFFER:
+        raise IdentificationError(
+            f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
+            f"check unit and sign of both"
+        )
+
+
+def smoothed_rates(time: Floats, angle: Floats) -> tuple[Floats, Floats]:
+    """Return angular velocity [rad/s] and acceleration [rad/s^2] from local parabolas, at the times of the samples."""
+    from scipy.signal import savgol_filter
+
+    # The filter wants an even clock.
+    even = np.linspace(time[0], time[-1], time.size)
+    step, width = float(even[1] - even[0]), smoothing_width(time.size)
+    values = np.interp(even, time, angle)
+    rates = [savgol_filter(values, width, 2, deriv=order, delta=step) for order in (1, 2)]
+    velocity, acceleration = (np.interp(time, even, rate) for rate in rates)
+    return velocity, acceleration
+
+
+def smoothing_width(count: int) -> int:
+    """Return an odd number of samples to smooth over."""
+    return max(FEWEST_SMOOTHED, int(_SMOOTHED_FRACTION * count)) | 1

@@ -1,0 +1,35 @@
+"""Initial values of a replay that were not recorded: which channels may have one, and the texts that give them."""
+
+from collections.abc import Sequence
+
+from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
+from ppafo.units import parse_quantity
+from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
+
+_UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
+_EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
+INITIAL_REMEDIES = {name: f'give its initial value, --initial "{example}"' for name, example in _EXAMPLES.items()}
+"""What to do about a channel that a replay would start from and that was not recorded."""
+
+
+def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:
+    """Return initial values in SI by channel from texts such as ``pressure_1=0 psi_g``.
+
+    Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for another channel, unit or form.
+    """
+    values = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not equals:
+            raise DataError(
+                f"initial value '{one_line(text)}' is not of the form CHANNEL=VALUE, for example '{_EXAMPLES[ANGLE]}'"
+            )
+        if name not in _UNITS:
+            hint = nearest_name(name, _UNITS)
+            raise DataError(
+                f"initial value '{one_line(text)}': there is no channel '{one_line(name)}'{hint}; "
+                f"available: {', '.join(_UNITS)}"
+            )
+        with refused_as(DataError, f"initial value '{one_line(text)}'", UnitError):
+            values[name] = parse_quantity(value, _UNITS[name], atmosphere)
+    return values

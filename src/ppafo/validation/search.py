@@ -1,0 +1,300 @@
+"""The search for a cause: what changes leave of recordings, the size that leaves least, and what one leaves to others.
+
+G = sum over channels of n [ln max(MS0/s^2, 1) - ln max(MSc/s^2, 1)] - k ln N, with MS the mean square left without and
+with a change, s the noise of the n samples, N the number of all and k = 1 for a change with a size.
+"""
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import lsq_linear
+
+from ppafo.errors import PpafoError
+from ppafo.parameters.device import Device
+from ppafo.progress import Progress, Report
+from ppafo.signals.recording import Floats
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.recorded.channels import COMMAND
+from ppafo.validation.agreement import ReplaySettings, replay_of
+from ppafo.validation.change import SWAPPED, Candidate, Change, joined
+from ppafo.validation.record import ONLY_NOISE, STEPS, Left, Record, at_rate, left_of, starts_without_wrong
+from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
+
+_TOGETHER = 32
+"""Changes that are replayed at once, so that progress can be shown and memory stays small."""
+_DIFFERENCE = 0.02
+"""Fraction of the distance between two sizes of a grid over which a derivative is taken."""
+_SMALL = 0.1
+"""Size over the smallest of its grid by which a second change is tried beside a first."""
+_PARTING = 1.0e-4
+"""Fraction of a squared slope that must lie across the first's, for a second change to be another one."""
+_SMALLEST = 1.0e-300
+"""What a sum of squares is at least where it divides."""
+
+
+class Tried(NamedTuple):
+    """A candidate at the size that leaves least, as it was sought, and by how much G [-] it explains more than none."""
+
+    candidate: Candidate
+    size: float
+    left: Left
+    gain: float
+
+    @property
+    def change(self) -> Change:
+        """The change of this size."""
+        return self.candidate.at(self.size)
+
+    @property
+    def is_inside(self) -> bool:
+        """True for a size that is not at an end of its grid, beyond which a better one may lie."""
+        return min(self.candidate.grid) < self.size < max(self.candidate.grid)
+
+    @property
+    def is_usual(self) -> bool:
+        """True for an error that sensors of any bench have."""
+        return self.candidate.is_usual or 0.0 < abs(self.size) <= self.candidate.usual
+
+    @property
+    def explains(self) -> bool:
+        """True where nothing but noise is left in any channel."""
+        return self.left.is_noise and self.gain > 0.0
+
+
+class Slope(NamedTuple):
+    """How the errors over noise (all samples,) grow with the size of a candidate."""
+
+    candidate: Candidate
+    errors: Floats
+
+
+class _Sized(NamedTuple):
+    """A candidate with a size, as it is sought, and the errors (all samples,) that this size adds for each of 1."""
+
+    candidate: Candidate
+    size: float
+    slope: Floats
+
+    @property
+    def change(self) -> Change:
+        """The change of this size."""
+        return self.candidate.at(self.size)
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """Recordings of one device on which changes are tried; ``report`` hears how far a long trial is."""
+
+    device: Device
+    settings: ReplaySettings
+    records: list[Record]
+    report: Report
+
+    @property
+    def penalty(self) -> float:
+        """The logarithm of the number of samples: what a size must explain more, and what two causes may differ by."""
+        return math.log(sum(record.values.size for record in self.records))
+
+    def evaluated(self, changes: Sequence[Change]) -> list[Left | None]:
+        """Return what each change leaves; None for one of a device that cannot have made such a recording."""
+        left: list[Left | None] = []
+        for first in range(0, len(changes), _TOGETHER):
+            if first:
+                self.report(Progress("searching for causes", first, len(changes)))
+            left += self._evaluated_together(changes[first : first + _TOGETHER])
+        return left
+
+    def _evaluated_together(self, changes: Sequence[Change]) -> list[Left | None]:
+        """Return what each of some changes leaves, all replayed at once."""
+        requests = [[self._request(record, change) for record in self.records] for change in changes]
+        possible = [request for of_change in requests for request in of_change if request is not None]
+        replayed = iter(replay_together(possible))
+        left: list[Left | None] = []
+        for change, of_change in zip(changes, requests, strict=True):
+            results = [None if request is None else next(replayed) for request in of_change]
+            parts = [
+                left_of(record, result, change, self.settings.longest_delay)
+                for record, result in zip(self.records, results, strict=True)
+                if isinstance(result, Replayed)
+            ]
+            if len(parts) < len(self.records):
+                left.append(None)
+                continue
+            squares = np.concatenate([part.squares for part in parts])
+            left.append(Left(squares, np.concatenate([part.errors for part in parts])))
+        return left
+
+    def _request(self, record: Record, change: Change) -> Replay | None:
+        """Return the replay of what the sensors saw, on the device with the numbers of a change; None for no device."""
+        recording, settings = record.measured.recording, self.settings
+        for name, sensor in change.sensors.items():
+            if name in recording:
+                values = sensor.true(recording[name])
+                values = np.clip(values, -1.0, 1.0) if name == COMMAND else values
+                recording = recording.with_channel(name, values, recording.unit(name))
+        if change.is_swapped:
+            swapped = {name: recording[other] for name, other in SWAPPED.items()}
+            for name, values in swapped.items():
+                recording = recording.with_channel(name, values, recording.unit(name))
+        if change.clock != 1.0:
+            recording = at_rate(recording, change.clock)
+        if change.start is not None:
+            starts = starts_without_wrong(record, self.device, change.start)
+            settings = replace(settings, initial={**starts, **settings.initial})
+        try:
+            settings = replace(settings, motion=change.motion or settings.motion)
+            request = replay_of(replace(record.measured, recording=recording), self.device, settings)
+            device = replace(request.device, effects={**request.device.effects, **change.effects})
+            if change.numbers:
+                scenario = replace(replayed_scenario(request), device=device)
+                device = with_numbers(scenario, change.numbers).device
+        except PpafoError:
+            return None
+        return replace(request, device=device)
+
+    def compared(self, candidates: Sequence[Candidate], none: Left) -> list[Tried]:
+        """Return the candidates at the sizes that leave least: the best of a grid, then two Gauss-Newton steps.
+
+        ``none`` is what is left without any. A size at an end of its grid is refused.
+        """
+        best: dict[str, Tried] = {}
+        trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
+        for step in range(STEPS + 1):
+            changes = [candidate.at(size) for candidate, size in trials]
+            for (candidate, size), left in zip(trials, self.evaluated(changes), strict=True):
+                if left is not None:
+                    gain = self._gain(left, none) - self.penalty * candidate.has_size
+                    now, before = Tried(candidate=candidate, size=size, left=left, gain=gain), best.get(candidate.name)
+                    # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
+                    if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
+                        best[candidate.name] = now
+            if step < STEPS:
+                trials = self._improved([tried for tried in best.values() if tried.candidate.has_size])
+        return [tried for tried in best.values() if tried.is_inside or not tried.candidate.has_size]
+
+    def _gain(self, left: Left, none: Left) -> float:
+        """Return by how much more than none a change explains, before its size is paid for."""
+        counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
+        return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(left.squares, 1.0))))
+
+    def _improved(self, tried: Sequence[Tried]) -> list[tuple[Candidate, float]]:
+        """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
+        ends = [_neighbours(each) for each in tried]
+        lengths = [_DIFFERENCE * (high - low) for low, high in ends]
+        moved = [each.candidate.at(each.size + length) for each, length in zip(tried, lengths, strict=True)]
+        improved = []
+        for each, left, length, (low, high) in zip(tried, self.evaluated(moved), lengths, ends, strict=True):
+            if left is not None:
+                slope = (left.errors - each.left.errors) / length
+                size = each.size - float(slope @ each.left.errors) / max(float(slope @ slope), _SMALLEST)
+                improved.append((each.candidate, min(max(size, low), high)))
+        return improved
+
+    def slopes(self, change: Change, left: Left, candidates: Sequence[Candidate]) -> list[Slope]:
+        """Return how the errors that a change leaves grow with the size of each of some candidates beside it."""
+        steps = [_SMALL * min(map(abs, candidate.grid)) for candidate in candidates]
+        changes = [joined(change, candidate.at(step)) for candidate, step in zip(candidates, steps, strict=True)]
+        return [
+            Slope(candidate, (moved.errors - left.errors) / step)
+            for candidate, step, moved in zip(candidates, steps, self.evaluated(changes), strict=True)
+            if moved is not None
+        ]
+
+    def together(self, usual: Sequence[Candidate], none: Left) -> list[Candidate]:
+        """Return the errors that any bench has, all at once, each as large as explains most; none without a sensor."""
+        slopes = self.slopes(Change(), none, usual)
+        if not slopes:
+            return []
+        change = reduce(joined, [sized.change for sized in _bounded(slopes, none.errors)])
+        words = "zeros, gains and delays of several sensors seem to be off"
+        return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
+
+    def beside_usual(self, slopes: Sequence[Slope], none: Left, known: Collection[str]) -> list[Tried]:
+        """Return the changes larger than on any bench that explain recordings beside what any bench has, at no cost.
+
+        Their sizes are those of straight lines; a run says whether they explain. Names in ``known`` are left out.
+        """
+        usual, sized, changes = [slope for slope in slopes if slope.candidate.usual], list[_Sized](), list[Change]()
+        for slope in slopes:
+            candidate = slope.candidate
+            if candidate.name in known:
+                continue
+            unbounded = slope._replace(candidate=replace(candidate, usual=math.inf))
+            others = [other for other in usual if other is not slope]
+            fitted = _bounded([unbounded, *others], none.errors)
+            size = fitted[0].size
+            left = none.errors + sum(each.size * each.slope for each in fitted)
+            # A straight line leaves some more; what leaves far more is no small change, nor is what its grid does not
+            # reach: of a logarithm such a size would be no number any more.
+            is_inside = min(candidate.grid) < size < max(candidate.grid)
+            if is_inside and float(left @ left) < 2.0 * ONLY_NOISE * len(left) and abs(size) > candidate.usual:
+                sized.append(_Sized(candidate, size, slope.errors))
+                changes.append(reduce(joined, [each.change for each in fitted[1:]], candidate.at(size)))
+        tried = [
+            Tried(candidate=candidate, size=size, left=left, gain=self._gain(left, none) - self.penalty)
+            for (candidate, size, _), left in zip(sized, self.evaluated(changes), strict=True)
+            if left is not None
+        ]
+        return [each for each in tried if each.explains and each.is_inside]
+
+    def needs_another(self, first: Tried, slopes: Sequence[Slope]) -> bool:
+        """Return whether a second change, larger than on any bench, explains what a first leaves.
+
+        To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its size costs as much
+        and the choice among p candidates 2 ln p (extended BIC, Chen and Chen 2008). What both leave over the noise is
+        correlation, for which a square counts less. What the engine may be off needs no cause.
+        """
+        if not slopes:
+            return False
+        errors = first.left.errors
+        step = _SMALL * min(map(abs, first.candidate.grid))
+        moved = self.evaluated([first.candidate.at(first.size + step)])[0]
+        along_first = np.zeros_like(errors) if moved is None else moved.errors - errors
+        along_first /= max(float(np.linalg.norm(along_first)), _SMALLEST)
+        # Beside a second change the first would have another size: what it can take over is no merit of the second.
+        rest = errors - (along_first @ errors) * along_first
+        threshold = 2.0 * (self.penalty + math.log(len(slopes)))
+        of_engine = sum(float(np.square(record.engine) @ record.good.sum(axis=1)) for record in self.records)
+        for candidate, slope in slopes:
+            across = slope - (along_first @ slope) * along_first
+            across_square = float(across @ across)
+            # What does the same as the first leaves rounding, along which anything may seem to be explained.
+            if across_square > _PARTING * float(slope @ slope):
+                along = float(across @ rest)
+                explained = along * along / across_square
+                noise = max((float(rest @ rest) - explained) / len(errors), 1.0)
+                is_larger = abs(along / across_square) > candidate.usual
+                if is_larger and explained > of_engine + threshold * noise * noise:
+                    return True
+        return False
+
+
+def _neighbours(tried: Tried) -> tuple[float, float]:
+    """Return the sizes of the grid below and above the one that is nearest; its own ends at an end."""
+    grid = sorted(tried.candidate.grid)
+    nearest = int(np.argmin(np.abs(np.array(grid) - tried.size)))
+    return grid[max(0, nearest - 1)], grid[min(len(grid) - 1, nearest + 1)]
+
+
+def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:
+    """Return candidates with the sizes, no larger than usual, that leave least of errors on straight lines.
+
+    One whose usual size is infinite has no bound.
+    """
+    # In units of its limit, or of its slope, each has one size, whatever its own unit is.
+    scales = np.array(
+        [
+            slope.candidate.usual
+            if math.isfinite(slope.candidate.usual)
+            else 1.0 / max(float(np.linalg.norm(slope.errors)), _SMALLEST)
+            for slope in slopes
+        ]
+    )
+    limits = np.array([1.0 if math.isfinite(slope.candidate.usual) else math.inf for slope in slopes])
+    columns = np.stack([slope.errors for slope in slopes], axis=1)
+    sizes = lsq_linear(columns * scales, -errors, (-limits, limits)).x * scales
+    return [_Sized(slope.candidate, float(size), slope.errors) for slope, size in zip(slopes, sizes, strict=True)]
