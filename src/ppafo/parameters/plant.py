@@ -1,6 +1,6 @@
 """From a device to the numbers that the plant and its effects compute with."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
@@ -11,6 +11,7 @@ from ppafo.model.columns import first, over_runs
 from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
+from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
 
@@ -60,6 +61,18 @@ def valve_settings(valve: Valve) -> Any:
 def first_settings(valve: Valve) -> Any:
     """Return the settings [SI] of a valve in the first run of an ensemble: they choose the model for all of them."""
     return valve_settings(valve)._make(map(first, valve_settings(valve)))
+
+
+def venting_valve(valve: Valve) -> ValveModel:
+    """The model of a valve that a command can vent: a proportional one has a vent valve beside it.
+
+    Of an ensemble the first run decides which model it is.
+    """
+    if valve.kind == "proportional":
+        from ppafo.model.valves import vent_valve  # a vane on a bench needs none
+
+        return vent_valve.choose(first_settings(valve))
+    return VALVES[valve.kind].choose(first_settings(valve))
 
 
 def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParameters:
@@ -141,6 +154,21 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
 def all_settings(device: Device) -> dict[str, dict[str, Any]]:
     """Return the settings [SI] of all effects of devices that are loaded, by name."""
     return {effect.name: settings_of(device, effect) for effect in _effects(device) if effect.is_of_device}
+
+
+def number_under(node: Any, attributes: Iterable[str]) -> Any:
+    """Return the number to which attributes lead from a device, or from what has one; it may be an array (runs,)."""
+    for name in attributes:
+        node = part_of(node, name)
+    return node
+
+
+def part_of(node: Any, name: str) -> Any:
+    """Return an attribute or entry of a part of a device, or of what has one."""
+    # A device has settings of the effects that its set names; those of all others are their defaults.
+    if name == SECTION and isinstance(node, Device):
+        return all_settings(node)
+    return node[name] if isinstance(node, Mapping) else getattr(node, name)
 
 
 def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect, ...]:

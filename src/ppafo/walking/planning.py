@@ -7,7 +7,8 @@ import numpy as np
 
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
@@ -15,7 +16,7 @@ from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
-from ppafo.model.catalog import ACTUATORS, VALVES
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import GaitNow, gait_at
@@ -24,12 +25,10 @@ from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.plant_faults import SOUND, PlantFaults
 from ppafo.model.sensors import GaitSensors
 from ppafo.model.shut_off import NOT_FITTED, ShutOff
-from ppafo.model.valves import vent_valve
-from ppafo.model.valves.kind import ValveModel
-from ppafo.parameters.device import Device, Valve
-from ppafo.parameters.plant import first_settings, plant_parameters
+from ppafo.parameters.device import Device
+from ppafo.parameters.plant import plant_parameters, venting_valve
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
+from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
@@ -111,10 +110,10 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
     """What the run of a walk is made of, whoever walks."""
     # An object in charge is asked between the steps, so the program has no controller of its own.
-    is_outside = scenario.controller.kind == PYTHON_CONTROLLER
+    is_outside = scenario.controller.is_outside
     return Components(
         device=device,
-        valve=walking_valve(device.valve),
+        valve=venting_valve(device.valve),
         controller=None if is_outside else law_of(scenario),
         settings={} if is_outside else scenario.controller.settings,
         reference=NO_REFERENCE,
@@ -145,10 +144,8 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
     # Lines may be smaller than any chamber, and then fill first.
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
-    # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
-    stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
     times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
-    counts = walk_step_counts(*times, plant, volume, stiffness)
+    counts = walk_step_counts(*times, plant, volume, scenario.stiffness)
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
@@ -252,6 +249,11 @@ def law_of(scenario: Scenario) -> ControllerKind:
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
 
 
+def requests_torque(law: ControllerKind) -> bool:
+    """True where a controller of walking wants a torque, false where it only opens and shuts valves."""
+    return hasattr(law.initial, "request")
+
+
 def fed_device(scenario: Scenario) -> Device:
     """The device with the gas that its supply has at the start: cold gas where it hangs on a bottle."""
     bottle, device = walk_of(scenario).bottle, scenario.device
@@ -271,10 +273,3 @@ def planned_task_sequence(sequence: TaskSequence, gait: Gait, number: Any = 0.0)
     """A task sequence in time, walked by the person with a number; ScenarioError for what the gait does not allow."""
     person = person_of(gait, number)
     return plan_task_sequence(sequence, gait, person.timing.frequency, person.timing, person.strike_angle)
-
-
-def walking_valve(valve: Valve) -> ValveModel:
-    """The valve of a walking device; a proportional one has a vent valve for free motion."""
-    # Which valve it is must be one for all runs of an ensemble, so the first decides.
-    settings = first_settings(valve)
-    return vent_valve.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

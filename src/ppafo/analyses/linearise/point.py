@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.linearise.plant import VALVE, plant_of, valve_states, without_slew_limit
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest
 from ppafo.engine.lanes import Floats, run_batch
@@ -23,7 +22,7 @@ from ppafo.model.ports import friction_at_rest
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import Scenario
 
 STEADY = 1.0e-9
 """Largest rate of a state [1/s], over the size of the state, that counts as none."""
@@ -111,7 +110,7 @@ def equilibrium(scenario: Scenario) -> Point:
         raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
-    is_open_loop = scenario.controller.kind == OPEN_LOOP
+    is_open_loop = scenario.controller.is_open_loop
     if scenario.controlled != TORQUE and not is_open_loop:
         line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; take --at with a time"
         raise ScenarioError(f"{scenario.name}: {line}")
@@ -131,7 +130,7 @@ def equilibrium(scenario: Scenario) -> Point:
             at = run.plant, most["angle"], most["pressure_1"], most["pressure_2"]
             torque = run.program.actuator.torque(*at)
             line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
-        other = " or hold the ankle" if isinstance(scenario.motion, FreeMotion) else ""
+        other = " or hold the ankle" if held is not None else ""
         raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")
     way = _way(run, steady, scenario.run.duration)
     if way:

@@ -49,67 +49,86 @@ _CAPTION = (
 def finding_of(results: StudyResults) -> Finding[StudyResults]:
     """Return the results in words, tables and panels; they have passed where any run completed."""
     document, summary = results.document, results.summary
-    study, runs, first = document["study"], document["runs"], [*summary["failures"][:1]]
     ended = ", ".join(f"{summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if summary[key])
-    described = " ".join(study.get("description", "").split())
-    failed = [
+    described = " ".join(document["study"].get("description", "").split())
+    failures = [
         f"run {failure['run']} ({failure['configuration']}): {failure['reason']}" for failure in summary["failures"]
     ]
-    remarks = [
+    quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
+    files = (
+        ("rows of all runs", "runs/*.parquet"),
+        ("summary", SUMMARY),
+        ("study", f"study.json, sha256 {document['sha256'][:16]}"),
+    )
+    return Finding(
+        name="sweep",
+        kicker="Study",
+        title=results.name,
+        said=(f"{results.name}: {document['runs']:,} runs: {ended}", *_failed_and_oscillating(results)),
+        parts=(
+            _figure(results, [described] if described else [], failures),
+            *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
+            Part("How to read it", said=[quantile], is_detail=True),
+            _varied(document["study"]),
+            Part(said=_sampling(document["study"]), is_detail=True),
+            _assumed(document["scenarios"]),
+            Part("Files", facts(files), is_detail=True),
+        ),
+        found=results,
+        passed=summary["completed"] > 0,
+    )
+
+
+def _failed_and_oscillating(results: StudyResults) -> list[str]:
+    """Return how many runs failed, with the first of them, and how many oscillate, by configuration."""
+    summary, runs = results.summary, results.document["runs"]
+    sentences = [
         f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "
         f"{failure['run']}: {failure['reason']}"
-        for failure in first
+        for failure in summary["failures"][:1]
     ]
-    remarks += [
+    return sentences + [
         f"{name}: in {count:,} runs the loop oscillates (column 'oscillates')"
         for name, count in summary.get("oscillating", {}).items()
         if count
     ]
-    said = [
+
+
+def _varied(study: Mapping[str, Any]) -> Part:
+    """Return a row for each number that a study varies: its path, how, and the keys of that."""
+    rows = []
+    for number in study.get("vary", ()):
+        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
+        rows.append((number["path"], number["kind"], ", ".join(keys)))
+    return Part("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
+
+
+def _sampling(study: Mapping[str, Any]) -> list[str]:
+    """Return the correlations of what a study draws, and how it draws them."""
+    sentences = [
         f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
         for pair in study.get("correlations", ())
     ]
     sample = study.get("sample")
     if sample:
         method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
-        said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
-    varied = []
-    for number in study.get("vary", ()):
-        others = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
-        varied.append((number["path"], number["kind"], ", ".join(others)))
-    # What the base scenarios assume, once where several assume the same.
+        sentences.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
+    return sentences
+
+
+def _assumed(scenarios: Mapping[str, Any]) -> Part:
+    """Return what the base scenarios assume, once where several assume the same."""
     names: dict[tuple[str, str, str], list[str]] = {}
-    for name, scenario in document["scenarios"].items():
+    for name, scenario in scenarios.items():
         for number in scenario["assumptions"]:
             names.setdefault((number["path"], number["value"], number["note"]), []).append(name)
-    assumed = [(*assumption, ", ".join(own)) for assumption, own in names.items()]
-    files = (
-        ("rows of all runs", "runs/*.parquet"),
-        ("summary", SUMMARY),
-        ("study", f"study.json, sha256 {document['sha256'][:16]}"),
-    )
-    quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
-    return Finding(
-        name="sweep",
-        kicker="Study",
-        title=results.name,
-        said=(f"{results.name}: {runs:,} runs: {ended}", *remarks),
-        parts=(
-            _figure(results, [described] if described else [], failed),
-            *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
-            Part("How to read it", said=[quantile], is_detail=True),
-            Part("What varied" if varied else "", columns_of(("path", "kind", ""), varied), left=3, is_detail=True),
-            Part(said=said, is_detail=True),
-            Part(
-                "What the base scenarios assume" if assumed else "",
-                columns_of(("value", "", "why", "in"), assumed),
-                left=4,
-                is_detail=True,
-            ),
-            Part("Files", facts(files), is_detail=True),
+    return Part(
+        "What the base scenarios assume" if names else "",
+        columns_of(
+            ("value", "", "why", "in"), [(*assumption, ", ".join(having)) for assumption, having in names.items()]
         ),
-        found=results,
-        passed=summary["completed"] > 0,
+        left=4,
+        is_detail=True,
     )
 
 

@@ -13,12 +13,10 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import TORQUE
-from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
@@ -71,7 +69,7 @@ def shortfall(scenario: Scenario) -> Floats:
     With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
     difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
     """
-    if scenario.device.actuator.kind != VANE or scenario.controlled != TORQUE:
+    if not scenario.device.has_torque_constant or scenario.controlled != TORQUE:
         return np.zeros(1)
     supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
     lowest, highest = profile_bounds(scenario.reference)
@@ -251,7 +249,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     base = scenario_with(problem, gains)
     columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, columns)
-    if scenario.controller.kind == OPEN_LOOP or scenario.walks:
+    if not scenario.follows_reference:
         return Ceiling(0.0, ())
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
     spread, explained = problem.spread, []

@@ -15,7 +15,7 @@ from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
 from ppafo.simulation.numbers import other_form
 from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.recorded.inputs import supply_paths
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import Scenario, vane_motion
 
 TIME_OFFSET = "recording.time_offset"
 """Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
@@ -56,8 +56,8 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
         for path, quantity in numbers.device_numbers(device).items()
         if path not in other
     }
-    if isinstance(scenario.motion, FreeMotion):
-        leg = scenario.motion.leg
+    leg = vane_motion(scenario).leg
+    if vane_motion(scenario).profile is None:
         declared |= {f"motion.{quantity.name}": quantity for quantity in (FREE if leg is None else LEG)}
         shank = () if leg is None else shank_settings(leg.shank.kind)
         declared |= {f"motion.shank.{quantity.name}": quantity for quantity in shank}

@@ -19,7 +19,7 @@ from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -95,7 +95,7 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
     the logarithm of this velocity, so that is moved.
     """
     limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
-    moves = any(isinstance(one.scenario.motion, FreeMotion) and ANGLE not in one.inputs for one in experiments)
+    moves = any(vane_motion(one.scenario).profile is None and ANGLE not in one.inputs for one in experiments)
     friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
     if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
         yield FreeParameter(
@@ -121,7 +121,7 @@ def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[f
         found["supply.pressure"] = deviation_of_limit(tolerances.supply)
         if DORSIFLEXION_SUPPLY not in inputs:
             found["supply.dorsiflexion_pressure"] = deviation_of_limit(tolerances.supply)
-    is_read = experiment.initial_state == "recording" or experiment.scenario.controller.kind == PYTHON_CONTROLLER
+    is_read = experiment.initial_state == "recording" or experiment.scenario.controller.is_outside
     stops = scenario.device.actuator.angle_min, scenario.device.actuator.angle_max
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):
