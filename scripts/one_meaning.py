@@ -43,6 +43,7 @@ from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import plan_ensemble
 from ppafo.simulation.loading import list_scenarios
+from ppafo.simulation.motion_kind import VANE
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
@@ -252,7 +253,7 @@ def at_library(name: str, count: int, seed: int) -> Judged:
 
 
 def _numbers_in_si(base: Scenario, words: Words) -> dict[str, float]:
-    if not base.walks:
+    if base.motion.motion_kind.layout == VANE:
         return in_si(base, words)
     declared = {path: quantity for path, (quantity, _) in numbers_of_walk(base).items()}
     zero = base.device.supply.atmospheric_pressure

@@ -193,7 +193,7 @@ def settings_of(name: str, count: int, seed: int) -> Iterator[dict[str, str]]:
     """Settings of a scenario, the same for every door."""
     draw = random.Random(f"{name} {seed}")
     scenario = load_scenario(name)
-    known = numbers_of(scenario) if not scenario.walks else numbers_of_walk(scenario)
+    known = numbers_of_walk(scenario) if name in list_walks() else numbers_of(scenario)
     for _ in range(count):
         paths = drawn_paths(list(known), draw)
         yield {path: words_of(path, *known[path], draw, scenario.device.supply.atmospheric_pressure) for path in paths}

@@ -33,7 +33,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
     ``own`` are the kinds of this package by name, in their order: kinds, or where each is, as ``module:KIND``.
     """
 
-    def __init__(self, group: str, word: str, kind_type: type[Kind], own: Mapping[str, Kind | str]) -> None:
+    def __init__(self, group: str, word: str, kind_type: type[Any], own: Mapping[str, Kind | str]) -> None:
         self.group = group
         self.word = word
         self._kind_type = kind_type
@@ -133,7 +133,7 @@ class Kinds(MutableMapping[str, Kind], Generic[Kind]):
     def _checked(self, load: Callable[[], Any], where: str, called: str) -> Kind:
         """Return what is loaded where it is a kind, of a name that was given; KindError where it is none."""
         try:
-            kind = load()
+            kind: Kind = load()
         except KindError as error:
             raise KindError(f"{where}: {one_line(error)}") from error
         except Exception as error:  # what another package does when it is imported is anybody's guess

@@ -53,12 +53,7 @@ def most_reversals(scenario: Scenario) -> float:
     law = scenario.law
     if law is None:
         return math.inf
-    stride_time = 0.0
-    if scenario.walks:
-        from ppafo.walking.motion import walk_of
-
-        stride_time = float(walk_of(scenario).gait.stride_time)
-    return rules.most_reversals(scenario, law, first(scenario.run.duration), stride_time)
+    return rules.most_reversals(scenario, law, first(scenario.run.duration), scenario.motion.stride_time)
 
 
 @checked("scenarios", "threads")

@@ -115,8 +115,8 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
             f"{_ANALYSES}.walk.question:walk_with_and_without",
             first_line="Simulate walking with the device, without it, and healthy.",
             library="ppafo.walking.loading:FILE",
-            listing="ppafo.analyses.walk.answer:list_files",
-            default_folder="ppafo.analyses.walk.answer:default_folder",
+            listing="ppafo.analyses.walk.command:list_files",
+            default_folder="ppafo.analyses.walk.command:default_folder",
         ),
     },
     "tools": {

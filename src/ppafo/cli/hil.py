@@ -44,7 +44,7 @@ def hil(
     from ppafo.storage import check_result_folder
 
     chosen = load_scenario(scenario, overrides)
-    if chosen.walks:
+    if chosen.motion.motion_kind.reads_forces:
         raise ScenarioError(
             f"'{chosen.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
         )

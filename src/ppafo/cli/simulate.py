@@ -53,8 +53,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None
     error = None if checked is None else checked.error
-    # A vane alone runs again in milliseconds; of a walk the error is estimated by its check only.
-    if checked is None and result.status.is_completed and not chosen.walks:
+    if checked is None and result.status.is_completed and chosen.motion.motion_kind.is_repeated_for_its_error:
         error = result.error()
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
     from ppafo.report.drawing import load_drawing
@@ -136,9 +135,8 @@ def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None"
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
-    walked = f"'ppafo walk {result.scenario.origin.file}' compares it with no device and with a healthy ankle"
-    beside = [] if not result.scenario.walks else [walked]
+    further = result.scenario.motion.motion_kind.further_command(str(result.scenario.origin.file))
     # The gains in force stand below the warnings.
     head, gap, metrics = str(result).partition("\n\n")
     run = f"{head}\n{in_force}{gap[1:]}{metrics}"
-    return "\n".join([run, "", *checked, *beside, f"written: {folder} ({written})"])
+    return "\n".join([run, "", *checked, *([further] if further else []), f"written: {folder} ({written})"])

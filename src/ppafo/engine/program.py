@@ -20,7 +20,7 @@ from ppafo.model.plant import PlantParameters, PlantState, SinglePort
 from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
-from ppafo.signals.meter import Course, FootSample, MeterKind
+from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, Course, FootSample, MeterKind
 
 if TYPE_CHECKING:
     from ppafo.engine.step.lane import Lane, Now
@@ -371,10 +371,41 @@ class Program:
         return {group: kind for group, kind in self.meter_groups.items() if not (self.is_locked and kind.of_motion)}
 
     @property
+    def traces(self) -> dict[str, str]:
+        """Where a lane has each channel that can be traced and is no number of the state by its own path."""
+        return paths_of_traces(self.state_rows(), self.walks, self.has_true_masses)
+
+    @property
     def traced_paths(self) -> dict[int, str]:
         """Where a lane has the channels that are traced, by their places."""
-        paths = paths_of_traces(self.state_rows(), self.walks, self.has_true_masses)
+        paths = self.traces
         return {row: paths.get(name, name) for row, name in enumerate(self.traced)}
+
+    @property
+    def followed(self) -> str:
+        """What its reference is of; empty where it follows none: in a walk a controller makes its own."""
+        return self.controlled if self.has_reference and not self.walks else ""
+
+    @property
+    def wanted(self) -> str:
+        """What its controller wants a value of: by the reference, or the torque that one of walking requests."""
+        return TORQUE if self.walks and self.requests_torque else self.followed
+
+    @property
+    def offers(self) -> frozenset[str]:
+        """What runs have, of all that metrics may need beside channels."""
+        has = {
+            WALK: self.walks,
+            STEADY: not self.takes_task_sequence,
+            LED_SHANK: self.is_on_gait,
+            REQUESTED: self.requests_torque,
+        }
+        return frozenset(need for need, is_there in has.items() if is_there)
+
+    @property
+    def chooses_parts(self) -> bool:
+        """True where numbers decide whether steps are taken whole: a locked joint, rigid chambers, and no lines."""
+        return self.is_locked and self.feed is None and not self.actuator.gives
 
     @property
     def takes_samples(self) -> bool:

@@ -27,8 +27,6 @@ from ppafo.gym.tasks import (
     Task,
     finite,
     reward_of,
-    valve_command,
-    valve_or_vent,
     within,
 )
 from ppafo.model.plant import chamber_pressures, joint_torque
@@ -137,7 +135,7 @@ def _rows_between_calls(step: StepText, task: Task) -> RowsOfLanes:
 
 def _lines_of_steps(step: StepText, rows: RowsOfLanes, task: Task) -> list[str]:
     """Return the lines that set the commands of a block from the actions and run its steps."""
-    command = step.collector.add(valve_or_vent if task.walks else valve_command)
+    command = step.collector.add(task.command)
     return [
         "for lane in range(states.shape[1]):",
         # Lanes without an environment take the action of the last one.

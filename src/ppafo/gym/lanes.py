@@ -112,7 +112,7 @@ class Environments:
         self._commands = np.zeros((blocks, clock.command_delay + 2, width))
         self._own = np.zeros((blocks, len(OWN_PATHS), width))
         # Where the next actions are written (environments, 1 or 2).
-        self.actions = np.zeros((count, 1 + task.walks))
+        self.actions = np.zeros((count, task.actions))
         self._chosen = np.zeros(count)
         self._observations = np.zeros((count, len(task.observed_paths)))
         self._outcomes = np.zeros((_OUTCOMES, count))

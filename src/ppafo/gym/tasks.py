@@ -188,7 +188,7 @@ class Task:
 
     ``view`` has the observed numbers. ``observed(seen, goal, memory, wanted, command, time)`` makes one of them,
     ``error(goal, wanted, angle, phase, torque)`` the error, ``kept(memory, supplied_mass, seen, time)`` the memory.
-    ``unit`` is the unit of the error. A task that ``walks`` is on a leg that walks.
+    ``unit`` is the unit of the error. ``command(action, other)`` makes the command of an action of ``actions`` numbers.
     """
 
     name: str
@@ -199,7 +199,8 @@ class Task:
     unit: str
     error_weight: float
     gas_weight: float
-    walks: bool = False
+    command: Callable[[float, float], float] = valve_command
+    actions: int = 1
 
     @property
     def observed_paths(self) -> list[str]:
@@ -239,7 +240,8 @@ TASKS = {
             "N m",
             1.0,
             1.0,
-            walks=True,
+            command=valve_or_vent,
+            actions=2,
         ),
     )
 }

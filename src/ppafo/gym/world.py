@@ -1,6 +1,6 @@
 """What one environment and many have in common: their settings, spaces, episodes and lanes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.overrides import over
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import load_walk
 from ppafo.walking.walk import lasting
 
@@ -107,6 +108,42 @@ def settings_of(arguments: Mapping[str, Any]) -> Settings:
     return Settings(**arguments)
 
 
+def _torque_episodes(file: str | Path, words: Sequence[str], varied: Ranges, settings: Settings) -> ScenarioEpisodes:
+    chosen = _scenario(file, words, settings.duration)
+    if chosen.controlled != TORQUE:
+        raise ScenarioError(
+            f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
+            "another scenario, or the task 'angle'"
+        )
+    return scenario_episodes(chosen, settings.randomise, varied, settings.targets)
+
+
+def _angle_episodes(file: str | Path, words: Sequence[str], varied: Ranges, settings: Settings) -> ScenarioEpisodes:
+    chosen = _scenario(file, words, settings.duration)
+    return scenario_episodes(chosen, settings.randomise, varied, settings.targets)
+
+
+def _scenario(file: str | Path, words: Sequence[str], duration: float | None) -> Scenario:
+    own = () if duration is None else (f"run.duration={float(duration)!r} s",)
+    return load_scenario(file, over(words, own, ScenarioError))
+
+
+def _walk_episodes(file: str | Path, words: Sequence[str], varied: Ranges, settings: Settings) -> WalkEpisodes:
+    if varied:
+        raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
+    walk, duration = load_walk(file, words), settings.duration
+    seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
+    return walk_episodes(walk, settings.randomise, seconds)
+
+
+_EPISODES: Mapping[str, Callable[[str | Path, Sequence[str], Ranges, Settings], ScenarioEpisodes | WalkEpisodes]] = {
+    "torque": _torque_episodes,
+    "angle": _angle_episodes,
+    "walk": _walk_episodes,
+}
+"""What the episodes of each task are drawn from."""
+
+
 class World:
     """What one environment and many have in common: episodes, spaces, and lanes for as many as are asked for."""
 
@@ -118,23 +155,7 @@ class World:
         file = usual if settings.scenario is None else settings.scenario
         words = over(flaws if is_usual else (), settings.overrides, ScenarioError)
         varied = VARIED.get(task, {}) if settings.vary is None and is_usual else settings.vary or {}
-        duration = settings.duration
-        self.episodes: ScenarioEpisodes | WalkEpisodes
-        if self.task.walks:
-            if varied:
-                raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
-            walk = load_walk(file, words)
-            seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
-            self.episodes = walk_episodes(walk, settings.randomise, seconds)
-        else:
-            own = () if duration is None else (f"run.duration={float(duration)!r} s",)
-            chosen = load_scenario(file, over(words, own, ScenarioError))
-            if task == "torque" and chosen.controlled != TORQUE:
-                raise ScenarioError(
-                    f"{chosen.name}: reference.of = '{chosen.controlled}': the task 'torque' follows a torque; take "
-                    "another scenario, or the task 'angle'"
-                )
-            self.episodes = scenario_episodes(chosen, settings.randomise, varied, settings.targets)
+        self.episodes = _EPISODES[task](file, words, varied, settings)
         bounds = observed_bounds(self.task, self.episodes.base.device)
         self.judging = Judging(
             error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,
@@ -149,7 +170,7 @@ class World:
         self.is_continuous = settings.actions == CONTINUOUS
         self.action_space: Any = gymnasium.spaces.Discrete(COMMANDS)
         if self.is_continuous:
-            self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1 + self.task.walks,), np.float32)
+            self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.task.actions,), np.float32)
 
     def __reduce__(self) -> "tuple[type[World], tuple[str, Settings]]":
         """Pickle by what it was made of: programs and what they are compiled to are found again."""

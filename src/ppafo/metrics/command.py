@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.metrics.metric import REQUEST, WALK, Floats, MetricKind, ReadAt
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import MID_STANCE
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import REQUESTED, WALK, Course, MeterKind, Sample
 
 Masks = NDArray[np.bool_]
 
@@ -121,7 +121,9 @@ ASKED = MeterKind("asked", Asked, start_asked, update_asked)
 
 
 def asked_samples(recording: Recording) -> Masks:
-    """Return the samples of a walk in which its controller asks for a torque (samples,)."""
+    """Return the samples in which a controller asks for a torque (samples,): all, but of a walk with its phases."""
+    if "controller_phase" not in recording:
+        return np.ones(len(recording), dtype=np.bool_)
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
 
 
@@ -148,7 +150,7 @@ METRICS = (
         None,
         ReadAt(("meters.asked.squares", "meters.asked.samples"), root_mean),
         (ASKED,),
-        needs=(WALK, REQUEST),
+        needs=(WALK, REQUESTED),
     ),
     MetricKind(
         "peak_torque",

@@ -20,10 +20,6 @@ from ppafo.units import from_si
 
 Floats = NDArray[np.float64]
 
-WALK, STEADY, REQUEST, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
-"""What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque; or a
-leg whose shank a gait leads."""
-
 
 @dataclass(frozen=True, slots=True)
 class Metric:

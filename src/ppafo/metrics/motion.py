@@ -5,10 +5,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.metrics.metric import LED_SHANK, Floats, MetricKind, ReadAt, Readings, less
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less
 from ppafo.model.columns import root
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import LED_SHANK, Course, MeterKind, Sample
 
 TRAVEL_FRACTION = 0.01
 """A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""

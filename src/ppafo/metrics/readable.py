@@ -2,11 +2,9 @@
 
 from typing import NamedTuple
 
-from ppafo.engine.channels import REQUEST as REQUEST_ROW
 from ppafo.engine.program import Program
-from ppafo.engine.rows import row_numbers
 from ppafo.metrics.gas import ENERGIES
-from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, WALK, MetricKind
+from ppafo.metrics.metric import MetricKind
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, ThermalState, TrueMasses
@@ -83,40 +81,35 @@ def thermal_totals(
 class TotalsKind(NamedTuple):
     """How the totals of a program's gas are made: the row, the function, and the groups that it takes after the state.
 
-    ``states`` are groups of states that it is given, ``parameters`` groups of parameters after those.
+    ``states`` are groups of states that it is given, ``parameters`` groups of parameters after those; ``missing`` are
+    channels that runs of such a gas have not.
     """
 
     row: type[Totals] | type[ThermalTotals]
     function: PlainFunction
     states: tuple[str, ...] = ()
     parameters: tuple[str, ...] = ()
+    missing: frozenset[str] = WITH_ENERGY_BALANCE
+
+
+_TOTALS: dict[type | None, TotalsKind] = {
+    None: TotalsKind(Totals, totals),
+    # Totals of a gas that is not ideal count true masses.
+    TrueMasses: TotalsKind(Totals, real_totals, ("masses",)),
+    ThermalState: TotalsKind(ThermalTotals, thermal_totals, ("masses",), ("plant", "thermal"), frozenset()),
+}
+"""Totals by the row in which a gas keeps what is no number of the plant's state."""
 
 
 def totals_kind(program: Program) -> TotalsKind:
     """How the totals of the gas of a program are made."""
-    if program.is_thermal:
-        return TotalsKind(
-            row=ThermalTotals, function=thermal_totals, states=("masses",), parameters=("plant", "thermal")
-        )
-    # Totals of a gas that is not ideal count true masses.
-    if program.has_true_masses:
-        return TotalsKind(row=Totals, function=real_totals, states=("masses",))
-    return TotalsKind(row=Totals, function=totals)
+    return _TOTALS[program.gas.STATES.get("masses")]
 
 
 def has_channels(program: Program, kind: MetricKind) -> bool:
     """True where runs of a program have the channels of a metric, and what else it needs."""
-    missing = frozenset() if program.is_thermal else WITH_ENERGY_BALANCE
-    # A walk follows no reference: what its controller wants in each phase of the gait is a number of its state.
-    has_reference = program.has_reference and not program.walks
-    has = {
-        WALK: program.walks,
-        STEADY: not program.takes_task_sequence,
-        LED_SHANK: program.is_on_gait,
-        REQUEST: REQUEST_ROW in row_numbers(program.state_rows()),
-    }
     return (
-        not missing.intersection(kind.channels)
-        and (not kind.of_reference or (has_reference and kind.of_reference == program.controlled))
-        and all(has[need] for need in kind.needs)
+        totals_kind(program).missing.isdisjoint(kind.channels)
+        and kind.of_reference in ("", program.followed)
+        and program.offers.issuperset(kind.needs)
     )

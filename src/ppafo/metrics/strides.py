@@ -8,10 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ppafo.metrics.metric import REQUEST, STEADY, WALK, Floats, MetricKind, ReadAt, Readings, less, time_if_any
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, time_if_any
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import HELPS, PUSH_OFF
-from ppafo.signals.meter import Course, MeterKind, Sample, StrideSample
+from ppafo.signals.meter import REQUESTED, STEADY, WALK, Course, MeterKind, Sample, StrideSample
 
 SETTLING = 2
 """First strides that are left out of averages: the controller learns the stride time in them."""
@@ -245,7 +245,7 @@ METRICS = (
         "RMS of requested torque less actuator torque in push-off",
         _push_off_error,
         STEADY,
-        REQUEST,
+        REQUESTED,
     ),
     _kind("strides", "-", "whole strides of the walk", ReadAt(("meters.strides.ended.whole",))),
     _kind(

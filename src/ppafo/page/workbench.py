@@ -2,12 +2,12 @@
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Protocol, final
 
 from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError, UnitError
@@ -23,9 +23,10 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.report.finding import LivePart
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import PAGE_LOOKS
-from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS
+from ppafo.simulation.declaration import OF_A_VANE, PRESSURE_WORDS, Declared
+from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.overrides import apply_overrides, is_of_device
-from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
+from ppafo.simulation.scenario import Scenario, vane_motion
 from ppafo.units import conversion, from_si, parse_quantity, to_si
 from ppafo.units.shown import shown_in
 from ppafo.version import __version__
@@ -54,12 +55,123 @@ _UNITS: dict[str, tuple[str, ...]] = {
 }
 """Units in which a person may type a value, beside the unit in which it is shown and that in SI."""
 _GAUGES = ("psi_g", "kPa_g", "bar_g", "Pa_g")
-_FIRST_STRIDE = "controller.first_stride_time"
-_WALKED = 6
-"""Length [s] of a walk in a page, unless somebody wants more: five strides."""
 _ABSOLUTE = ("largest_pressure",)
 """Metrics whose name says that a pressure is absolute."""
 _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
+
+
+_FIRST_STRIDE = "controller.first_stride_time"
+_WALKED = 6
+"""Length [s] of a walk in a page, unless somebody wants more: five strides."""
+
+
+class _ShownMotion(Protocol):
+    """What a page shows and asks of the scenarios of one layout."""
+
+    claims: ClassVar[str]
+    """Which claims of ``words.toml`` a page makes of it."""
+
+    def declared(self) -> Declared:
+        """Return what its file can hold."""
+
+    def look(self, scenario: Scenario, /) -> int:
+        """Return the number of its colour."""
+
+    def tab(self, scenario: Scenario, /) -> str:
+        """Return the title of the tab that it shares."""
+
+    def usual_changes(self, scenario: Scenario, /) -> dict[str, str]:
+        """Return the changes with which it begins, texts by key."""
+
+    def with_limits(self, entry: Mapping[str, Any], scenario: Scenario, /) -> dict[str, Any]:
+        """Return a setting with the limits that its file has and its program has not."""
+
+    def relations(self, keys: Collection[str], /) -> list[dict[str, Any]]:
+        """Return contradictions of settings that its file refuses and its program does not."""
+
+
+@final
+class _VaneAlone:
+    claims: ClassVar[str] = "claims"
+
+    def declared(self) -> Declared:
+        return OF_A_VANE
+
+    def look(self, scenario: Scenario) -> int:
+        return PAGE_LOOKS.get(scenario.device.valve.kind, 0)
+
+    def tab(self, scenario: Scenario) -> str:
+        motion = vane_motion(scenario)
+        if motion.profile is None:
+            return "Step response" if scenario.controller.is_open_loop else "Unconstrained vane"
+        return "Moving ankle" if motion.locked_angle is None else "Torque task"
+
+    def usual_changes(self, _scenario: Scenario) -> dict[str, str]:
+        return {}
+
+    def with_limits(self, entry: Mapping[str, Any], _scenario: Scenario) -> dict[str, Any]:
+        return dict(entry)
+
+    def relations(self, _keys: Collection[str]) -> list[dict[str, Any]]:
+        return []
+
+
+@final
+class _Walk:
+    claims: ClassVar[str] = "claims_of_walks"
+
+    def declared(self) -> Declared:
+        from ppafo.walking.declaration import OF_A_WALK
+
+        return OF_A_WALK
+
+    def look(self, _scenario: Scenario) -> int:
+        # With and without the device, a walk takes colours in their order, as its figures do.
+        return 0
+
+    def tab(self, _scenario: Scenario) -> str:
+        return "Walk"
+
+    def usual_changes(self, scenario: Scenario) -> dict[str, str]:
+        from ppafo.walking.motion import SHORTEST_STRIDES
+
+        # A walk is short here.
+        return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * scenario.motion.stride_time))} s"}
+
+    def with_limits(self, entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
+        from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES
+
+        stride = scenario.motion.stride_time
+        if entry["key"] == _FIRST_STRIDE:
+            return {**entry, "minimum": 0.5 * stride, "maximum": 2.0 * stride}
+        if entry["key"] == "run.duration":
+            limits = {"minimum": SHORTEST_STRIDES * stride, "maximum": 60.0 * LONGEST_MINUTES}
+            return {**entry, **limits, "is_minimum_allowed": True}
+        return dict(entry)
+
+    def relations(self, keys: Collection[str]) -> list[dict[str, Any]]:
+        from ppafo.walking.contradictions import COMPRESSION
+
+        above = (
+            ("controller.highest_pressure", "supply.pressure", COMPRESSION),
+            ("controller.highest_pressure", "supply.dorsiflexion_pressure", COMPRESSION),
+            ("controller.frozen_time", "controller.period", 2.0),
+            ("controller.fill_time", "valve.delay", 1.0),
+            ("controller.vent_time", "valve.delay", 1.0),
+        )
+        return [
+            {"key": key, "relation": "above", "other": other, "factor": factor, "slack": 0.0}
+            for key, other, factor in above
+            if {key, other} <= set(keys)
+        ]
+
+
+_SHOWN: Mapping[str, _ShownMotion] = {VANE: _VaneAlone(), WALK: _Walk()}
+
+
+def _motion(scenario: Scenario) -> _ShownMotion:
+    """Return what a page shows and asks of a scenario."""
+    return _SHOWN[scenario.motion.motion_kind.layout]
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,13 +191,9 @@ def program_content(simulated: Simulated, module: str, intervals: Mapping[str, I
         {setting["key"] for setting in described["settings"]},
     )
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
-    declared = OF_A_VANE
-    if described["kind"] == "walk":
-        from ppafo.walking.declaration import OF_A_WALK
-
-        declared = OF_A_WALK
+    shown = _motion(simulated.scenario)
     overridden = read_overrides(described["overrides"], ScenarioError)
-    changed = apply_overrides(described["document"], overridden, described["name"], declared)
+    changed = apply_overrides(described["document"], overridden, described["name"], shown.declared())
     document, own = changed.document, changed.device
     of_file = document.get("device", {}).get("overrides", ())
     overrides = list(over(of_file, map(str, own), valve=simulated.scenario.device.valve_name))
@@ -94,11 +202,10 @@ def program_content(simulated: Simulated, module: str, intervals: Mapping[str, I
         "name": described["name"],
         "kind": described["kind"],
         "label": simulated.label,
-        # With and without the device, a walk takes colours in their order, as its figures do.
-        "look": PAGE_LOOKS.get(simulated.scenario.device.valve.kind, 0) if not simulated.scenario.walks else 0,
+        "look": shown.look(simulated.scenario),
         "description": " ".join(described["title"].split()),
         "document": document,
-        "usual": usual_changes(simulated.scenario),
+        "usual": shown.usual_changes(simulated.scenario),
         "deviceSections": sorted(
             {entry["key"].partition(".")[0] for entry in described["settings"] if is_of_device(entry["key"])}
         ),
@@ -115,7 +222,7 @@ def program_content(simulated: Simulated, module: str, intervals: Mapping[str, I
             }
             for relation in described["relations"]
         ]
-        + _relations_of_files(described),
+        + shown.relations(keys),
         "channels": [_shown(entry) for entry in described["channels"] if entry["name"] != "time"],
         "metrics": [_shown(entry) for entry in described["metrics"]],
         # Only of an actuator that makes its torque of a pressure so.
@@ -133,55 +240,17 @@ _SUSTAINED = {
 """The settings of which the torques are made that the supplies sustain."""
 
 
-def usual_changes(scenario: Scenario) -> dict[str, str]:
-    """Return the changes that a configuration of a page begins with, texts by key: a walk is short."""
-    if not scenario.walks:
-        return {}
-    from ppafo.walking.motion import SHORTEST_STRIDES, walk_of
-
-    return {"run.duration": f"{max(_WALKED, math.ceil(SHORTEST_STRIDES * walk_of(scenario).gait.stride_time))} s"}
-
-
 def usual_values(scenario: Scenario) -> dict[str, float]:
-    """Return ``usual_changes`` as numbers in SI by key: all of them are times."""
-    return {key: parse_quantity(text, "s") for key, text in usual_changes(scenario).items()}
-
-
-def _relations_of_files(described: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Contradictions that the file of a walk refuses and its program does not."""
-    if described["kind"] != "walk":
-        return []
-    from ppafo.walking.contradictions import COMPRESSION
-
-    above = (
-        ("controller.highest_pressure", "supply.pressure", COMPRESSION),
-        ("controller.highest_pressure", "supply.dorsiflexion_pressure", COMPRESSION),
-        ("controller.frozen_time", "controller.period", 2.0),
-        ("controller.fill_time", "valve.delay", 1.0),
-        ("controller.vent_time", "valve.delay", 1.0),
-    )
-    keys = {entry["key"] for entry in described["settings"]}
-    return [
-        {"key": key, "relation": "above", "other": other, "factor": factor, "slack": 0.0}
-        for key, other, factor in above
-        if {key, other} <= keys
-    ]
+    """Return the changes with which a scenario begins as numbers in SI by key: all of them are times."""
+    return {key: parse_quantity(text, "s") for key, text in _motion(scenario).usual_changes(scenario).items()}
 
 
 def _as_in_files(entry: Mapping[str, Any], scenario: Scenario) -> dict[str, Any]:
-    """A setting with what only Python knows of a walk: its stride and length, and which pressures are absolute."""
-    if scenario.walks and entry["key"] in (_FIRST_STRIDE, "run.duration"):
-        from ppafo.walking.motion import LONGEST_MINUTES, SHORTEST_STRIDES, walk_of
-
-        stride = walk_of(scenario).gait.stride_time
-        if entry["key"] == _FIRST_STRIDE:
-            return {**entry, "minimum": 0.5 * stride, "maximum": 2.0 * stride}
-        shortest = SHORTEST_STRIDES * stride
-        return {**entry, "minimum": shortest, "maximum": 60.0 * LONGEST_MINUTES, "is_minimum_allowed": True}
+    """A setting with what only Python knows of it: its limits in a file, and which pressures are absolute."""
     display = entry["display"]
     if entry["group"] == "controller" and display["unit"].endswith("_g"):
         return {**entry, "display": {**display, "unit": f"{display['unit'][:-2]}_a", "zero": 0.0}}
-    return dict(entry)
+    return _motion(scenario).with_limits(entry, scenario)
 
 
 def page_content(
@@ -340,9 +409,6 @@ _LABELS = {
     "proportional": "Proportional valve",
     "off": "Without help",
 }
-_WALK = "Walk"
-_TASKS = {"locked": "Torque task", "prescribed": "Moving ankle", "free": "Unconstrained vane"}
-_STEP = "Step response"
 
 
 @checked("scenarios", "overrides")
@@ -475,7 +541,7 @@ def known_intervals() -> Mapping[str, Interval]:
 def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
     groups: dict[str, list[Simulated]] = {}
     for program in simulated:
-        groups.setdefault(_task(program.scenario), []).append(program)
+        groups.setdefault(_motion(program.scenario).tab(program.scenario), []).append(program)
     tabs = []
     for title, group in groups.items():
         alone = " ".join(group[0].scenario.description.split()).replace("psi_g", "psi") if len(group) == 1 else ""
@@ -486,21 +552,15 @@ def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
                 "title": title,
                 "summary": alone or _SUMMARIES.get(title, ""),
                 "programs": [program.scenario.name for program in group],
-                "start": [{"program": scenario.name, "changes": usual_changes(scenario)} for scenario in starts],
-                "claims": words()["claims_of_walks" if title == _WALK else "claims"],
+                "start": [
+                    {"program": scenario.name, "changes": _motion(scenario).usual_changes(scenario)}
+                    for scenario in starts
+                ],
+                "claims": words()[_motion(starts[0]).claims],
                 "questions": [{"text": question["text"], "changes": question["changes"]} for question in asked],
             }
         )
     return tabs
-
-
-def _task(scenario: Scenario) -> str:
-    if scenario.walks:
-        return _WALK
-    motion = vane_motion(scenario)
-    if isinstance(motion, FreeMotion):
-        return _STEP if scenario.controller.kind == "constant" else _TASKS["free"]
-    return _TASKS["locked" if motion.profile.kind == "constant" else "prescribed"]
 
 
 _SUMMARIES = {

@@ -1,6 +1,6 @@
 """From a device to the numbers that the plant and its effects compute with."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from types import SimpleNamespace
 from typing import Any, NamedTuple, cast
@@ -141,6 +141,21 @@ def settings_of(device: Device, effect: Effect, others: Sections = _NO_SECTIONS)
 def all_settings(device: Device) -> dict[str, dict[str, Any]]:
     """Return the settings [SI] of all effects of devices that are loaded, by name."""
     return {effect.name: settings_of(device, effect) for effect in _effects(device) if effect.is_of_device}
+
+
+def number_under(node: Any, attributes: Iterable[str]) -> Any:
+    """Return the number to which attributes lead from a device, or from what has one; it may be an array (runs,)."""
+    for name in attributes:
+        node = part_of(node, name)
+    return node
+
+
+def part_of(node: Any, name: str) -> Any:
+    """Return an attribute or entry of a part of a device, or of what has one."""
+    # A device has settings of the effects that its set names; those of all others are their defaults.
+    if name == SECTION and isinstance(node, Device):
+        return all_settings(node)
+    return node[name] if isinstance(node, Mapping) else getattr(node, name)
 
 
 def effects_of(device: Device, others: Sections = _NO_SECTIONS) -> tuple[Effect, ...]:

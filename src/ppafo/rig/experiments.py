@@ -313,7 +313,7 @@ def rig_run(scenario: Scenario, request: Request, highest_rate: float = math.inf
         sensors={name: sensor(preset, name, request.seed, times.size) for name in (*_SENSED, *_SUPPLIES)},
         sample_times=times,
         # A constant command is decided once.
-        control_period=2.0 * scenario.run.duration if scenario.controller.kind == "constant" else run.period,
+        control_period=2.0 * scenario.run.duration if scenario.controller.is_open_loop else run.period,
         command_delay=run.command_delay + preset.values["line.delay"],
         hysteresis=preset.values["valve.hysteresis"],
     )

@@ -8,6 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+WALK, STEADY, REQUESTED, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
+"""What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque; or a
+leg whose shank a gait leads."""
+
 
 class FootSample(NamedTuple):
     """A foot on the shank of a gait: its angle and the measured one over the horizontal [rad].

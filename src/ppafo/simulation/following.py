@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.plant import number_under
 from ppafo.simulation.declaration import SUPPLY_LINES, Reading, line_paths, value_at
-from ppafo.simulation.numbers import device_number_at
 
 if TYPE_CHECKING:
     from ppafo.model.regulator import SupplyLines
@@ -30,7 +30,7 @@ def read_followers(
 
     def number(path: str) -> float:
         known = settings if path in settings else present
-        return known[path] if path in known else device_number_at(device, path)
+        return known[path] if path in known else float(number_under(device, path.split(".")))
 
     for section, items in sections.items():
         for quantity in items:

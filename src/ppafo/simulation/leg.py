@@ -1,7 +1,9 @@
 """A foot on a shank that is led, without ground: what it adds to the plan of a vane and to what a run records."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from ppafo.engine.led_leg import GAIT_SHANK, LedLeg, shank_over_samples
 from ppafo.engine.over_samples import over_samples
 from ppafo.engine.run import Run
 from ppafo.model.columns import Problem
-from ppafo.model.gait import foot_in_gait
+from ppafo.model.gait import ShankSeries, foot_in_gait
 from ppafo.model.leg import FootLoad, torque_on_foot
 from ppafo.model.plant import PlantParameters
 from ppafo.simulation.motion_kind import Measured
@@ -22,6 +24,23 @@ from ppafo.simulation.plan import CarriedLeg, plan_vane
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 from ppafo.simulation.vane_recording import friction_sizes, measured
+
+
+def on_gait(leg: Leg, name: str, folder: Path) -> Leg:
+    """Return a leg whose shank and knee go as in a gait of a name, or of a file in a folder; DataError for none."""
+    from ppafo.gait import list_gaits, load_gait, series_of  # other shanks load none
+
+    gait = load_gait(name if name in list_gaits() else folder / name)
+    curves = ShankSeries(
+        frequency=1.0 / gait.stride_time,
+        start=leg.shank.start,
+        toe_lever=leg.toe_lever,
+        shank=series_of(gait, "shank_angle"),
+        ankle=series_of(gait, "ankle_angle"),
+        knee_forward=series_of(gait, "knee_forward"),
+        knee_up=series_of(gait, "knee_up"),
+    )
+    return replace(leg, gait=gait.name, curves=curves)
 
 
 def plan_leg(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:

@@ -4,14 +4,14 @@ Each kind declares what a file says of it, and how that is read and checked agai
 a run or an ensemble of such a motion needs is loaded when it is called.
 """
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
-from ppafo.control.kind import OPEN_LOOP, ControllerKind
+from ppafo.control.kind import ControllerKind
 from ppafo.errors import DataError, ScenarioError, one_line
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
@@ -32,7 +32,7 @@ from ppafo.simulation.declaration import (
     shank_settings,
     value_at,
 )
-from ppafo.simulation.motion_kind import Clock, Measured, MotionKind, MotionSection, ProfileTable, Seen
+from ppafo.simulation.motion_kind import VANE, Clock, Measured, MotionSection, ProfileTable, Seen
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.schema import profile_table, shank_table
@@ -46,63 +46,96 @@ if TYPE_CHECKING:
 _PROFILE, _SHANK = "motion.profile", "motion.shank"
 
 
-def quantities_of_vane(scenario: Scenario) -> dict[str, Quantity]:
-    """Return the declaration of every number of a scenario of a vane, by path."""
-    section = scenario.motion.motion_kind.section
-    profile = None if section is None or section.profile is None else getattr(scenario.motion, section.profile.name)
-    return _beside(scenario, motion_quantities(section, "" if profile is None else profile.kind))
+@dataclass(frozen=True, slots=True, eq=False)
+class VaneKind:
+    """A motion of a vane alone. What only its runs need is loaded when it is called.
 
+    Motions differ in what their file says, in how they are planned, and in what is recorded of them.
+    """
 
-def _beside(scenario: Scenario, of_motion: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Return the declaration of every number of a scenario, given those of its motion."""
-    document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
-    # A constant command follows no reference, whatever the scenario has in its place.
-    reference = {"kind": scenario.reference.kind, "of": scenario.controlled}
-    document |= {} if scenario.controller.kind == OPEN_LOOP else {"reference": reference}
-    document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
-    return quantities(document | ({} if scenario.supply_line is None else {SUPPLY_LINE: {}}), of_motion)
+    name: str
+    section: MotionSection
+    plan: "Callable[[Scenario], tuple[Run, tuple[Problem, ...]]]"
+    measured: "Callable[[Scenario, Run, Floats, Mapping[str, Floats]], Measured]"
+    places: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    layout: ClassVar[str] = VANE
+    command: ClassVar[str] = "simulate"
+    is_measured_at_once: ClassVar[bool] = False
+    reads_forces: ClassVar[bool] = False
+    is_repeated_for_its_error: ClassVar[bool] = True
 
+    def rules(self, scenario: Scenario) -> "tuple[Problem, ...]":
+        """Return which numbers contradict each other: the vane beyond a stop, a delay too long."""
+        from ppafo.simulation.ensemble.vane import rules
 
-def _noise(scenario: Scenario) -> Any:
-    return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
+        return rules(scenario)
 
+    def quantities(self, scenario: Scenario) -> dict[str, Quantity]:
+        """Return the declaration of every number of a scenario beside its device's, by path."""
+        profile = self.section.profile
+        kind = "" if profile is None else getattr(scenario.motion, profile.name).kind
+        of_motion = motion_quantities(self.section, kind)
+        # Numbers that are not where their path says come last, where those of a vane are listed.
+        elsewhere = {path: of_motion.pop(path) for path in self.places if path in of_motion}
+        document: dict[str, Any] = {"controller": {"kind": scenario.controller.kind}}
+        # A constant command follows no reference, whatever the scenario has in its place.
+        if self.follows_reference(scenario):
+            document["reference"] = {"kind": scenario.reference.kind, "of": scenario.controlled}
+        document |= {} if scenario.gas_model is None else {"gas_model": {"kind": THERMAL}}
+        document |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
+        return quantities(document, of_motion) | elsewhere
 
-def _switches(scenario: Scenario) -> tuple[Any, ...]:
-    return scenario.sensors.flaws
+    def clock(self, scenario: Scenario, times: Mapping[str, Any]) -> "tuple[Clock, tuple[Problem, ...]]":
+        """Return the clock with other times [s], by path, and what does not fit together."""
+        from ppafo.simulation.ensemble.vane import clock
+
+        return clock(scenario, times)
+
+    def switches(self, scenario: Scenario) -> tuple[Any, ...]:
+        """Return the flaws of the sensors, of which each is 0 for all runs of a program or for none."""
+        return scenario.sensors.flaws
+
+    def noise(self, scenario: Scenario) -> Any:
+        """Return the sum of all levels of noise."""
+        return scenario.sensors.angle_noise + scenario.sensors.pressure_noise
+
+    def law(self, scenario: Scenario) -> ControllerKind:
+        """Return the controller as it is in its catalogue."""
+        return CONTROLLERS[scenario.controller.kind]
+
+    def sees(self, scenario: Scenario) -> Seen:
+        """Return how the controller sees what it controls, with the foot of a leg or without."""
+        from ppafo.simulation.torque_loop import seen_in_scenario
+
+        return seen_in_scenario(scenario.controlled, vane_motion(scenario).leg is not None)
+
+    def follows_reference(self, scenario: Scenario) -> bool:
+        """Tell whether there is a law that follows the reference, and not a constant command."""
+        return not scenario.controller.is_open_loop
+
+    def asks_gradually(self, law: ControllerKind) -> bool:
+        """Tell whether a law asks for openings between shut and open to follow a reference."""
+        return law.needs_reference and not law.only_switches
+
+    def lacks(self, scenario: Scenario, metric: "MetricKind") -> str:
+        """Return why a scenario has not what a metric needs, an empty text where it has it."""
+        from ppafo.simulation.ensemble.vane import lacks
+
+        return lacks(scenario, metric)
+
+    def python_call(self, name: str, overrides: str) -> str:
+        """Return the call of Python that runs a scenario of a name with overrides, which are quoted texts."""
+        return f"ppafo.simulate({name!r}, [{overrides}])"
+
+    def further_command(self, _file: str) -> str:
+        """Return an empty text: a run says all of a vane alone."""
+        return ""
 
 
 def _plan(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
     from ppafo.simulation.plan import plan_vane
 
     return plan_vane(scenario)
-
-
-def _rules(scenario: Scenario) -> "tuple[Problem, ...]":
-    from ppafo.simulation.ensemble.vane import rules
-
-    return rules(scenario)
-
-
-def _clock(scenario: Scenario, times: Mapping[str, Any]) -> "tuple[Clock, tuple[Problem, ...]]":
-    from ppafo.simulation.ensemble.vane import clock
-
-    return clock(scenario, times)
-
-
-def _law(scenario: Scenario) -> ControllerKind:
-    return CONTROLLERS[scenario.controller.kind]
-
-
-def _sees(scenario: Scenario) -> "Seen":
-    from ppafo.simulation.torque_loop import seen_in_scenario
-
-    return seen_in_scenario(scenario.controlled, vane_motion(scenario).leg is not None)
-
-
-def _lacks(scenario: Scenario, kind: "MetricKind") -> str:
-    from ppafo.simulation.ensemble.vane import lacks
-
-    return lacks(scenario, kind)
 
 
 def _measured_free(scenario: Scenario, run: "Run", times: "Floats", rows: "Mapping[str, Floats]") -> Measured:
@@ -131,40 +164,25 @@ def _read_free(reading: Reading, device: Device, _duration: float, _step: float,
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
 
 
-FREE_MOTION = MotionKind(
+FREE_MOTION = VaneKind(
     name="free",
-    plan=_plan,
-    rules=_rules,
-    quantities=quantities_of_vane,
-    places={},
-    clock=_clock,
-    switches=_switches,
-    noise=_noise,
-    law=_law,
-    sees=_sees,
-    lacks=_lacks,
-    measured=_measured_free,
     section=MotionSection("the vane moves as the torques demand", FREE, _read_free),
+    plan=_plan,
+    measured=_measured_free,
 )
 """Equation (1), with a constant external torque."""
-
-
-def _quantities_of_locked(scenario: Scenario) -> dict[str, Quantity]:
-    # The angle comes last, where numbers of a locked vane are listed.
-    return _beside(scenario, {}) | {LOCKED_ANGLE: ANGLE}
 
 
 def _read_locked(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> PrescribedMotion:
     return PrescribedMotion(ProfileChoice("constant", {"level": _read_angle(reading, device)}), "locked")
 
 
-LOCKED_MOTION = replace(
-    FREE_MOTION,
+LOCKED_MOTION = VaneKind(
     name="locked",
-    quantities=_quantities_of_locked,
-    places={LOCKED_ANGLE: ("motion", "profile", "level")},
-    measured=_measured_prescribed,
     section=MotionSection("the vane stays at one angle", (ANGLE,), _read_locked),
+    plan=_plan,
+    measured=_measured_prescribed,
+    places={LOCKED_ANGLE: ("motion", "profile", "level")},
 )
 """A vane on a test bench that is clamped: its profile is constant."""
 
@@ -177,10 +195,8 @@ def _read_prescribed(reading: Reading, device: Device, duration: float, step: fl
     return PrescribedMotion(profile)
 
 
-PRESCRIBED_MOTION = replace(
-    FREE_MOTION,
+PRESCRIBED_MOTION = VaneKind(
     name="prescribed",
-    measured=_measured_prescribed,
     section=MotionSection(
         "the angle of the vane is a given function of time",
         (),
@@ -192,6 +208,8 @@ PRESCRIBED_MOTION = replace(
             partial(profile_table, ANGLE_LEVEL, "Angle"),
         ),
     ),
+    plan=_plan,
+    measured=_measured_prescribed,
 )
 """The ankle goes along a profile whatever the device does."""
 
@@ -211,24 +229,14 @@ def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, 
             )
         return FreeMotion(*start, leg=Leg(**numbers, shank=shank))
     # A vane alone, or on a shank at rest, loads no gaits.
-    from ppafo.gait import list_gaits, load_gait, series_of
-    from ppafo.model.gait import ShankSeries
+    from ppafo.simulation.leg import on_gait
 
     name = str(value_at(reading.document, f"{_SHANK}.gait"))
     try:
-        gait = load_gait(name if name in list_gaits() else folder / name)
+        leg = on_gait(Leg(**numbers, shank=shank), name, folder)
     except DataError as error:
         raise reading.refusal(f"{_SHANK}.gait", one_line(error)) from error
-    series = ShankSeries(
-        frequency=1.0 / gait.stride_time,
-        start=shank.start,
-        toe_lever=numbers["toe_lever"],
-        shank=series_of(gait, "shank_angle"),
-        ankle=series_of(gait, "ankle_angle"),
-        knee_forward=series_of(gait, "knee_forward"),
-        knee_up=series_of(gait, "knee_up"),
-    )
-    return FreeMotion(*start, leg=Leg(**numbers, shank=shank, gait=gait.name, curves=series))
+    return FreeMotion(*start, leg=leg)
 
 
 def _plan_leg(scenario: Scenario) -> "tuple[Run, tuple[Problem, ...]]":
@@ -243,11 +251,8 @@ def _measured_leg(scenario: Scenario, run: "Run", times: "Floats", rows: "Mappin
     return measured_leg(scenario, run, times, rows)
 
 
-LEG_MOTION = replace(
-    FREE_MOTION,
+LEG_MOTION = VaneKind(
     name="leg",
-    plan=_plan_leg,
-    measured=_measured_leg,
     section=MotionSection(
         "the vane moves a foot that is free, on a shank that is led",
         LEG,
@@ -260,5 +265,7 @@ LEG_MOTION = replace(
             {GAIT_SHANK: ("gait",)},
         ),
     ),
+    plan=_plan_leg,
+    measured=_measured_leg,
 )
 """Equation (11), without ground."""

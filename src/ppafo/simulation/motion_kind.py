@@ -6,7 +6,7 @@ A kind is loaded when a document or a scenario names it: a vane alone loads no w
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 from ppafo.kinds import Kinds, declared_kinds
 from ppafo.model.declaration import PlainFunction, Quantity
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ppafo.parameters.device import Device
     from ppafo.signals.recording import Recording
 
-ScenarioType = TypeVar("ScenarioType")
+ScenarioType_contra = TypeVar("ScenarioType_contra", contravariant=True)
 """A scenario, which has a motion and is defined above it."""
 
 
@@ -46,41 +46,89 @@ class Seen(NamedTuple):
     turning: PlainFunction | None = None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class MotionKind(Generic[ScenarioType]):
-    """What a motion brings to the runs of its scenarios, as functions of the scenario.
-
-    ``plan`` gives the run and what may be wrong with it, as ``plan_runs`` does; ``rules`` which numbers contradict each
-    other. Any number may be an array (runs,) in both. ``quantities`` declares the numbers of the scenario beside those
-    of its device, ``places`` says by path which attributes lead to those that are not where their path says.
-    ``clock(scenario, times)`` gives the clock with other times [s], which may be arrays too, and what is wrong with it.
-    ``switches`` are settings that are 0 for all runs of a program or for none, ``noise`` is the sum of all levels of
-    noise that its controller receives, ``law`` that controller with what the motion adds to it, and ``sees`` how it
-    sees what it controls. ``lacks(scenario, metric)`` says why it has not what a metric needs, an empty text where it
-    has it. ``measured(scenario, run, times, rows)`` gives
-    recording and metrics of rows (samples,) by path, and how a run that was completed ended, in words.
-
-    ``section`` is what the file of a vane alone has as ``[motion]``, None of a walk, whose file is laid out in another
-    way.
-    """
-
-    name: str
-    plan: "Callable[[ScenarioType], tuple[Run, tuple[Problem, ...]]]"
-    rules: "Callable[[ScenarioType], tuple[Problem, ...]]"
-    quantities: Callable[[ScenarioType], dict[str, Quantity]]
-    places: Mapping[str, tuple[str, ...]]
-    clock: "Callable[[ScenarioType, Mapping[str, Any]], tuple[Clock, tuple[Problem, ...]]]"
-    switches: Callable[[ScenarioType], tuple[Any, ...]]
-    noise: Callable[[ScenarioType], Any]
-    law: "Callable[[ScenarioType], ControllerKind]"
-    sees: Callable[[ScenarioType], Seen]
-    lacks: "Callable[[ScenarioType, MetricKind], str]"
-    measured: "Callable[[ScenarioType, Run, Floats, Mapping[str, Floats]], Measured]"
-    section: "MotionSection | None" = None
-
-
 Measured = tuple["Recording", Mapping[str, "Metric"], str]
 """Recording and metrics of a run, and how it ended if it was completed, in words."""
+
+
+@runtime_checkable
+class MotionKind(Protocol[ScenarioType_contra]):
+    """What a motion brings to the runs of its scenarios. Any number of a scenario may be an array (runs,)."""
+
+    @property
+    def name(self) -> str:
+        """Name under which its catalogue has it."""
+
+    @property
+    def section(self) -> "MotionSection | None":
+        """What the file of a vane alone has as ``[motion]``; None in the layout of a walk."""
+
+    @property
+    def layout(self) -> str:
+        """Layout of its files, libraries and pages: ``vane`` or ``walk``."""
+
+    @property
+    def places(self) -> Mapping[str, tuple[str, ...]]:
+        """Attributes that lead to the numbers that are not where their path says, by path."""
+
+    @property
+    def command(self) -> str:
+        """Word behind ``ppafo`` on the command line that shows what a scenario comes to."""
+
+    @property
+    def is_measured_at_once(self) -> bool:
+        """True where the status of a run says what was measured, so that it cannot wait until somebody asks."""
+
+    @property
+    def reads_forces(self) -> bool:
+        """True where a controller reads the forces under the foot beside the angle and the pressures."""
+
+    @property
+    def is_repeated_for_its_error(self) -> bool:
+        """True where a run is so short that a second one tells the error of the first without being asked for."""
+
+    def plan(self, scenario: ScenarioType_contra, /) -> "tuple[Run, tuple[Problem, ...]]":
+        """Return the run and what may be wrong with it, as ``plan_runs`` does."""
+
+    def rules(self, scenario: ScenarioType_contra, /) -> "tuple[Problem, ...]":
+        """Return which numbers contradict each other."""
+
+    def quantities(self, scenario: ScenarioType_contra, /) -> dict[str, Quantity]:
+        """Return the declaration of the numbers of a scenario beside those of its device, by path."""
+
+    def clock(self, scenario: ScenarioType_contra, times: Mapping[str, Any], /) -> "tuple[Clock, tuple[Problem, ...]]":
+        """Return the clock with other times [s], by path, and what is wrong with it."""
+
+    def switches(self, scenario: ScenarioType_contra, /) -> tuple[Any, ...]:
+        """Return settings that are 0 for all runs of a program or for none."""
+
+    def noise(self, scenario: ScenarioType_contra, /) -> Any:
+        """Return the sum of all levels of noise that the controller receives."""
+
+    def law(self, scenario: ScenarioType_contra, /) -> "ControllerKind":
+        """Return the controller with what the motion adds to it."""
+
+    def sees(self, scenario: ScenarioType_contra, /) -> Seen:
+        """Return how the controller sees what it controls."""
+
+    def follows_reference(self, scenario: ScenarioType_contra, /) -> bool:
+        """Tell whether the controller follows the reference of the scenario, and none that it makes itself."""
+
+    def asks_gradually(self, law: "ControllerKind", /) -> bool:
+        """Tell whether a law asks for openings between shut and open to follow what it wants."""
+
+    def lacks(self, scenario: ScenarioType_contra, metric: "MetricKind", /) -> str:
+        """Return why a scenario has not what a metric needs, an empty text where it has it."""
+
+    def python_call(self, name: str, overrides: str, /) -> str:
+        """Return the call of Python that shows a scenario of a name with overrides, which are quoted texts."""
+
+    def further_command(self, file: str, /) -> str:
+        """Return which command says more of a scenario than a run, in one line; an empty text where none does."""
+
+    def measured(
+        self, scenario: ScenarioType_contra, run: "Run", times: "Floats", rows: "Mapping[str, Floats]", /
+    ) -> Measured:
+        """Return what a run came to, from its rows (samples,) by path at times [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,8 +160,8 @@ class ProfileTable:
     own: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-WALK = "walk"
-"""The motion of a leg that a gait leads."""
+VANE, WALK = "vane", "walk"
+"""The layouts of a vane alone, and of a leg that a gait leads; the motion of that has the same name."""
 
 VANE_MOTIONS = ("free", "locked", "prescribed", "leg")
 """Motions of a vane alone that this package has."""
@@ -126,4 +174,4 @@ MOTIONS: Kinds[MotionKind[Any]] = Kinds(_GROUP, "motion", MotionKind, declared_k
 def is_walk(name: str) -> bool:
     """Tell whether a kind of motion is a walk; KindError where the kind cannot be used."""
     kind = MOTIONS.get(name)
-    return kind is not None and kind.section is None
+    return kind is not None and kind.layout == WALK

@@ -5,15 +5,15 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ppafo.model.catalog import VALVES, device_effects
-from ppafo.model.declaration import Quantity, held_in
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
-from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path
-from ppafo.parameters.plant import all_settings
+from ppafo.parameters.plant import number_under, part_of
 from ppafo.simulation.declaration import LOCKED_ANGLE
-from ppafo.simulation.scenario import Scenario, vane_motion
+from ppafo.simulation.scenario import Scenario
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
@@ -42,11 +42,6 @@ def device_numbers(device: Device) -> dict[str, Quantity]:
     ]
     declared += [("valve", quantity) for quantity in (*ORIFICE, *VALVES[device.valve.kind].quantities)]
     return {f"{section}.{quantity.name}": quantity for section, quantity in declared}
-
-
-def device_number_at(device: Device, path: str) -> float:
-    """Return the number at a path of ``device_numbers``, in SI units; not of the form in which an orifice is not."""
-    return float(_number(device, tuple(path.split("."))))
 
 
 def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
@@ -92,27 +87,13 @@ def links_that_hold(scenario: Scenario) -> Graph:
 def _numbers_of_graph(scenario: Scenario) -> dict[str, Any]:
     """Return the numbers that links of a scenario name, by path; of an orifice the form that it has."""
     absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)}
-    return {
-        path: _number(scenario, _attributes(path, scenario)) for path in paths_in(scenario.graph) if path not in absent
-    }
+    present = (path for path in paths_in(scenario.graph) if path not in absent)
+    return {path: number_under(scenario, _attributes(path, scenario)) for path in present}
 
 
 def number_at(scenario: Scenario, path: str) -> float:
     """Return the number at a path of ``declared_numbers`` that is not in ``TIMES``, in SI units."""
-    return float(_number(scenario, _attributes(chosen_path(path, scenario), scenario)))
-
-
-def _number(node: Any, attributes: tuple[str, ...]) -> Any:
-    for name in attributes:
-        node = _inner(node, name)
-    return node
-
-
-def _inner(node: Any, name: str) -> Any:
-    # A device has settings of the effects that its set names; those of all others are their defaults.
-    if name == EFFECT_SETTINGS and isinstance(node, Device):
-        return all_settings(node)
-    return node[name] if isinstance(node, Mapping) else getattr(node, name)
+    return float(number_under(scenario, _attributes(chosen_path(path, scenario), scenario)))
 
 
 def other_form(device: Device, section: str) -> tuple[str, ...]:
@@ -132,7 +113,7 @@ def _changing_form(scenario: Scenario, paths: Collection[str]) -> list[str]:
 
 def path_of_locked_angle(scenario: Scenario) -> str | None:
     """Return the path of the angle at which a vane stays, None where it moves."""
-    if scenario.walks or vane_motion(scenario).locked_angle is None:
+    if scenario.motion.locked_angle is None:
         return None
     return LOCKED_ANGLE if LOCKED_ANGLE in scenario.motion.motion_kind.places else "motion.profile.level"
 
@@ -148,7 +129,7 @@ def _attributes(path: str, scenario: Scenario) -> tuple[str, ...]:
 
 def _replace_number(node: Any, attributes: tuple[str, ...], number: Any) -> Any:
     name, inside = attributes[0], attributes[1:]
-    inner = _replace_number(_inner(node, name), inside, number) if inside else number
+    inner = _replace_number(part_of(node, name), inside, number) if inside else number
     if isinstance(node, Mapping):
         return {**node, name: inner}
     if any(field.name == name for field in fields(node)):

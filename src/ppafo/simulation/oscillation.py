@@ -22,7 +22,7 @@ from ppafo.report.display_units import metric_change
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
 from ppafo.units.shown import in_units, units_in_force
 
@@ -147,7 +147,7 @@ def _terms(scenario: Scenario, law: ControllerKind) -> dict[str, Term]:
 
 def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     """Return the gains of a scenario's torque law in force; None for a law that has none."""
-    if scenario.controller.kind == PYTHON_CONTROLLER:
+    if scenario.controller.is_outside:
         return None
     items = [quantity for quantity in settings_of(scenario, law) if _OF_LOOP.intersection(quantity.follows)]
     if not items:
@@ -167,19 +167,13 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit)
 
 
-def asks_gradually(scenario: Scenario, law: ControllerKind) -> bool:
-    """Return whether a law asks for openings between shut and open to follow a torque, so that it should not turn."""
-    is_outside = scenario.controller.kind == PYTHON_CONTROLLER
-    wants = hasattr(law.initial, "request") if scenario.walks else law.needs_reference
-    return not is_outside and wants and not law.only_switches
-
-
 def most_reversals(scenario: Scenario, law: ControllerKind, duration: float, stride_time: float = 0.0) -> float:
     """Return the reversals of the command in a time [s] above which a loop oscillates; infinite for one that may.
 
     ``stride_time`` [s] is how long a stride of a walk lasts.
     """
-    if not asks_gradually(scenario, law):
+    # A law that asks for openings between shut and open should not turn.
+    if scenario.controller.is_outside or not scenario.motion.motion_kind.asks_gradually(law):
         return math.inf
     return duration * (MOST_PER_STRIDE / stride_time if stride_time > 0.0 else MOST_PER_SECOND)
 
@@ -190,7 +184,7 @@ def oscillation_in(result: "Recorded") -> Oscillation | None:
     if law is None:
         return None
     metrics, time = {name: metric.value for name, metric in result.metrics.items()}, result.recording.time
-    strides = metrics.get("strides", 0.0) if scenario.walks else 0.0
+    strides = metrics.get("strides", 0.0)
     stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
     return oscillation_of(scenario, law, result.recording, metrics, stride_time)
 
@@ -207,7 +201,7 @@ def oscillation_of(
     reversals, duration = metrics.get(REVERSALS, 0.0), float(np.ptp(recording.time[[0, -1]]))
     if not has_reference(recording) or reversals <= most_reversals(scenario, law, duration, stride_time):
         return None
-    asked = asked_samples(recording) if scenario.walks else np.ones(len(recording), dtype=np.bool_)
+    asked = asked_samples(recording)
     reference, value = (series[asked] for series in followed(recording))
     unlike = _unlike(scenario, law)
     # With the device's gains a command that turns there comes from what presses the joint, and no gain would help.

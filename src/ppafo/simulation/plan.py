@@ -52,13 +52,7 @@ from ppafo.parameters.plant import (
     valve_settings,
 )
 from ppafo.simulation.profiles import profile_bounds, profile_parameters
-from ppafo.simulation.scenario import (
-    PYTHON_CONTROLLER,
-    GasModel,
-    ProfileChoice,
-    Scenario,
-    vane_motion,
-)
+from ppafo.simulation.scenario import GasModel, ProfileChoice, Scenario, vane_motion
 
 if TYPE_CHECKING:
     from ppafo.engine.led_leg import LedLeg
@@ -284,7 +278,7 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     device, motion, control = scenario.device, vane_motion(scenario), scenario.controller
     plant = plant_parameters(device, motion.outside_torque)
     # The command of a Python object comes from outside the lanes.
-    law = None if control.kind == PYTHON_CONTROLLER else CONTROLLERS[control.kind]
+    law = None if control.is_outside else CONTROLLERS[control.kind]
     numbers: Mapping[str, Any] = control.settings
     problems: tuple[Problem, ...] = ()
     # A fixed-point controller has integers, which follow from its gains, its period and the range of its reference.
@@ -327,13 +321,13 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     is_alone = scenario.supply_lines is None and not model.gives
     angle = vane_motion(scenario).locked_angle if is_alone else None
     if angle is not None:
-        # The pressure of gas with an energy balance follows faster, by its heat capacity ratio.
-        stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
         # A stricter tolerance counts as a longer step; a looser one as the default.
         step = counts.step / smaller(1.0, tolerance)
         held = smaller(larger(angle, plant.angle_min), plant.angle_max)
         room = plant.atmospheric_pressure
-        needs_parts = np.logical_not(is_slow(plant, step, *volumes_of(model, plant, held, room, room), stiffness))
+        needs_parts = np.logical_not(
+            is_slow(plant, step, *volumes_of(model, plant, held, room, room), scenario.stiffness)
+        )
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),

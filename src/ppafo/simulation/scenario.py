@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Protocol
 
-from ppafo.control.kind import PythonController
+from ppafo.control.kind import OPEN_LOOP, PythonController
 from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import Number, held
-from ppafo.parameters.device import Device, Supply
+from ppafo.model.declaration import Number
+from ppafo.parameters.device import Device, Supply, held
 from ppafo.parameters.graph import Graph, outside
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
 
@@ -85,6 +85,7 @@ class FreeMotion:
     leg: Leg | None = None
     profile: ClassVar[None] = None
     locked_angle: ClassVar[None] = None
+    stride_time: ClassVar[float] = 0.0
     HELD: ClassVar[tuple[str, ...]] = ("leg",)
 
     def __getattr__(self, name: str) -> Any:
@@ -100,6 +101,13 @@ class FreeMotion:
     def outside_torque(self) -> Any:
         """Constant torque [N m] against plantarflexion beside a leg, which T_2 of equation (11) does below 0."""
         return self.external_torque if self.leg is None else -self.leg.ankle_torque
+
+    @property
+    def form(self) -> str:
+        """What no number of it changes, in words."""
+        return (
+            "free" if self.leg is None else f"free with the foot of a leg, whose shank is led, `{self.leg.shank.kind}`"
+        )
 
     @property
     def label(self) -> str:
@@ -126,6 +134,7 @@ class PrescribedMotion:
     kind: str = "prescribed"
     leg: ClassVar[None] = None
     outside_torque: ClassVar[float] = 0.0
+    stride_time: ClassVar[float] = 0.0
 
     @property
     def motion_kind(self) -> "MotionKind[Scenario]":
@@ -136,6 +145,11 @@ class PrescribedMotion:
     def locked_angle(self) -> Any:
         """The angle [rad] at which the vane stays, None where it moves."""
         return self.profile.level if self.profile.kind == "constant" else None
+
+    @property
+    def form(self) -> str:
+        """What no number of it changes, in words."""
+        return f"prescribed, `{self.profile.kind}`"
 
     @property
     def label(self) -> str:
@@ -156,6 +170,14 @@ class Motion(Protocol):
     @property
     def label(self) -> str:
         """The motion in a few words."""
+
+    @property
+    def locked_angle(self) -> Any:
+        """The angle [rad] at which a vane stays, None where it moves."""
+
+    @property
+    def stride_time(self) -> float:
+        """Time of a stride [s], 0 without strides."""
 
 
 VaneMotion = FreeMotion | PrescribedMotion
@@ -277,6 +299,16 @@ class Control:
     custom: PythonController | None = None
     HELD: ClassVar[tuple[str, ...]] = ("settings",)
 
+    @property
+    def is_open_loop(self) -> bool:
+        """True for a constant command, which follows no reference and reads no sensor."""
+        return self.kind == OPEN_LOOP
+
+    @property
+    def is_outside(self) -> bool:
+        """True where a Python object decides, or whoever hands the command in."""
+        return self.kind == PYTHON_CONTROLLER
+
     def __getattr__(self, name: str) -> Any:
         """Return a setting by its name."""
         return held(self, name)
@@ -346,14 +378,19 @@ class Scenario:
         return None if self.supply_line is None else self.supply_line.row(self.device.supply)
 
     @property
-    def walks(self) -> bool:
-        """True where a leg walks with the device, false for a vane alone."""
-        return self.motion.motion_kind.section is None
-
-    @property
     def law(self) -> "ControllerKind | None":
         """The controller with what the motion adds to it; None for a Python object."""
-        return None if self.controller.kind == PYTHON_CONTROLLER else self.motion.motion_kind.law(self)
+        return None if self.controller.is_outside else self.motion.motion_kind.law(self)
+
+    @property
+    def stiffness(self) -> Any:
+        """By how much faster the pressure of its gas follows than at one temperature [-]: its heat capacity ratio."""
+        return 1.0 if self.gas_model is None else self.device.gas.heat_capacity_ratio
+
+    @property
+    def follows_reference(self) -> bool:
+        """True where the controller follows the reference: no constant command, nor a walk, which makes its own."""
+        return self.motion.motion_kind.follows_reference(self)
 
     @property
     def graph(self) -> Graph:

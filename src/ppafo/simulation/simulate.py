@@ -248,8 +248,7 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     kept = times.size if status.time is None else max(1, int(np.searchsorted(times, status.time)))
     versions = {"ppafo": __version__, "python": platform.python_version(), "numpy": np.__version__}
     engine = {"step": run.step, "steps": run.step_count, "steps_per_sample": run.steps_per_sample}
-    if scenario.walks:
-        # A walk is measured at once, for its status says how it ended.
+    if scenario.motion.motion_kind.is_measured_at_once:
         measured = _measured(scenario, run, times[:kept], record[:kept], rows)
         if status.is_completed:
             status = replace(status, message=measured.ended)

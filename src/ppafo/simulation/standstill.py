@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.control.angle_loop import ANGLE_STIFFNESS
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.metric import extent, followed, has_reference
+from ppafo.metrics.metric import extent, followed
 from ppafo.model.controlled import ANGLE, CONTROLLED
 from ppafo.report.display_units import metric_change
 from ppafo.signals import Recording
@@ -45,7 +45,7 @@ class Standstill:
 @in_units(lambda scenario, *_: scenario.device.shown)
 def standstill_of(scenario: Scenario, law: ControllerKind, recording: Recording) -> Standstill | None:
     """Return the verdict on a run; None where its loop moves, or where it wants nothing else than it has."""
-    if scenario.walks or not has_reference(recording):
+    if not scenario.follows_reference:
         return None
     wanted, moved = extent(recording), float(np.ptp(followed(recording)[1]))
     if wanted <= LEAST_WAY * CONTROLLED[scenario.controlled].size or moved > LEAST_SHARE * wanted:

@@ -17,7 +17,7 @@ from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import Number, PlainFunction
+from ppafo.model.declaration import Number, PlainFunction, row_with
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
@@ -53,6 +53,15 @@ _Hertz = Annotated[float, Number("Hz", "")]
 _Inertia = Annotated[float, Number("kg m^2", "")]
 _Torque = Annotated[float, Number("N m", "")]
 _Damping = Annotated[float, Number("N m s/rad", "")]
+_Mass = Annotated[float, Number("kg", "")]
+_Length = Annotated[float, Number("m", "")]
+
+
+class SignalsOfWalk(NamedTuple):
+    """Sample period [s] and bandwidth of the pressure sensors [Hz] of a walk, whose measurements are not old."""
+
+    period: _Seconds
+    bandwidth: _Hertz
 
 
 class Signals(NamedTuple):
@@ -63,40 +72,11 @@ class Signals(NamedTuple):
     delay: _Seconds
 
 
-class SignalsOfWalk(NamedTuple):
-    """Sample period [s] and bandwidth of the pressure sensors [Hz] of a walk, whose measurements are not old."""
-
-    period: _Seconds
-    bandwidth: _Hertz
-
-
-class OfJoint(NamedTuple):
-    """Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
-
-    period: _Seconds
-    bandwidth: _Hertz
-    delay: _Seconds
-    angle_bandwidth: _Hertz
-    inertia: _Inertia
-    gravity_torque: _Torque
-    viscous_damping: _Damping
-    dynamic_torque: _Torque
-
-
-class OfLeg(NamedTuple):
-    """Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
-
-    period: _Seconds
-    bandwidth: _Hertz
-    delay: _Seconds
-    angle_bandwidth: _Hertz
-    inertia: _Inertia
-    gravity_torque: _Torque
-    viscous_damping: _Damping
-    dynamic_torque: _Torque
-    foot_mass: Annotated[float, Number("kg", "")]
-    foot_mass_centre: Annotated[float, Number("m", "")]
-    foot_inertia: _Inertia
+_Joint = {"inertia": _Inertia, "gravity_torque": _Torque, "viscous_damping": _Damping, "dynamic_torque": _Torque}
+OfJoint: Any = row_with("OfJoint", Signals, angle_bandwidth=_Hertz, **_Joint)
+"""Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
+OfLeg: Any = row_with("OfLeg", OfJoint, foot_mass=_Mass, foot_mass_centre=_Length, foot_inertia=_Inertia)
+"""Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
 
 
 def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
@@ -205,12 +185,12 @@ def time_with_angle(signals: Any) -> float:
     return age + late
 
 
-def turning_alone(signals: OfJoint) -> tuple[float, float]:
+def turning_alone(signals: Any) -> tuple[float, float]:
     """Inertia [kg m^2] and largest gravity torque [N m] of what the actuator moves."""
     return signals.inertia, signals.gravity_torque
 
 
-def turning_with_foot(signals: OfLeg) -> tuple[float, float]:
+def turning_with_foot(signals: Any) -> tuple[float, float]:
     """Inertia [kg m^2] and largest gravity torque [N m] of actuator and foot about the ankle."""
     moment = signals.foot_mass * signals.foot_mass_centre
     inertia = signals.inertia + signals.foot_inertia + moment * signals.foot_mass_centre

@@ -4,7 +4,6 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.lanes import Floats
 from ppafo.engine.linking import place_over_samples
 from ppafo.engine.over_samples import over_samples
@@ -77,7 +76,7 @@ def measured(
         "mass_1": (rows["state.mass_1"], "kg"),
         "mass_2": (rows["state.mass_2"], "kg"),
     }
-    if scenario.controller.kind != OPEN_LOOP:
+    if scenario.follows_reference:
         # Times of the first samples [s], shape (count,), rounded as the engine does, so that a reference has its bits.
         steps = np.arange(times.size, dtype=np.float64) * run.record_every
         whole = np.round(steps)
@@ -106,9 +105,9 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
         line_1, line_2 = line_pressures(run.lines.parameters, run.plant.gas_product, lines)
         channels |= {"line_pressure_1": (np.asarray(line_1), "Pa"), "line_pressure_2": (np.asarray(line_2), "Pa")}
         channels["regulated_mass"] = (np.asarray(lines.regulated_mass), "kg")
-    if run.program.has_true_masses:
+    if "masses.mass_1" in rows:
         channels |= {name: (rows[f"masses.{name}"], "kg") for name in ("mass_1", "mass_2")}
-    if not run.program.is_thermal:
+    if "masses.gas_work" not in rows:
         return channels
     for chamber in (1, 2):
         # The state has the mass that would have this pressure at the temperature of the room.

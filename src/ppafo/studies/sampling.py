@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
 from ppafo.studies.study import Drawn, Sample
@@ -156,7 +155,7 @@ def with_noise(
     ``paths`` are all that vary; a seed among them is left as it is.
     """
     # An open-loop controller uses no sensor; levels may be arrays (runs,).
-    closed = [scenario for scenario in scenarios if scenario.controller.kind != OPEN_LOOP]
+    closed = [scenario for scenario in scenarios if not scenario.controller.is_open_loop]
     is_noisy = bool(closed) and any(path in _NOISE_LEVELS for path in paths)
     for scenario in closed:
         level = scenario.motion.motion_kind.noise(scenario)

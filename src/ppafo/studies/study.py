@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.channels import TRACED
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
@@ -51,7 +50,7 @@ def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> O
     channels = (*outputs.trajectories, *outputs.bands)
     references = {kind.reference: name for name, kind in CONTROLLED.items()}
     for channel in channels:
-        if channel in references and all(scenario.controller.kind == OPEN_LOOP for scenario in scenarios):
+        if channel in references and all(scenario.controller.is_open_loop for scenario in scenarios):
             raise StudyError(f"outputs: '{channel}' needs a reference, and the controllers here follow none")
         if channel in references and all(scenario.controlled != references[channel] for scenario in scenarios):
             raise StudyError(

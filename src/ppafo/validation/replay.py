@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
+from ppafo.engine.lanes import Batch, Floats
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.errors import DataError, PpafoError, SimulationError

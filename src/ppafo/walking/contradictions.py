@@ -16,7 +16,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import Reading, short_quantity_text, value_at
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of, walking_valve
@@ -110,7 +110,7 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     """Yield every pair of numbers that could contradict each other, with whether they do."""
     yield from _of_pairs(scenario)
     # An object in charge has no settings that could contradict.
-    if scenario.controller.kind == PYTHON_CONTROLLER:
+    if scenario.controller.is_outside:
         return
     settings, valve = scenario.controller.settings, scenario.device.valve.kind
     fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))

@@ -1,30 +1,58 @@
 """The walk along a prescribed gait as a kind of motion: shank and loaded foot are led, whatever the device does."""
 
-from ppafo.simulation.motion_kind import WALK, MotionKind, Seen
+from dataclasses import dataclass
+from typing import ClassVar
+
+from ppafo.control.kind import ControllerKind
+from ppafo.simulation.motion_kind import WALK, Seen
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import IN_WALK
-from ppafo.walking.contradictions import rules
-from ppafo.walking.motion import PLACES, clock_with, numbers_of_scenario
-from ppafo.walking.planning import law_of, noise, plan_walks, switches
-from ppafo.walking.result import lacks, measured
+from ppafo.walking import contradictions, motion, planning, result
 
 
-def _sees(_scenario: Scenario) -> Seen:
-    return IN_WALK
+@dataclass(frozen=True, slots=True, eq=False)
+class WalkKind:
+    """A motion along a gait: each of its functions is that of ``walking`` of the same meaning."""
+
+    name: str
+    section: ClassVar[None] = None
+    layout: ClassVar[str] = WALK
+    places = motion.PLACES
+    command: ClassVar[str] = "walk"
+    is_measured_at_once: ClassVar[bool] = True
+    reads_forces: ClassVar[bool] = True
+    is_repeated_for_its_error: ClassVar[bool] = False
+
+    plan = staticmethod(planning.plan_walks)
+    rules = staticmethod(contradictions.rules)
+    quantities = staticmethod(motion.numbers_of_scenario)
+    clock = staticmethod(motion.clock_with)
+    switches = staticmethod(planning.switches)
+    noise = staticmethod(planning.noise)
+    law = staticmethod(planning.law_of)
+    lacks = staticmethod(result.lacks)
+    measured = staticmethod(result.measured)
+
+    def sees(self, _scenario: Scenario) -> Seen:
+        """Return how the controller sees the torque."""
+        return IN_WALK
+
+    def follows_reference(self, _scenario: Scenario) -> bool:
+        """Tell that the controller makes what it follows itself, in each phase of the gait."""
+        return False
+
+    def asks_gradually(self, law: ControllerKind) -> bool:
+        """Tell whether a law asks for openings between shut and open to follow the torque that it requests."""
+        return planning.requests_torque(law) and not law.only_switches
+
+    def python_call(self, name: str, overrides: str) -> str:
+        """Return the call of Python that shows a walk of a name with overrides, which are quoted texts."""
+        return f"ppafo.walk({name!r}, overrides=[{overrides}])"
+
+    def further_command(self, file: str) -> str:
+        """Return which command sets the walk of a file beside others, in one line."""
+        return f"'ppafo walk {file}' compares it with no device and with a healthy ankle"
 
 
-WALK_KIND = MotionKind(
-    name=WALK,
-    plan=plan_walks,
-    rules=rules,
-    quantities=numbers_of_scenario,
-    places=PLACES,
-    clock=clock_with,
-    switches=switches,
-    noise=noise,
-    law=law_of,
-    sees=_sees,
-    lacks=lacks,
-    measured=measured,
-)
+WALK_KIND = WalkKind(WALK)
 """The motion of a scenario that walks along a gait."""

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ppafo.arguments import Overrides, checked
-from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.shut_off import SHUT_OFF

@@ -5,11 +5,11 @@ What may vary in it stands below: its numbers by path, and its times, one by one
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ppafo.control.walking.catalog import TIMINGS
+from ppafo.control.walking.timings import TIMINGS
 from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
@@ -58,6 +58,12 @@ class WalkMotion:
     person: Any = 0.0
     broken: Mapping[str, FaultSettings] = field(default_factory=dict)
     shut_off: Mapping[str, Any] = field(default_factory=dict)
+    locked_angle: ClassVar[None] = None
+
+    @property
+    def stride_time(self) -> float:
+        """Time of a stride of the gait [s]."""
+        return float(self.gait.stride_time)
 
     @property
     def label(self) -> str:

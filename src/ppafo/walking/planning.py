@@ -7,7 +7,8 @@ import numpy as np
 
 from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of
@@ -29,7 +30,7 @@ from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.plant import first_settings, plant_parameters
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, ProfileChoice, Scenario
+from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
 from ppafo.walking.motion import walk_of
@@ -111,7 +112,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
     """What the run of a walk is made of, whoever walks."""
     # An object in charge is asked between the steps, so the program has no controller of its own.
-    is_outside = scenario.controller.kind == PYTHON_CONTROLLER
+    is_outside = scenario.controller.is_outside
     return Components(
         device=device,
         valve=walking_valve(device.valve),
@@ -145,10 +146,8 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
     # Lines may be smaller than any chamber, and then fill first.
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
-    # Adiabatic chambers fill faster than isothermal ones, by the ratio of heat capacities.
-    stiffness = 1.0 if scenario.gas_model is None else scenario.device.gas.heat_capacity_ratio
     times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
-    counts = walk_step_counts(*times, plant, volume, stiffness)
+    counts = walk_step_counts(*times, plant, volume, scenario.stiffness)
     return Steps(
         step=counts.step,
         step_count=whole(counts.step_count),
@@ -250,6 +249,11 @@ def law_of(scenario: Scenario) -> ControllerKind:
     if scenario.controller.kind == switching.CONSTANT.name:
         return switching.CONSTANT
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
+
+
+def requests_torque(law: ControllerKind) -> bool:
+    """True where a controller of walking wants a torque, false where it only opens and shuts valves."""
+    return hasattr(law.initial, "request")
 
 
 def fed_device(scenario: Scenario) -> Device:

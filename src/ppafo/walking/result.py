@@ -12,14 +12,15 @@ from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk, state_row_numbers
 from ppafo.engine.step.lane import LaneResult
 from ppafo.metrics import METRICS, Metric, evaluate
-from ppafo.metrics.metric import LED_SHANK, REQUEST, STEADY, MetricKind, Metrics
+from ppafo.metrics.metric import MetricKind, Metrics
 from ppafo.model.contact import SWING
 from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
+from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
 from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.oscillation import Oscillation, oscillation_in
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import write_opensim
@@ -32,7 +33,7 @@ from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
-from ppafo.walking.planning import law_of, task_sequence_of_walk
+from ppafo.walking.planning import requests_torque, task_sequence_of_walk
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
@@ -337,9 +338,7 @@ def measured(scenario: Scenario, run: Run, time: Floats, record: Mapping[str, Fl
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:
     """Why a walk has not what a metric needs, an empty text where it has."""
-    motion, control = walk_of(scenario), scenario.controller.kind
-    is_outside = control == PYTHON_CONTROLLER
-    has_request = not is_outside and hasattr(law_of(scenario).initial, "request")
+    motion, control, law = walk_of(scenario), scenario.controller.kind, scenario.law
     needs = kind.needs
     reasons = (
         (
@@ -352,7 +351,10 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
             STEADY in needs and motion.task_sequence is not None,
             "it is a mean over equal strides, and a task sequence has others: leave the task sequence out",
         ),
-        (REQUEST in needs and not has_request, f"its controller '{control}' requests no torque"),
+        (
+            REQUESTED in needs and (law is None or not requests_torque(law)),
+            f"its controller '{control}' requests no torque",
+        ),
     )
     return next((reason for is_so, reason in reasons if is_so), "")
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk import answer
+from ppafo.analyses.walk import command
 from ppafo.cli.main import main
 from ppafo.page.html import bundled, digest
 from ppafo.page.workbench import live_part
@@ -235,7 +235,7 @@ def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(configuration, device=replace(configuration.device, supply=supply))
 
     monkeypatch.setattr("ppafo.walking.loading.load_walk", changed)
-    monkeypatch.setattr(answer, "load_walk", changed)
+    monkeypatch.setattr(command, "load_walk", changed)
 
 
 @pytest.mark.usefixtures("bursting")

@@ -24,6 +24,7 @@ from ppafo.exports.c_library import c_library, walk_library
 from ppafo.exports.c_library.files import Setting, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
+from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import list_walks, load_walk
 from ppafo.walking.loading import FILE
@@ -277,9 +278,9 @@ def test_what_cannot_leave_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_file_is_a_scenario_or_a_walk_by_its_sections(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_bytes(FILE.read("solenoid"))
-    assert load_scenario(file).walks
+    assert load_scenario(file).motion.motion_kind.layout == WALK
     file.write_bytes((resources.files("ppafo") / "scenarios" / "step-response.toml").read_bytes())
-    assert not load_scenario(file).walks
+    assert load_scenario(file).motion.motion_kind.layout == VANE
 
 
 def test_a_setting_that_contradicts_another_is_refused_by_name_and_a_flaw_needs_other_functions(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, nearest_name, one_line
@@ -75,12 +76,12 @@ class LinearModel:
         return self.time is None
 
     @property
-    def poles(self) -> "np.ndarray[Any, np.dtype[np.complex128]]":
+    def poles(self) -> NDArray[np.complex128]:
         """Poles [1/s], the slowest first."""
         eigenvalues = np.linalg.eigvals(self.a).astype(np.complex128)
         return eigenvalues[np.argsort(np.abs(eigenvalues))]
 
-    def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> Any:
+    def response(self, frequencies: Floats, output: str = "torque", source: str = "command") -> NDArray[np.complex128]:
         """Frequency response (frequencies,) of an output to an input, complex, in SI; frequencies [Hz].
 
         ScenarioError for a name that is no output or input, and for a frequency at which the model has a pole.
@@ -99,7 +100,7 @@ class LinearModel:
                     "end; give another frequency"
                 )
             responses.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
-        return np.array(responses)
+        return np.array(responses, dtype=np.complex128)
 
     def json_document(self) -> dict[str, Any]:
         """Return point, matrices, poles and sides as plain data in SI."""

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.linearise.plant import VALVE, plant_of, valve_states, without_slew_limit
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest
 from ppafo.engine.lanes import Floats, run_batch
@@ -111,7 +110,7 @@ def equilibrium(scenario: Scenario) -> Point:
         raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
-    is_open_loop = scenario.controller.kind == OPEN_LOOP
+    is_open_loop = scenario.controller.is_open_loop
     if scenario.controlled != TORQUE and not is_open_loop:
         line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; take --at with a time"
         raise ScenarioError(f"{scenario.name}: {line}")

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ppafo.analyses.linearise.model import LinearModel
-from ppafo.engine.lanes import Floats, StepInputs, replay
+from ppafo.engine.lanes import Floats
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.simulation.plan import plan_run

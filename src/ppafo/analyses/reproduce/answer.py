@@ -1,7 +1,7 @@
 """The reproduction: every claim with its verdict, figures, recordings, and the one bespoke page."""
 
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -141,20 +141,31 @@ _TASK_METRICS = (
 
 def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> str:
     """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
-    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
-    for value in reproduction.assumed:
-        groups.setdefault(value.used_by, []).append(value)
-    # What all experiments rest on comes first.
-    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
-    solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
-    results = (reproduction.solenoid, reproduction.proportional, reproduction.step)
-    steps = sorted({1e3 * float(result.engine["step"]) for result in results})
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
-    counts = verdict_counts(reproduction.claims).items()
-    severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
+    runs = (reproduction.solenoid, reproduction.proportional, reproduction.step)
     values = {
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
+        "overrides": reproduction.overrides,
+        **_claim_values(reproduction),
+        **_set_values(reproduction),
+        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
+        **_task_values(reproduction),
+        "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
+        "steps": _steps_text(runs),
+        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
+        "step_figure": inline_figure(drawn[STEP_FIGURE]),
+        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
+        "live": live_part([run.scenario for run in runs]),
+        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
+    }
+    return render_page(TEMPLATE, values, "ppafo.analyses.reproduce")
+
+
+def _claim_values(reproduction: Reproduction) -> dict[str, Any]:
+    """Return what the page says of the claims: each with its verdict, how many have each, and what cannot be tested."""
+    counts = verdict_counts(reproduction.claims).items()
+    return {
         "count_sentence": count_sentence([claim.verdict for claim in reproduction.claims]),
         "counts": [(name, VERDICTS[name], _SYMBOLS[name], MEANINGS[name], count) for name, count in counts],
         "claims": reproduction.claims,
@@ -162,9 +173,15 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         "symbols": _SYMBOLS,
         "not_published": [(entry.statement, entry.where) for entry in map(paper_entries().get, NOT_PUBLISHED) if entry],
         "not_read": NOT_READ,
-        "overrides": reproduction.overrides,
         "step_observations": reproduction.step_observations,
         "torque_observations": reproduction.torque_observations,
+    }
+
+
+def _set_values(reproduction: Reproduction) -> dict[str, Any]:
+    """Return what the page says of both parameter sets: findings of the printed one, and those that the other keeps."""
+    severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
+    return {
         "printed_set": reproduction.printed_set,
         "completed_set": reproduction.completed_set,
         **{
@@ -172,26 +189,40 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
             for severity, name in severities.items()
         },
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
-        "readings_of_u": _reading_rows(reproduction.readings_of_u),
-        "result_on_u": result_on_u(reproduction.readings_of_u) if reproduction.readings_of_u else (),
+        "assumed_groups": _assumed_groups(reproduction.assumed),
+    }
+
+
+def _assumed_groups(assumed: Iterable[AssumedValue]) -> list[tuple[str, list[AssumedValue]]]:
+    """Return assumed values by the experiments that use them; what all of them rest on comes first."""
+    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
+    for value in assumed:
+        groups.setdefault(value.used_by, []).append(value)
+    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
+    return [(_users(users), values) for users, values in ordered]
+
+
+def _task_values(reproduction: Reproduction) -> dict[str, Any]:
+    """Return what the page says of the torque task: metrics of both valves, the torque ceiling, what U may mean."""
+    solenoid, proportional = reproduction.solenoid.metrics, reproduction.proportional.metrics
+    readings = reproduction.readings_of_u
+    return {
+        "readings_of_u": _reading_rows(readings),
+        "result_on_u": result_on_u(readings) if readings else (),
         "within_reach": f"{WITHIN_REACH:g}",
-        "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
-        "step_figure": inline_figure(drawn[STEP_FIGURE]),
-        "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
         "task_rows": [
             (solenoid[name].summary, _metric_text(solenoid[name]), _metric_text(proportional[name]))
             for name in _TASK_METRICS
             if name in solenoid and name in proportional
         ],
         "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
-        "assumed_groups": [(_users(users), values) for users, values in ordered],
-        "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
-        "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
-        "live": live_part([result.scenario for result in results]),
-        "command": shlex.join(["ppafo", "reproduce", "--out", "out/reproduce", *changed]),
     }
-    return render_page(TEMPLATE, values, "ppafo.analyses.reproduce")
+
+
+def _steps_text(runs: Sequence[Result]) -> str:
+    """Return the step of the engine in some runs, or the range of theirs."""
+    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
+    return f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms"
 
 
 def holding_torque(result: Result) -> float:

@@ -1,6 +1,6 @@
 """Runs the paper's experiments and judges what the paper claims of them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from ppafo.analyses.reproduce.answer import (
     PROPORTIONAL,
@@ -8,8 +8,15 @@ from ppafo.analyses.reproduce.answer import (
     STEP,
     Reproduction,
 )
-from ppafo.analyses.reproduce.bench import assumed_values, synthetic_evidence
-from ppafo.analyses.reproduce.claim import arithmetic_claims, load_reported, not_published_claim, told_claim
+from ppafo.analyses.reproduce.bench import AssumedValue, assumed_values, synthetic_evidence
+from ppafo.analyses.reproduce.claim import (
+    Claim,
+    Observation,
+    arithmetic_claims,
+    load_reported,
+    not_published_claim,
+    told_claim,
+)
 from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.other_settings import control_claims
@@ -50,50 +57,37 @@ ORDER = (
 
 
 def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothing) -> Reproduction:
-    """Return what came of the paper's own experiments."""
+    """Return what came of the paper's own experiments.
+
+    ``overrides`` are texts such as ``supply.pressure=60 psi_g``, each for the experiments that have its value;
+    ``report`` hears what is being done. ScenarioError for a value that none has, SimulationError for a run that fails.
+    """
     scenarios = _scenarios(overrides)
-    runs: list[Result] = []
-    for name in EXPERIMENTS:
-        report(Progress(f"simulating {name}"))
-        runs.append(simulate(scenarios[name]))
-        if not runs[-1].status.is_completed:
-            raise SimulationError(f"{name}: {runs[-1].status.message}")
-    step, solenoid, proportional = runs
+    step, solenoid, proportional = _runs(scenarios, report)
     report(Progress("measuring on the simulated test bench (synthetic)"))
     # The rig records with the overrides of the simulations.
-    meant = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
-    tasks = {"solenoid": meant[SOLENOID], "proportional": meant[PROPORTIONAL]}
-    synthetic = synthetic_evidence(tasks, meant[STEP])
+    own = {name: scenario.origin.overrides for name, scenario in scenarios.items()}
+    synthetic = synthetic_evidence({"solenoid": own[SOLENOID], "proportional": own[PROPORTIONAL]}, own[STEP])
     report(Progress("checking the paper's own numbers"))
     reported = load_reported()
     completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
-    of_step = tuple(value.sentence() for value in assumed if STEP in value.used_by)
-    of_task = tuple(value.sentence() for value in assumed if {SOLENOID, PROPORTIONAL} & set(value.used_by))
     events, supply = step_events(step.recording), step.scenario.device.supply
     levels = Levels(supply.pressure, supply.atmospheric_pressure)
     step_observed = tuple(step_observations(step.recording, levels, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))
-    phased = phased_runs(solenoid)
-    claims = [
+    claims = (
         *arithmetic_claims(reported),
         told_claim(
             "figure_7_words",
             "What the text tells of the pressures and the angle of the step response.",
             step_observed,
-            of_step,
+            _used_by(assumed, STEP),
         ),
-        *torque_task_claims(phased, proportional, of_task),
-        told_claim(
-            "oscillation_words",
-            "What the text tells of the oscillation with both valves.",
-            torque_observed,
-            of_task,
-        ),
-        *control_claims(solenoid, proportional, phased),
+        *_task_claims(solenoid, proportional, torque_observed, _used_by(assumed, SOLENOID, PROPORTIONAL)),
         not_published_claim(),
-    ]
+    )
     return Reproduction(
         claims=tuple(sorted(claims, key=lambda claim: ORDER.index(claim.id))),
         step_observations=step_observed,
@@ -111,6 +105,40 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
         completed_findings=tuple(audit(completed)),
         overrides=tuple(overrides),
     )
+
+
+def _runs(scenarios: Mapping[str, Scenario], report: Report) -> list[Result]:
+    """Return the run of each experiment, in the order of ``EXPERIMENTS``; SimulationError for one that fails."""
+    runs = []
+    for name in EXPERIMENTS:
+        report(Progress(f"simulating {name}"))
+        run = simulate(scenarios[name])
+        if not run.status.is_completed:
+            raise SimulationError(f"{name}: {run.status.message}")
+        runs.append(run)
+    return runs
+
+
+def _used_by(assumed: Iterable[AssumedValue], *experiments: str) -> tuple[str, ...]:
+    """Return what any of some experiments rests on beside the paper, a sentence each."""
+    return tuple(value.sentence() for value in assumed if not set(experiments).isdisjoint(value.used_by))
+
+
+def _task_claims(
+    solenoid: Result, proportional: Result, observed: Sequence[Observation], rests_on: tuple[str, ...]
+) -> list[Claim]:
+    """Return the claims on the torque task, over the unknown phase of the solenoid pair's decisions."""
+    phased = phased_runs(solenoid)
+    return [
+        *torque_task_claims(phased, proportional, rests_on),
+        told_claim(
+            "oscillation_words",
+            "What the text tells of the oscillation with both valves.",
+            observed,
+            rests_on,
+        ),
+        *control_claims(solenoid, proportional, phased),
+    ]
 
 
 def _scenarios(overrides: Sequence[str]) -> dict[str, Scenario]:

@@ -20,34 +20,28 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     """Return the results in words, tables and panels; they have passed where any run completed."""
     document, summary = results.document, results.summary
     ended = ", ".join(f"{summary[key]:,} {key}" for key in ("completed", "diverged", "refused") if summary[key])
-    description = " ".join(document["study"].get("description", "").split())
-    failed = [
+    described = " ".join(document["study"].get("description", "").split())
+    failures = [
         f"run {failure['run']} ({failure['configuration']}): {failure['reason']}" for failure in summary["failures"]
     ]
-    varied, assumed = _varied(document["study"]), _assumed(document["scenarios"])
+    quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
     files = (
         ("rows of all runs", "runs/*.parquet"),
         ("summary", SUMMARY),
         ("study", f"study.json, sha256 {document['sha256'][:16]}"),
     )
-    quantile = f"Quantile: {summary['quantile_definition']}. Only completed runs that have the metric are counted."
     return Finding(
         name="sweep",
         kicker="Study",
         title=results.name,
-        said=(f"{results.name}: {document['runs']:,} runs: {ended}", *_remarks(document["runs"], summary)),
+        said=(f"{results.name}: {document['runs']:,} runs: {ended}", *_failed_and_oscillating(results)),
         parts=(
-            figure_of(results, [description] if description else [], failed),
+            figure_of(results, [described] if described else [], failures),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Part("How to read it", said=[quantile], is_detail=True),
-            Part("What varied" if varied else "", columns_of(("path", "kind", ""), varied), left=3, is_detail=True),
+            _varied(document["study"]),
             Part(said=_sampling(document["study"]), is_detail=True),
-            Part(
-                "What the base scenarios assume" if assumed else "",
-                columns_of(("value", "", "why", "in"), assumed),
-                left=4,
-                is_detail=True,
-            ),
+            _assumed(document["scenarios"]),
             Part("Files", facts(files), is_detail=True),
         ),
         found=results,
@@ -55,49 +49,57 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     )
 
 
-def _remarks(runs: int, summary: Mapping[str, Any]) -> list[str]:
-    """Return why the first run failed, where any did, and how many runs oscillate."""
-    remarks = [
+def _failed_and_oscillating(results: StudyResults) -> list[str]:
+    """Return how many runs failed, with the first of them, and how many oscillate, by configuration."""
+    summary, runs = results.summary, results.document["runs"]
+    sentences = [
         f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "
-        f"{first['run']}: {first['reason']}"
-        for first in summary["failures"][:1]
+        f"{failure['run']}: {failure['reason']}"
+        for failure in summary["failures"][:1]
     ]
-    return remarks + [
+    return sentences + [
         f"{name}: in {count:,} runs the loop oscillates (column 'oscillates')"
         for name, count in summary.get("oscillating", {}).items()
         if count
     ]
 
 
-def _varied(study: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Return path, kind and all else that a study file says of each number that varies."""
+def _varied(study: Mapping[str, Any]) -> Part:
+    """Return a row for each number that a study varies: its path, how, and the keys of that."""
     rows = []
     for number in study.get("vary", ()):
-        others = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
-        rows.append((number["path"], number["kind"], ", ".join(others)))
-    return rows
+        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
+        rows.append((number["path"], number["kind"], ", ".join(keys)))
+    return Part("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
 
 
 def _sampling(study: Mapping[str, Any]) -> list[str]:
-    """Return which values are correlated, and how the distributions are drawn."""
-    said = [
+    """Return the correlations of what a study draws, and how it draws them."""
+    sentences = [
         f"Correlation of {pair['between'][0]} with {pair['between'][1]}: {pair['coefficient']}, of their normal scores."
         for pair in study.get("correlations", ())
     ]
     sample = study.get("sample")
     if sample:
         method, seed = sample["method"].replace("_", " "), sample.get("seed", 1)
-        said.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
-    return said
+        sentences.append(f"Sampled by {method}: {sample['runs']} draws, seed {seed}.")
+    return sentences
 
 
-def _assumed(scenarios: Mapping[str, Any]) -> list[list[str]]:
-    """Return path, value and reason of what the base scenarios assume, and in which of them: each once."""
-    names: dict[tuple[str, ...], list[str]] = {}
+def _assumed(scenarios: Mapping[str, Any]) -> Part:
+    """Return what the base scenarios assume, once where several assume the same."""
+    names: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in scenarios.items():
         for number in scenario["assumptions"]:
             names.setdefault((number["path"], number["value"], number["note"]), []).append(name)
-    return [[*assumption, ", ".join(assuming)] for assumption, assuming in names.items()]
+    return Part(
+        "What the base scenarios assume" if names else "",
+        columns_of(
+            ("value", "", "why", "in"), [(*assumption, ", ".join(having)) for assumption, having in names.items()]
+        ),
+        left=4,
+        is_detail=True,
+    )
 
 
 def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:

@@ -103,24 +103,19 @@ def _options(tuned: Tuned) -> str:
     return " ".join(f'--set "{line}"' for line in tuned.overrides)
 
 
-def _verb(tuned: Tuned) -> str:
-    return "walk" if tuned.problem.scenario.walks else "simulate"
-
-
 def _command(tuned: Tuned) -> str:
     """Return the line that runs the scenario with the gains found."""
     scenario = tuned.problem.scenario
-    return f"ppafo {_verb(tuned)} {scenario.origin.file or scenario.name} {_options(tuned)}"
+    return f"ppafo {scenario.motion.motion_kind.command} {scenario.origin.file or scenario.name} {_options(tuned)}"
 
 
 def _pasted(tuned: Tuned) -> str:
     """Return the gains found to paste on a command line, into a study file and into Python."""
-    verb = _verb(tuned)
     listed = ", ".join(f'"{line}"' for line in tuned.overrides)
-    keyword = "overrides=" if verb == "walk" else ""
+    call = tuned.problem.scenario.motion.motion_kind.python_call(tuned.scenario, listed)
     return (
         f"# {tuned.verdict}\n\n# on the command line\n{_options(tuned)}\n\n# in a study file\n"
-        f"overrides = [{listed}]\n\n# in Python\nppafo.{verb}({tuned.scenario!r}, {keyword}[{listed}])\n"
+        f"overrides = [{listed}]\n\n# in Python\n{call}\n"
     )
 
 

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
@@ -250,7 +249,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     base = scenario_with(problem, gains)
     columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, columns)
-    if scenario.controller.kind == OPEN_LOOP or scenario.walks:
+    if not scenario.follows_reference:
         return Ceiling(0.0, ())
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
     spread, explained = problem.spread, []

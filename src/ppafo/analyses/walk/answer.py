@@ -1,9 +1,8 @@
 """A walk of one wearer with and without the device, in words, tables and figures."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,17 +21,15 @@ from ppafo.documents.json_text import plain
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
-from ppafo.progress import Progress, Report
 from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.live_parts import live_part
 from ppafo.simulation.oscillation import gains_of
+from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
-from ppafo.walking import task_sequence as task_sequences
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
-from ppafo.walking.loading import FILE, load_walk
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
@@ -122,54 +119,22 @@ _LIMITS = (
 def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
-    configuration, walked, gait = worn.scenario, walk_of(worn.scenario), walk_of(worn.scenario).gait
+    configuration, motion = worn.scenario, walk_of(worn.scenario)
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
-    along = "" if walked.task_sequence is None else f", task sequence {walked.task_sequence.name}"
-    bottle = "" if worn.supply is None else bottle_remark(worn)
-    if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
-        on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
-        bottle = f"how long a bottle lasts: {on_it}; here its supply pressure stays as it is set"
-    remarks = [*person_remarks(configuration), bottle, *safety_remarks(worn), trust_remark(configuration)]
-    remarks += [
-        f"{result.scenario.name}: {result.status.message}" for result in (worn, bare) if not result.status.is_completed
-    ]
+    along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
-    set_up = (
-        configuration.description,
-        f"device '{configuration.device.name}', gait '{gait.name}'" + (f" ({gait.title})" if gait.title else ""),
-        law_of(configuration).summary,
-        f"values changed for this walk: {', '.join(configuration.origin.overrides)}"
-        if configuration.origin.overrides
-        else "",
-    )
-    if walked.task_sequence is not None:
-        pictures = task_sequence_pictures(comparison)
-    else:
-        walks = {"with the device": worn, "without": bare}
-        shown = (
-            ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
-            ("", "legs-moving", _MOVING, partial(animation, comparison)),
-            ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
-            ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
-        )
-        # Of a mean stride there is nothing to draw where a walk has none.
-        drawn = shown if worn.averages and bare.averages else ()
-        pictures = (
-            *over_time_parts(worn),
-            *(Part(head, name=name, caption=caption, draw=draw, is_detail=True) for head, name, caption, draw in drawn),
-        )
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {gait.name}{along}", *first_lines(worn)),
+        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}", *first_lines(worn)),
         parts=(
-            Part(said=[text for text in set_up if text], is_detail=True),
+            Part(said=_set_up(configuration), is_detail=True),
             *task_sequence_parts(comparison),
-            Part(columns=comparison_table(comparison), remarks=[text for text in remarks if text]),
+            Part(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
             Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
-            *pictures,
+            *_pictures(comparison),
             Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
         found=WalkPair(comparison),
@@ -186,6 +151,64 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             **bottle_files(worn),
         },
         live=partial(live_part, [configuration]),
+    )
+
+
+def _set_up(configuration: Scenario) -> list[str]:
+    """Return what walks: description, device, gait, law, and what was changed for this walk."""
+    gait, overrides = walk_of(configuration).gait, configuration.origin.overrides
+    title = f" ({gait.title})" if gait.title else ""
+    sentences = (
+        configuration.description,
+        f"device '{configuration.device.name}', gait '{gait.name}'{title}",
+        law_of(configuration).summary,
+        f"values changed for this walk: {', '.join(overrides)}" if overrides else "",
+    )
+    return [sentence for sentence in sentences if sentence]
+
+
+def _remarks(comparison: Comparison) -> list[str]:
+    """Return who walks, how long a bottle lasts, what was unsafe, how far to trust the walk, and what diverged."""
+    worn, bare = comparison.with_device, comparison.without_device
+    bottle = "" if worn.supply is None else bottle_remark(worn)
+    if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
+        walk_on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
+        bottle = f"how long a bottle lasts: {walk_on_it}; here its supply pressure stays as it is set"
+    remarks = (
+        *person_remarks(worn.scenario),
+        bottle,
+        *safety_remarks(worn),
+        trust_remark(worn.scenario),
+        *(
+            f"{result.scenario.name}: {result.status.message}"
+            for result in (worn, bare)
+            if not result.status.is_completed
+        ),
+    )
+    return [remark for remark in remarks if remark]
+
+
+def _pictures(comparison: Comparison) -> Sequence[Part]:
+    """Return the figures of a task sequence, or of equal strides: over time, and the mean stride where there is one."""
+    worn, bare = comparison.with_device, comparison.without_device
+    if walk_of(worn.scenario).task_sequence is not None:
+        return task_sequence_pictures(comparison)
+    over_time = over_time_parts(worn)
+    if not (worn.averages and bare.averages):
+        return over_time
+    walks = {"with the device": worn, "without": bare}
+    of_mean_stride = (
+        ("The leg", "legs", _LEGS, partial(frames_figure, comparison)),
+        ("", "legs-moving", _MOVING, partial(animation, comparison)),
+        ("What the device does in each phase", "gait-phases", _PHASES, partial(strip_figure, worn)),
+        ("The mean stride", "mean-stride", _MEAN, partial(walk_figure, walks)),
+    )
+    return (
+        *over_time,
+        *(
+            Part(heading, name=name, caption=caption, draw=draw, is_detail=True)
+            for heading, name, caption, draw in of_mean_stride
+        ),
     )
 
 
@@ -244,39 +267,3 @@ def mean_stride_csv(result: WalkResult) -> bytes:
         columns[f"{name} [{curves.unit}]"] = curves.mean
         columns[f"{name}_deviation [{curves.unit}]"] = curves.deviation
     return csv_of(columns)
-
-
-LONG = 12.0
-"""Minutes above which a walk reports how far it is."""
-
-
-def list_files() -> list[dict[str, Any]]:
-    """Return the walks and the task sequences that come with the package: name, what it is, description."""
-    found = []
-    for library in (FILE, task_sequences.FILE):
-        files = {name: library.parse(library.read(name), name) for name in library.names()}
-        found += [
-            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
-            for name, file in files.items()
-        ]
-    return found
-
-
-def default_folder(values: Mapping[str, Any]) -> Path:
-    """Return where the command writes by default: by the name of the configuration."""
-    names = ("overrides", "gait", "task_sequence", "bottle")
-    configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
-    walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
-    along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
-    kind = "walk" if values["wearers"] is None else "wearers"
-    return Path("out") / f"{kind}-{configuration.name}{along}"
-
-
-def reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
-    """Return what hears of a walk and reports it, where there is more than ``above`` of the ``noun``."""
-
-    def forward(done: float, total: float) -> None:
-        if total > above:
-            report(Progress("walking", round(done), round(total), noun=noun))
-
-    return forward

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Count, Gait, Minutes, Overrides, Whole, Word, checked
-from ppafo.progress import Report, report_nothing
+from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
     from ppafo.report.finding import Finding
@@ -46,7 +47,7 @@ def walk_with_and_without(
     """
     from dataclasses import replace
 
-    from ppafo.analyses.walk.answer import LONG, finding_of, reporter
+    from ppafo.analyses.walk.answer import finding_of
     from ppafo.analyses.walk.wearers import wearers_finding
     from ppafo.errors import ArgumentError
     from ppafo.simulation.scenario import Scenario
@@ -62,8 +63,22 @@ def walk_with_and_without(
         chosen = load_walk(chosen, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)
     report = progress or report_nothing
     if wearers is not None:
-        advance = reporter(report, "wearers", 0.0)
+        advance = _reporter(report, "wearers", 0.0)
         return wearers_finding(walk_population(chosen, minutes=minutes, wearers=wearers, seed=seed, progress=advance))
-    comparison = compare_walks(chosen, minutes=minutes, progress=reporter(report, "min", LONG))
+    comparison = compare_walks(chosen, minutes=minutes, progress=_reporter(report, "min", _LONG_WALK))
     finding = finding_of(comparison)
     return replace(finding, passed=finding.passed and comparison.with_device.oscillation is None) if check else finding
+
+
+_LONG_WALK = 12.0
+"""Minutes above which a walk reports how far it is."""
+
+
+def _reporter(report: Report, noun: str, above: float) -> Callable[[float, float], None]:
+    """Return what hears how far walks are, and reports it where there is more than ``above`` of the ``noun``."""
+
+    def forward(done: float, total: float) -> None:
+        if total > above:
+            report(Progress("walking", round(done), round(total), noun=noun))
+
+    return forward

@@ -49,7 +49,8 @@ def sense(parts: Program, lane: Lane, now: Now) -> None:
         lane.seen = vane(parts, lane, now)
 
 
-# Of a vane.
+# Of a vane. Rows of the history of signals: angle [rad], pressure 1 and 2 [Pa]; they stand as numbers, since the place
+# where a history is set is read before names stand for what they mean (``engine/reduction.py``).
 
 
 def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
@@ -86,7 +87,7 @@ def remember_command(parts: Program, lane: Lane, slot: int) -> None:
     lane.command_history[slot] = lane.result.command
 
 
-# Of a walk.
+# Of a walk. Rows of the same history: force under heel and toes [N], angle [rad], pressure 1 and 2 [Pa].
 
 
 def gait(parts: Program, lane: Lane) -> GaitMeasurement:

@@ -8,6 +8,7 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import (
+    RULES_OF_TIMES,
     Library,
     Switch,
     c_identifier,
@@ -21,6 +22,7 @@ from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.clock import links_of_times, time_texts
+from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.numbers import links_that_hold
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
@@ -38,11 +40,6 @@ _FLAWS_OF_WALK = (
 def c_library(scenario: Scenario) -> dict[str, bytes]:
     """Files of a library in C by name. ProgramError for what cannot be translated, with file and line."""
     return library_files(library_of(scenario))
-
-
-def library_of(scenario: Scenario) -> Library:
-    """The library of a scenario or a walk."""
-    return scenario_library(scenario) if not scenario.walks else walk_library(scenario)
 
 
 def scenario_library(scenario: Scenario) -> Library:
@@ -79,6 +76,7 @@ def scenario_library(scenario: Scenario) -> Library:
         further=partial(preparation_of, scenario, program.program),
         following=partial(following_text, settings, links) if links else None,
         links=links,
+        rules=RULES_OF_TIMES,
     )
 
 
@@ -116,6 +114,14 @@ def walk_library(configuration: Scenario) -> Library:
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
     )
+
+
+_LIBRARIES = {VANE: scenario_library, WALK: walk_library}
+
+
+def library_of(scenario: Scenario) -> Library:
+    """The library of a scenario or a walk."""
+    return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 
 
 def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:

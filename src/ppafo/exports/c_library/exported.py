@@ -4,15 +4,15 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from ppafo.engine.channels import REQUEST, TRACED, walk_traces
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.metrics import METRICS
-from ppafo.metrics.metric import WALK, MetricKind
-from ppafo.metrics.readable import has_channels
+from ppafo.metrics.metric import MetricKind
+from ppafo.metrics.readable import has_channels, totals_kind
 from ppafo.model.controlled import CONTROLLED
+from ppafo.signals.meter import WALK
 
 COUNTS = ("interval", "steps", "steps_per_sample", "signal_delay", "command_delay", "needs_parts")
 """Numbers of the steps of a run: steps from one sample to the next, in all, to a sample of the controller; delays.
@@ -39,17 +39,11 @@ class ExportedProgram:
     def loops(self) -> dict[str, Program]:
         """Programs of its lane loops, by their names in C.
 
-        A locked joint with rigid chambers and without lines has two: its settings decide whether the error decides
-        about the parts of a step.
+        There are two where the settings decide whether the error decides about the parts of a step.
         """
-        if not self.chooses_parts:
+        if not self.program.chooses_parts:
             return {WHOLE: self.program}
         return {WHOLE: replace(self.program, is_adaptive=False), IN_PARTS: replace(self.program, is_adaptive=True)}
-
-    @property
-    def chooses_parts(self) -> bool:
-        """True where the settings decide whether the error decides about the parts of a step."""
-        return self.program.is_locked and self.program.feed is None and not self.program.actuator.gives
 
     @property
     def outputs(self) -> tuple[str, ...]:
@@ -59,19 +53,15 @@ class ExportedProgram:
 
 def exported(program: Program) -> ExportedProgram:
     """The program as it is exported; a metric that needs all samples of a channel is left out."""
-    missing = set() if program.is_thermal else {"temperature_1", "temperature_2"}
-    states = (path for name, row in program.state_rows().items() for path in leaf_paths(row, name))
-    if REQUEST not in states if program.walks else not program.has_reference:
-        missing |= {kind.reference for kind in CONTROLLED.values()}
-    missing |= {kind.reference for name, kind in CONTROLLED.items() if name != program.controlled}
+    missing = totals_kind(program).missing | {
+        kind.reference for name, kind in CONTROLLED.items() if name != program.wanted
+    }
     offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)
-    metrics = tuple(kind for kind in offered if program.walks == (WALK in kind.needs))
+    # Metrics of a walk are about its strides.
+    metrics = tuple(kind for kind in offered if (WALK in program.offers) == (WALK in kind.needs))
     # By name: the same metrics in another order are the same program.
     meters = dict(sorted({meter.name: meter for kind in metrics for meter in kind.meters}.items()))
-    outputs = (
-        *(name for name in TRACED if name not in missing),
-        *(walk_traces(program.state_rows()) if program.walks else ()),
-    )
+    outputs = tuple(name for name in program.traces if name not in missing)
     return ExportedProgram(replace(program, meters=tuple(meters.values()), traced=outputs), metrics)
 
 

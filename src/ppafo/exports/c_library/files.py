@@ -21,7 +21,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device, SonicOrifice
 from ppafo.parameters.graph import Graph
 from ppafo.parameters.plant import effects_of
-from ppafo.simulation.scenario import FreeMotion, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import Scenario, vane_motion
 from ppafo.version import __version__
 
 if TYPE_CHECKING:
@@ -107,6 +107,10 @@ class Relation:
     is_share: bool = False
 
 
+Rule = tuple[str, str, tuple[str, ...]]
+"""A rule of settings: the setting that is named, the condition as text in C, the settings that it holds in order."""
+
+
 @dataclass(frozen=True, slots=True)
 class Switch:
     """Settings of which any ``is_above`` 0, or none: the other case is another program."""
@@ -141,7 +145,7 @@ class Library:
 
     ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
     ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
-    ``keeps_times`` where a file could have its times. ``following`` adds the function that lets settings follow others,
+    ``rules`` are between its times, as in a file. ``following`` adds the function that lets settings follow others,
     None where none does, and ``defaults`` names the settings whose default does so, which has no range; ``links`` say
     what follows what. ``words`` fill the page. ``surface`` is how it is called.
     """
@@ -159,7 +163,7 @@ class Library:
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
     surface: Surface = LOOP
-    keeps_times: bool = True
+    rules: tuple[Rule, ...] = ()
 
     @property
     def name(self) -> str:
@@ -211,58 +215,88 @@ def run_words(library: Library) -> dict[str, str]:
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
-    program = library.program
-    outputs = ["time", *program.outputs]
+    """Marks of the templates of a library, and the text in the place of each; words of its own go before these."""
     # The last argument of the loop of a run in C, where it has both kinds of steps.
-    in_parts = ", run->needs_parts" if program.chooses_parts else ""
+    in_parts = ", run->needs_parts" if library.program.program.chooses_parts else ""
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
-    relations = _relations(library)
-    table = []
-    for setting in library.settings:
-        low, high = _limits(setting.quantity)
-        marks = setting.quantity.minimum_allowed, setting.name in library.defaults
-        flags = ", ".join("true" if mark else "false" for mark in marks)
-        table.append(f'    {{"{setting.name}", {setting.value!r}, {low!r}, {high!r}, {flags}}},')
+    surface = library.surface
     return {
         **run_words(library),
+        **_title_words(library, name),
+        **_struct_words(library),
+        **_check_words(library),
+        **_example_words(library),
+        "in_parts": in_parts,
+        "run": filled(template(_FOLDER, "run.h"), {"name": name}),
+        "steps": filled(template(_FOLDER, "steps.c"), steps),
+        "first": "".join(f"    before.{setting} = before.{surface.step};\n" for setting in surface.as_step),
+        "follow": "" if library.following is None else "    follow(&before, &all);",
+        **library.words,
+        **surface.words,
+    }
+
+
+def _title_words(library: Library, name: str) -> dict[str, str]:
+    """What a library is, as comments and pages say it."""
+    return {
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "in_parts": in_parts,
-        "run": filled(template(_FOLDER, "run.h"), {"name": name}),
-        "steps": filled(template(_FOLDER, "steps.c"), steps),
-        "first": "".join(f"    before.{name} = before.{library.surface.step};\n" for name in library.surface.as_step),
-        "follow": "" if library.following is None else "    follow(&before, &all);",
-        "settings": _members(
-            (setting.name, setting.quantity.unit, _said(setting.quantity)) for setting in library.settings
-        ),
-        "outputs": _members((("time", "s", "since the start"), *((name, *OUTPUTS[name]) for name in program.outputs))),
+    }
+
+
+def _struct_words(library: Library) -> dict[str, str]:
+    """Members of the structs of settings, outputs and metrics, and the table of the settings with their ranges."""
+    settings, program = library.settings, library.program
+    outputs = (("time", "s", "since the start"), *((name, *OUTPUTS[name]) for name in program.outputs))
+    return {
+        "settings": _members((setting.name, setting.quantity.unit, _said(setting.quantity)) for setting in settings),
+        "outputs": _members(outputs),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
-        "table": "\n".join(table),
-        "relations": "\n".join(
-            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in relations
-        ),
-        "is_whole": _IS_WHOLE if any("is_whole(" in holds for holds, _ in relations) else "",
-        "needs_other": "\n".join(
-            f'    if ({condition}) {{\n        return "{name}";\n    }}'
-            for condition, name in conditions_of_program(library)
-        ),
+        "table": "\n".join(_table_line(setting, setting.name in library.defaults) for setting in settings),
+    }
+
+
+def _table_line(setting: Setting, follows: bool) -> str:
+    """Line of the table in C: name, value, range, whether its lower end is allowed, whether the default ``follows``."""
+    low, high = _limits(setting.quantity)
+    flags = ", ".join("true" if flag else "false" for flag in (setting.quantity.minimum_allowed, follows))
+    return f'    {{"{setting.name}", {setting.value!r}, {low!r}, {high!r}, {flags}}},'
+
+
+def _check_words(library: Library) -> dict[str, str]:
+    """Lines in C that return the name of a setting which contradicts another one, or which needs another program."""
+    relations = _relations(library)
+    refused = [(f"!({condition})", name) for condition, name in relations]
+    return {
+        "relations": _returning(refused),
+        "is_whole": _IS_WHOLE if any("is_whole(" in condition for condition, _ in relations) else "",
+        "needs_other": _returning(conditions_of_program(library)),
+    }
+
+
+def _returning(conditions: Iterable[tuple[str, str]]) -> str:
+    """Lines in C that return a name under its condition."""
+    return "\n".join(f'    if ({condition}) {{\n        return "{name}";\n    }}' for condition, name in conditions)
+
+
+def _example_words(library: Library) -> dict[str, str]:
+    """What the example prints of outputs and metrics, and the setting that it changes."""
+    outputs = ["time", *library.program.outputs]
+    # Every scenario has a supply pressure, which is what a user would try first.
+    (pressure,) = [setting for setting in library.settings if setting.name == "supply_pressure"]
+    return {
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
         "csv_values": ",\n".join(f"            outputs.{name}" for name in outputs),
         "print_metrics": "\n".join(
             f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
-            for kind in program.metrics
+            for kind in library.program.metrics
         ),
-        # Every scenario has a supply pressure, which is what a user would try first.
-        "example": next(
-            f"{setting.name} = {setting.value!r};" for setting in library.settings if setting.name == "supply_pressure"
-        ),
-        **library.words,
-        **library.surface.words,
+        "example": f"{pressure.name} = {pressure.value!r};",
     }
 
 
@@ -309,13 +343,13 @@ def conditions_of(library: Library) -> list[tuple[str, str]]:
     return [*ranges, *_relations(library)]
 
 
-RULES_OF_TIMES = (
+RULES_OF_TIMES: tuple[Rule, ...] = (
     ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
     ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
     ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
     ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
 )
-"""Rules of the times of a scenario (``simulation/clock.py``): setting named, rule, settings in it."""
+"""Rules of the times of a scenario (``simulation/clock.py``)."""
 
 
 _IS_WHOLE = """
@@ -337,11 +371,9 @@ def _relations(library: Library) -> list[tuple[str, str]]:
             slack = repr(relation.tolerance)
             other = f"{other} * (1.0 {sign} {slack})" if relation.is_share else f"{other} {sign} {slack}"
         relations.append((f"settings->{relation.name} {_SIGNS[relation.relation]} {other}", relation.name))
-    # A plant alone has no times of a file, and a walk checks its own.
-    rules = RULES_OF_TIMES if library.keeps_times and not library.program.program.walks else ()
     return [
         *relations,
-        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in rules),
+        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in library.rules),
     ]
 
 
@@ -370,13 +402,9 @@ _TRAPS_OF_WALK = """\
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
     """What the page of the library says of this scenario, in which settings follow others by ``links``."""
-    motion = scenario.motion
-    moves = f"prescribed, `{motion.profile.kind}`" if isinstance(motion, PrescribedMotion) else "free"
-    if isinstance(motion, FreeMotion) and motion.leg is not None:
-        moves = f"free with the foot of a leg, whose shank is led, `{motion.leg.shank.kind}`"
     fixed = [
         f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
-        f"the reference, `{scenario.reference.kind}`, and the motion, {moves}",
+        f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
         *_fixed_of_device(scenario.device, scenario.gas_model is not None, scenario.supply_lines is not None),
         _at_zero(scenario.device, scenario.sensors.flaws),
         "whether `run_output_interval` is a whole number of steps of the engine",

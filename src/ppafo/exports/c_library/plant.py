@@ -1,7 +1,8 @@
 """The plant of a scenario or a walk alone: its inputs come from outside at each step."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import singledispatch
 from typing import NamedTuple
 
 from ppafo.control.catalog import PROFILES
@@ -15,9 +16,9 @@ from ppafo.model.valves.kind import VENT
 from ppafo.parameters.graph import outside
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.profiles import profile_parameters
-from ppafo.simulation.scenario import Control, FreeMotion, PrescribedMotion, ProfileChoice, Scenario, Sensors
+from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMotion, ProfileChoice, Scenario, Sensors
 from ppafo.walking.declaration import FORCES
-from ppafo.walking.motion import walk_of
+from ppafo.walking.motion import WalkMotion
 from ppafo.walking.preparation import FaultSettings
 
 
@@ -103,9 +104,9 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
-    plant = _commanded_walk(scenario) if scenario.walks else _commanded_vane(scenario)
+    plant = _commanded(scenario.motion, scenario)
     library = library_of(plant)
-    drive = _drive_of(plant, library.settings)
+    drive = _drive_of(plant.motion, {setting.path: setting for setting in library.settings})
     taken = {variable.name for variable in (drive.command, *drive.inputs)}
     references = {kind.reference for kind in CONTROLLED.values()}
     outputs = tuple(name for name in library.program.outputs if name not in taken | references)
@@ -113,20 +114,16 @@ def plant_of(scenario: Scenario) -> PlantAlone:
     program = replace(library.program.program, meters=(), traced=outputs)
     replaced = {setting.path for setting in library.settings if setting.path.startswith(_REPLACED)}
     return PlantAlone(
-        library=replace(library, program=ExportedProgram(program, ()), keeps_times=False),
+        library=replace(library, program=ExportedProgram(program, ()), rules=()),
         drive=drive,
         hidden=frozenset(replaced.union(_WITHOUT_EFFECT)),
         step=plant.run.step,
     )
 
 
-def _drive_of(plant: Scenario, settings: Sequence[Setting]) -> Drive:
-    """Return how a plant is driven, within the ranges of its settings."""
-    by_path = {setting.path: setting for setting in settings}
-    if isinstance(plant.motion, PrescribedMotion):
-        return _angle_drive(plant.motion, by_path)
-    if isinstance(plant.motion, FreeMotion):
-        return _torque_drive(plant.motion, by_path)
+@singledispatch
+def _drive_of(_motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
+    """Return how a plant that moves so is driven, within the ranges of its settings by path: here that of a walk."""
     return Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
 
 
@@ -134,6 +131,7 @@ _FIRST_RAMP = 0.0078125
 """Length [s] of the ramp that an angle begins with. Short: a fast ankle stays in the range of a level."""
 
 
+@_drive_of.register
 def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> Drive:
     """Return the drive of a joint whose angle and rate come from outside: a ramp, which the profile already is."""
     stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
@@ -165,6 +163,7 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> D
     )
 
 
+@_drive_of.register
 def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
     """Return the drive of a free joint: T_ex on a vane alone, or T_2 of the ankle of a leg, which is opposed."""
     if motion.leg is None:
@@ -253,14 +252,13 @@ def _volume_conditions(alone: PlantAlone) -> list[str]:
     return [f"({low} < {end} && {end} < {high})" for end in ends]
 
 
-def _commanded_vane(scenario: Scenario) -> Scenario:
+@singledispatch
+def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
     """Return the scenario under a command at every step of its engine; a prescribed angle comes from outside too."""
-    motion = scenario.motion
-    if isinstance(motion, PrescribedMotion):
-        # It begins where the scenario has it.
-        start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-        settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
-        motion = PrescribedMotion(ProfileChoice("ramp_hold", settings))
+    return _commanded_vane(scenario)
+
+
+def _commanded_vane(scenario: Scenario) -> Scenario:
     # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
@@ -272,16 +270,23 @@ def _commanded_vane(scenario: Scenario) -> Scenario:
         run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
         sensors=Sensors(),
-        motion=motion,
         links=outside(scenario.links, "controller", "reference"),
     )
 
 
-def _commanded_walk(walk: Scenario) -> Scenario:
-    """Return the walk with a command that is handed in at every step, and sensors that nothing reads."""
+@_commanded.register
+def _commanded_path(motion: PrescribedMotion, scenario: Scenario) -> Scenario:
+    # It begins where the scenario has it.
+    start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
+    settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
+    return replace(_commanded_vane(scenario), motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
+
+
+@_commanded.register
+def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
+    # Sensors are there that nothing reads.
     check_can_leave(walk)
     step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
-    motion = walk_of(walk)
     # The forces under the foot are among the outputs.
     forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
     return replace(

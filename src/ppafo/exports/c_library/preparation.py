@@ -7,7 +7,6 @@ from typing import Any, final
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.entries import indent
-from ppafo.engine.lanes import RECORDED_ANGLE, Segment
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
@@ -43,7 +42,7 @@ from ppafo.simulation.plan import (
     thermal_gas,
 )
 from ppafo.simulation.profiles import TOLERANCE
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import Leg, Scenario, vane_motion
 from ppafo.simulation.supply_lines import lines_at_start
 from ppafo.units import parse_quantity
 
@@ -162,6 +161,11 @@ class Writing:
         self.rows[name] = list(fields)
         return f"{name}({', '.join(f'{field}={value}' for field, value in fields.items())})" if fields else "()"
 
+    @property
+    def stiffness(self) -> str:
+        """By how much faster the pressure of the gas follows than at one temperature."""
+        return "gas_heat_capacity_ratio" if "thermal" in self.program.gas.PARAMETERS else "1.0"
+
     def section(self, section: str, names: Sequence[str]) -> dict[str, str]:
         """The names in C of some settings of a section, by their own."""
         return {name: c_identifier(f"{section}.{name}") for name in names}
@@ -255,7 +259,7 @@ class Writing:
         add = self.add
         flaws = self.section("sensors", FLAWS)
         yield f"sensors = {add(SensorParameters)}({', '.join(flaws.values())}, sensors_seed)"
-        if self.program.is_thermal:
+        if "thermal" in self.program.gas.PARAMETERS:
             walls = self.section("gas_model", [quantity.name for quantity in gas_settings(THERMAL)])
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:
@@ -375,10 +379,9 @@ def preparation_of(scenario: Scenario, program: Program, collector: SourceCollec
 
 def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
     """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
-    program, add, motion = writing.program, writing.add, scenario.motion
-    leg = motion.leg if isinstance(motion, FreeMotion) else None
-    free = "motion_external_torque" if leg is None else "-motion_ankle_torque"
-    yield from writing.plant("plant", free if isinstance(motion, FreeMotion) else "0.0")
+    program, add, leg, path = writing.program, writing.add, vane_motion(scenario).leg, writing.program.angle
+    torque = "motion_external_torque" if leg is None else "-motion_ankle_torque"
+    yield from writing.plant("plant", torque if path is None else "0.0")
     if leg is not None:
         yield from _leg(leg, writing)
 
@@ -387,14 +390,14 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
     yield f"counts_of_steps = {add(step_counts)}({times})"
     yield f"tolerance = {add(relative_tolerance)}(run_tolerance)"
     yield from writing.timing("sensors_delay", "tolerance")
-    level = c_identifier(path_of_locked_angle(scenario) or LOCKED_ANGLE)
-    if scenario.supply_lines is not None or not program.is_locked or program.actuator.gives:
+    stays = path_of_locked_angle(scenario)
+    level = c_identifier(stays or LOCKED_ANGLE)
+    if not program.chooses_parts:
         yield "needs_parts = True"
     else:
-        stiffness = "1.0" if scenario.gas_model is None else "gas_heat_capacity_ratio"
         shortened = f"step / {add(smaller)}(1.0, tolerance)"
         within = f"{add(smaller)}({add(larger)}({level}, plant.angle_min), plant.angle_max)"
-        room = "plant.atmospheric_pressure"
+        room, stiffness = "plant.atmospheric_pressure", writing.stiffness
         yield f"smallest = {add(program.actuator.chambers)}(plant, {within}, {room}, {room})"
         yield f"needs_parts = not {add(is_slow)}(plant, {shortened}, smallest.volume_1, smallest.volume_2, {stiffness})"
 
@@ -405,23 +408,20 @@ def _lines(scenario: Scenario, writing: Writing) -> Iterator[str]:
     # Where no reference is followed, the one that stands in its place is written out.
     known = (
         {}
-        if program.has_reference
+        if scenario.follows_reference
         else {quantity.name: repr(settings[quantity.name]) for quantity in profile.quantities}
     )
     yield f"reference = {writing.kind('reference', profile, known)}"
-    if program.angle is RECORDED_ANGLE:
-        yield f"path = {add(Segment)}(0.0, motion_angle, 0.0)"
-    elif isinstance(motion, PrescribedMotion):
-        held = {"level": level} if program.is_locked else {}
-        yield f"path = {writing.kind('motion.profile', PROFILES[motion.profile.kind], held)}"
+    if path is not None:
+        held = {} if stays is None else {"level": level}
+        yield f"path = {writing.kind('motion.profile', path, held)}"
     yield from writing.gas()
 
     # The states at the start.
     moved = "motion_angle", "motion_angular_velocity"
-    if isinstance(motion, PrescribedMotion):
+    if path is not None:
         moved = "angle", "angular_velocity"
-        assert program.angle is not None, "the angle is prescribed"
-        yield f"angle, angular_velocity, _ = {add(program.angle.value)}(path, 0.0)"
+        yield f"angle, angular_velocity, _ = {add(path.value)}(path, 0.0)"
     pressures = "initial_pressure_1, initial_pressure_2"
     yield f"filled = {add(program.actuator.chambers)}(plant, {moved[0]}, {pressures})"
     volumes = "filled.volume_1, filled.volume_2"

@@ -109,7 +109,7 @@ def c_text_of_run(
     samples = Shared(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
     metrics_row = struct_of_numbers(f"{name}_metrics", [kind.name for kind in exported.metrics])
     types: dict[str, tuple[Type, ...]] = {
-        WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if exported.chooses_parts else [])),
+        WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if exported.program.chooses_parts else [])),
         "metrics": (states, states, parameters, INT, metrics_row),
         "prepare": (settings_row, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (settings_row, settings_row),

@@ -179,9 +179,8 @@ def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
     if configuration.supply_lines is not None:
         volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
         yield f"volume = min(volume, {', '.join(volumes)})"
-    stiffness = "1.0" if configuration.gas_model is None else "gas_heat_capacity_ratio"
     times = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {add(walk_step_counts)}({times}, plant, volume, {stiffness})"
+    yield f"counts_of_steps = {add(walk_step_counts)}({times}, plant, volume, {writing.stiffness})"
     yield "needs_parts = False"
     yield from writing.timing("signal_delay")
 

@@ -1,8 +1,8 @@
 """A form of gait recordings: how its files are known and read, and what their columns mean without a gait map."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 from ppafo.gait.recorded.mapping import GaitMap, Side
 from ppafo.gait.recorded.table import MotionTable
@@ -10,11 +10,43 @@ from ppafo.gait.recorded.table import MotionTable
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """The map of files that come without one, columns of force plates to choose by the foot's motion, and remarks."""
+    """What the columns of a file mean that comes without a gait map.
+
+    ``columns`` is the map, ``plates`` are columns of force plates to choose from by the foot's motion, ``remarks``
+    sentences for whoever reads the file.
+    """
 
     columns: GaitMap
     plates: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+
+
+class FileReader(Protocol):
+    """How a file of a form is read."""
+
+    def __call__(self, path: str | Path, /) -> MotionTable:
+        """Return time [s], columns and units of a file, its ``form`` left empty; DataError where it cannot be read."""
+
+
+class ConventionOf(Protocol):
+    """What the columns of a file of a form mean where no gait map of the user says it."""
+
+    def __call__(self, table: MotionTable, side: Side, body_mass: float, /) -> Convention:
+        """Return the convention for a foot, and for forces over a body mass [kg]."""
+
+
+class FileTest(Protocol):
+    """How files of a form are told from others with their suffix."""
+
+    def __call__(self, path: str | Path, /) -> bool:
+        """Return whether a file is of the form, by its content."""
+
+
+class TableChange(Protocol):
+    """How a table is changed before its columns have their meaning, where no gait map of the user says it."""
+
+    def __call__(self, table: MotionTable, /) -> MotionTable:
+        """Return the table with the columns that the convention of its form is about."""
 
 
 def any_file(_path: str | Path) -> bool:
@@ -29,19 +61,16 @@ def as_it_is(table: MotionTable) -> MotionTable:
 
 @dataclass(frozen=True, slots=True)
 class GaitForm:
-    """A form of gait recordings. ``suffixes`` are in lower case, with their dot.
+    """A form of gait recordings: its name, a summary in a phrase, and suffixes in lower case, with their dot.
 
-    ``read`` returns time [s], columns and units of a file, DataError where it cannot be read, and ``convention`` what
-    its columns mean for a side and a body mass [kg]. ``recognises`` tells files of the form from others with their
-    suffix, by content. Where no gait map of the user says what columns mean, ``arrange`` may change them before.
     ``is_whole`` is true where a file has all curves of a foot, so that no file of another form can add one.
     """
 
     name: str
     summary: str
     suffixes: tuple[str, ...]
-    read: Callable[[str | Path], MotionTable]
-    convention: Callable[[MotionTable, Side, float], Convention]
-    recognises: Callable[[str | Path], bool] = any_file
-    arrange: Callable[[MotionTable], MotionTable] = as_it_is
+    read: FileReader
+    convention: ConventionOf
+    recognises: FileTest = any_file
+    arrange: TableChange = as_it_is
     is_whole: bool = False

@@ -30,7 +30,7 @@ from ppafo.simulation.recorded.channels import (
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
 from ppafo.simulation.recorded.replay import replay_control
 from ppafo.simulation.recorded.rest import value_at_rest
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario, Sensors
+from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """What a recording is compared in [rad], [Pa], [Pa]."""
@@ -85,7 +85,7 @@ def check_experiment(experiment: Experiment) -> None:
             raise IdentificationError(f"{said}: {recording.label} has no channel '{name}'{use}; it has {have}")
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
     is_free, follows = isinstance(scenario.motion, FreeMotion), {ANGLE} & set(inputs) & set(experiment.channels)
-    is_python = scenario.controller.kind == PYTHON_CONTROLLER and COMMAND not in inputs
+    is_python = scenario.controller.is_outside and COMMAND not in inputs
     has_leg = isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None
     refuse_first(
         said,

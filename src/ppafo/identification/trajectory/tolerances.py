@@ -21,7 +21,7 @@ from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, FreeMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Scenario
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -123,7 +123,7 @@ def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[f
         found["supply.pressure"] = deviation_of_limit(tolerances.supply)
         if DORSIFLEXION_SUPPLY not in inputs:
             found["supply.dorsiflexion_pressure"] = deviation_of_limit(tolerances.supply)
-    is_read = experiment.initial_state == "recording" or experiment.scenario.controller.kind == PYTHON_CONTROLLER
+    is_read = experiment.initial_state == "recording" or experiment.scenario.controller.is_outside
     stops = scenario.device.actuator.angle_min, scenario.device.actuator.angle_max
     # Where the vane lies at a stop, the stop says where it starts.
     if free is not None and ANGLE not in inputs and not any(math.isclose(free.angle, stop) for stop in stops):

@@ -100,6 +100,7 @@ from ppafo.report.display_units import display_unit, quantity_of_unit
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import set_name
+from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.compiling import asked, complaint
@@ -109,6 +110,8 @@ from ppafo.version import __version__
 if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
 
+_KINDS = {VANE: "scenario", WALK: "walk"}
+"""What a page calls what it simulates."""
 _TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
 _CHANGED = {**_TASK, "origin": "changed"}
 _DEFAULT = {**_TASK, "origin": "default"}
@@ -141,7 +144,7 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
         "name": library.title,
         "title": library.description,
         "version": __version__,
-        "kind": "scenario" if not scenario.walks else "walk",
+        "kind": _KINDS[scenario.motion.motion_kind.layout],
         "document": dict(scenario.origin.content),
         "overrides": list(scenario.origin.overrides),
         "settings": [
@@ -393,7 +396,7 @@ _ARRAYS = {
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:
     """Lines that call the lane loop that the clock asks for."""
-    if not program.chooses_parts:
+    if not program.program.chooses_parts:
         return f"GO_ON({WHOLE}{ending});"
     in_parts, whole = (f"        GO_ON({name}{ending});\n" for name in (IN_PARTS, WHOLE))
     return f"if (clock->needs_parts) {{\n{in_parts}    }} else {{\n{whole}    }}"

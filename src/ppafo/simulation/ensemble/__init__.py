@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.engine.channels import TRACED
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
@@ -124,7 +123,7 @@ def _check_channel(base: Scenario, name: str) -> None:
     controlled = next((kind.name for kind in CONTROLLED.values() if kind.reference == name), base.controlled)
     if controlled != base.controlled:
         raise ScenarioError(f"{base.name}: there is no '{name}' to trace: reference.of is '{base.controlled}'")
-    if name == CONTROLLED[controlled].reference and base.controller.kind == OPEN_LOOP:
+    if name == CONTROLLED[controlled].reference and base.controller.is_open_loop:
         raise ScenarioError(f"{base.name}: a constant command follows no reference, so there is none to trace")
     if name.startswith("temperature_") and base.gas_model is None:
         raise ScenarioError(f"{base.name}: '{name}' needs gas with an energy balance ([gas_model] kind = \"thermal\")")

@@ -14,7 +14,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.simulation.declaration import TEXTS
 from ppafo.simulation.numbers import ORIFICES, declared_numbers, moving_together, other_form
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Scenario
+from ppafo.simulation.scenario import Scenario
 
 _TEXTS = (
     *TEXTS,
@@ -52,7 +52,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
 
     Those of the paths in ``gauge`` count from the atmosphere of their run.
     """
-    if base.controller.kind == PYTHON_CONTROLLER and base.controller.custom is None:
+    if base.controller.is_outside and base.controller.custom is None:
         raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
     # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
@@ -95,7 +95,7 @@ def _check_path(base: Scenario, given: str, path: str, declared: Mapping[str, Qu
         return
     if path in _TEXTS:
         raise ScenarioError(f"{base.name}: '{given}' is a text and cannot vary; run an ensemble for each value")
-    if base.controller.kind == PYTHON_CONTROLLER and path.startswith("controller."):
+    if base.controller.is_outside and path.startswith("controller."):
         raise ScenarioError(
             f"{base.name}: '{given}' cannot vary: a Python object has no declared settings; "
             "a module with a KIND has them (docs/how-to/extend.md)"

@@ -7,7 +7,8 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lanes import Batch, BatchResult, Floats, add_meters, load_programs, meters_of, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Floats, load_programs, run_blocks
+from ppafo.engine.metering import add_meters, meters_of
 from ppafo.engine.program import Program
 from ppafo.engine.rows import group_of, leaf_paths, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Members

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.errors import ScenarioError
-from ppafo.metrics.metric import LED_SHANK, WALK, MetricKind
+from ppafo.metrics.metric import MetricKind
 from ppafo.model.columns import Problem, at
 from ppafo.model.controlled import CONTROLLED
+from ppafo.signals.meter import LED_SHANK, WALK
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
 from ppafo.simulation.motion_kind import Clock
@@ -57,7 +57,7 @@ def _beyond_the_stops(scenario: Scenario) -> Problem:
 def _reference_beyond_reach(scenario: Scenario) -> Problem:
     """An angle or a pressure that no controller can reach."""
     followed = CONTROLLED[scenario.controlled]
-    if followed.reach is None or scenario.controller.kind == OPEN_LOOP:
+    if followed.reach is None or not scenario.follows_reference:
         return np.zeros(1, dtype=np.bool_), lambda _: ""
     return _profile_beyond(scenario, limits_of(scenario.device, followed), scenario.reference, "reference")
 
@@ -112,7 +112,7 @@ def lacks(scenario: Scenario, kind: MetricKind) -> str:
         return "it needs a leg whose shank follows a gait"
     if not kind.of_reference:
         return ""
-    if scenario.controller.kind == OPEN_LOOP:
+    if not scenario.follows_reference:
         return "its controller follows no reference"
     controlled = scenario.controlled
     return "" if kind.of_reference == controlled else f"reference.of is '{controlled}', not '{kind.of_reference}'"

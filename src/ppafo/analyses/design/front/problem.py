@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.analyses.design.front.search import LARGEST_SEED, SearchTable
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
 from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
@@ -336,10 +335,10 @@ def _task(table: TaskTable, kinds: Sequence[str], folder: Path, file: str, whole
             )
     scenarios = {kind: load_scenario(placed(table.scenarios[kind], folder), table.overrides) for kind in kinds}
     for kind, scenario in scenarios.items():
-        if scenario.controller.kind == OPEN_LOOP:
+        if scenario.controller.is_open_loop:
             raise StudyError(
                 f"{file}: task '{table.name}': scenario '{scenario.name}' follows no reference (controller "
-                f"'{OPEN_LOOP}'), so it has no tracking error"
+                f"'{scenario.controller.kind}'), so it has no tracking error"
             )
         reason = lacking(scenario, METRICS[error]) if error in METRICS else ""
         if reason:

@@ -10,7 +10,6 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.kind import OPEN_LOOP
 from ppafo.control.profiles import KNOTS
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
@@ -321,8 +320,8 @@ def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: 
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)
     plain.device.check_torque_constant("the size of a device")
-    if plain.controller.kind == OPEN_LOOP:
-        raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{OPEN_LOOP}')")
+    if plain.controller.is_open_loop:
+        raise StudyError(f"{file}: scenario '{plain.name}' follows no reference (controller '{plain.controller.kind}')")
     # The least common multiple of both times: the run then ends with a sample of the controller and of the output.
     a, b = (
         Fraction(interval).limit_denominator(_LARGEST_DENOMINATOR)

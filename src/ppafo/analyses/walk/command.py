@@ -1,0 +1,31 @@
+"""What the command ``ppafo walk`` has beside its question: the files to list, and where it writes by default."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ppafo.walking import task_sequence as task_sequences
+from ppafo.walking.loading import FILE, load_walk
+from ppafo.walking.motion import walk_of
+
+
+def list_files() -> list[dict[str, Any]]:
+    """Return the walks and the task sequences that come with the package: name, what it is, description."""
+    rows = []
+    for library in (FILE, task_sequences.FILE):
+        files = {name: library.parse(library.read(name), name) for name in library.names()}
+        rows += [
+            {"name": name, "kind": library.noun, "description": str(file.get("description", ""))}
+            for name, file in files.items()
+        ]
+    return rows
+
+
+def default_folder(values: Mapping[str, Any]) -> Path:
+    """Return where the command writes by default: by the name of the configuration."""
+    names = ("overrides", "gait", "task_sequence", "bottle")
+    configuration = load_walk(values["scenario"], **{name: values[name] for name in names})
+    walked, bottled = walk_of(configuration).task_sequence, walk_of(configuration).bottle
+    along = ("" if walked is None else f"-{walked.name}") + ("" if bottled is None else f"-{bottled.bottle.name}")
+    kind = "walk" if values["wearers"] is None else "wearers"
+    return Path("out") / f"{kind}-{configuration.name}{along}"
