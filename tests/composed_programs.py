@@ -7,9 +7,9 @@ from typing import Any
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.entries import INLINE
-from ppafo.engine.lanes import RECORDED_ANGLE
 from ppafo.engine.loop_text import write_lanes
 from ppafo.engine.program import Program
+from ppafo.engine.replay import RECORDED_ANGLE
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import energy_balance, isothermal, lines, walk
 from ppafo.metrics import METRICS

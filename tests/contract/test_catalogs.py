@@ -13,7 +13,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.channels import TRACED
-from ppafo.engine.rows import leaf_paths, numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.metrics import METRICS, MetricKind
 from ppafo.model.catalog import VALVES
 from ppafo.model.plant import Openings
@@ -92,7 +92,7 @@ def test_quantities_of_walking_controllers_end_in_the_name_of_their_field(kind: 
 def test_controllers_return_commands_from_minus_one_to_one_and_a_state_of_the_same_kind(
     kind: ControllerKind, torque: float
 ) -> None:
-    parameters = rebuild(kind.parameters, list(numbers_by_name(kind).values()))
+    parameters = rebuilt(kind.parameters, map(float, list(numbers_by_name(kind).values())))
     state = kind.initial
     for _ in range(5):
         command, state = kind.update(parameters, state, 2.0, Measurement(1.3, 2e5, 1e5, torque), 1e-3)
@@ -103,7 +103,7 @@ def test_controllers_return_commands_from_minus_one_to_one_and_a_state_of_the_sa
 
 @pytest.mark.parametrize("kind", PROFILES.values(), ids=lambda kind: kind.name)
 def test_profiles_return_value_rate_and_second_derivative_that_belong_together(kind: ProfileKind) -> None:
-    parameters = rebuild(kind.parameters, list(defaults(kind).values()))
+    parameters = rebuilt(kind.parameters, map(float, list(defaults(kind).values())))
     width = 1e-5
     for time in (0.13, 0.41, 0.77, 1.31):
         _, rate, second = kind.value(parameters, time)
@@ -114,7 +114,7 @@ def test_profiles_return_value_rate_and_second_derivative_that_belong_together(k
 
 @pytest.mark.parametrize("kind", PROFILES.values(), ids=lambda kind: kind.name)
 def test_profiles_stay_within_the_bounds_that_they_state_and_reach_them(kind: ProfileKind) -> None:
-    parameters = rebuild(kind.parameters, list((defaults(kind) | {"level": -0.7}).values()))
+    parameters = rebuilt(kind.parameters, map(float, list((defaults(kind) | {"level": -0.7}).values())))
     lowest, highest = kind.bounds(parameters)
     values = [kind.value(parameters, 0.001 * step)[0] for step in range(5000)]
     assert min(values) == pytest.approx(lowest, abs=1e-4)
@@ -138,7 +138,7 @@ def test_valve_models_show_the_reference_solver_openings_between_0_and_1(
 @pytest.mark.parametrize(("name", "model", "settings"), valve_models())
 def test_valve_states_survive_the_way_through_rows(name: str, model: ValveModel, settings: Any) -> None:
     state = model.settle(model.prepare(settings), model.initial(), 0.6, 0.0)
-    assert rebuild(model.state, numbers(state)) == state, name
+    assert rebuilt(model.state, map(float, numbers(state))) == state, name
 
 
 def test_kinds_are_frozen() -> None:
@@ -168,7 +168,7 @@ def test_a_profile_that_says_so_is_monotone(kind: ProfileKind) -> None:
     turned = False
     for _ in range(100):
         drawn = [draw.uniform(max(item.minimum, -3.0), min(item.maximum, 3.0)) for item in kind.quantities]
-        values = [kind.value(rebuild(kind.parameters, drawn), 0.05 * step)[0] for step in range(140)]
+        values = [kind.value(rebuilt(kind.parameters, map(float, drawn)), 0.05 * step)[0] for step in range(140)]
         changes = [later - earlier for earlier, later in itertools.pairwise(values)]
         turned = turned or (min(changes) < -1e-12 and max(changes) > 1e-12)
     assert turned != kind.is_monotone

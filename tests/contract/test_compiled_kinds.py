@@ -14,7 +14,7 @@ from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import HEADER, INLINE
-from ppafo.engine.rows import leaf_paths, numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import EFFECTS, VALVES
@@ -65,7 +65,7 @@ def controllers(draw: random.Random) -> Iterator[Entry]:
     """Laws of the torque task and of walking, each through a hundred samples of its own state."""
     for kind in [*CONTROLLERS.values(), *WALKING_CONTROLLERS.values()]:
         walks = kind.name in WALKING_CONTROLLERS
-        parameters, state, tried = rebuild(kind.parameters, numbers_of(kind, draw)), kind.initial, []
+        parameters, state, tried = rebuilt(kind.parameters, map(float, numbers_of(kind, draw))), kind.initial, []
         for sample in range(100):
             pressures = [draw.uniform(1.0e5, 4.5e5) for _ in range(2)]
             seen: Any = Measurement(draw.uniform(0.9, 1.8), *pressures, draw.uniform(-8.0, 8.0))
@@ -83,7 +83,7 @@ def profiles(draw: random.Random) -> Iterator[Entry]:
         points = {f"time_{number:02}": 0.07 * number for number in range(1, 40)} | {"period": 1.7}
         drawn = zip(kind.quantities, settings(kind, draw), strict=True)
         numbers = [points.get(item.name, value or draw.uniform(0.1, 2.0)) for item, value in drawn]
-        parameters = rebuild(kind.parameters, numbers)
+        parameters = rebuilt(kind.parameters, map(float, numbers))
         yield Entry(kind.name, kind.value, [(parameters, 0.031 * step) for step in range(60)])
 
 
@@ -146,7 +146,7 @@ def effects(draw: random.Random) -> Iterator[Entry]:
     """States of effects, and laws that call no place of another."""
 
     def numbers(row: Any) -> Any:
-        return rebuild(row, [draw.uniform(0.5, 2.0) for _ in leaf_paths(row, "")])
+        return rebuilt(row, map(float, [draw.uniform(0.5, 2.0) for _ in leaf_paths(row, "")]))
 
     for effect in EFFECTS.values():
         if effect.state is None:

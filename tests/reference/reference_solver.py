@@ -24,7 +24,7 @@ from ppafo.engine.lanes import BatchResult, run_batch, samples_in
 from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.linking import python_place
 from ppafo.engine.loading import load_source
-from ppafo.engine.rows import leaf_paths, numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import SimulationError
@@ -296,7 +296,7 @@ class _Solution:
         states, first = {}, gas_unknowns(self.run.program)
         for name, row in self.run.program.effect_states.items():
             count = len(leaf_paths(row, name))
-            states[name] = rebuild(row, y[first : first + count])
+            states[name] = rebuilt(row, map(float, y[first : first + count]))
             first += count
         return states
 
@@ -345,7 +345,7 @@ class _Solution:
 
     def valve_state(self) -> Any:
         """The valve's part of the unknowns."""
-        return rebuild(self.run.program.valve.state, self.y[self.valve_from :])
+        return rebuilt(self.run.program.valve.state, map(float, self.y[self.valve_from :]))
 
     def next_valve_event(self) -> float:
         """When the valve next changes by itself."""

@@ -113,7 +113,7 @@ def _bits() -> Said:
 
 def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
     """Return compilers and kept models of a cache folder; ``why_not`` says why that one is not used, if so."""
-    from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, kept_sizes, list_left_out, list_programs
+    from ppafo.engine.cache.tidying import LONGEST_UNUSED, MAXIMUM_BYTES, list_left_out, list_programs, list_texts
     from ppafo.engine.loading import compilers_to_try
 
     programs = [] if folder is None else list_programs(folder)
@@ -123,12 +123,12 @@ def models_document(folder: Path | None, why_not: str) -> dict[str, Any]:
         "folder": None if folder is None else str(folder),
         "not_used": why_not or None,
         "size": sum(program.size for program in programs),
-        "made_from_programs": 0 if folder is None else sum(kept_sizes(folder)),
+        "made_from_programs": 0 if folder is None else sum(text.size for text in list_texts(folder)),
         "left_out": {} if folder is None else list_left_out(folder),
         "kept_unused_days": LONGEST_UNUSED / _DAY,
         "most_bytes": MAXIMUM_BYTES,
         "programs": [
-            {"name": program.place.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
+            {"name": program.path.name, "size": program.size, "unused_days": max(0.0, (now - program.used) / _DAY)}
             for program in programs
         ],
     }

@@ -1,4 +1,4 @@
-"""What a controller and a profile declare of themselves."""
+"""What a controller and a profile declare of themselves, and what the defaults of their settings may follow."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -10,6 +10,53 @@ from ppafo.model.declaration import Quantity
 
 OPEN_LOOP = "constant"
 """The controller that follows no reference: its recordings have none, so that no tracking error is made of it."""
+
+VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
+PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
+"""What the default of a setting may follow of a device that has them: names in ``Quantity.follows``."""
+
+NOMINAL = {
+    name: f"nominal {name.replace('_', ' ')}"
+    for name in (
+        "flow",
+        "gas_product",
+        "valve_conductance",
+        "leak_conductance",
+        "critical_ratio",
+        "supply_pressure",
+        "dorsiflexion_pressure",
+        "atmospheric_pressure",
+        "relieving",
+        "torque_constant",
+        "displacement_per_radian",
+        "dead_volume_1",
+        "dead_volume_2",
+        "chamber_growth",
+        "chamber_rest_1",
+        "chamber_rest_2",
+        "angle_min",
+        "angle_max",
+        "pair",
+        "opening_delay",
+        "closing_delay",
+        "switching_interval",
+        "delay",
+        "lag",
+        "dead_band",
+        "joining_time",
+        "line_droop_1",
+        "line_largest_flow_1",
+        "line_volume_1",
+        "line_droop_2",
+        "line_largest_flow_2",
+        "line_volume_2",
+        "line_relieving",
+    )
+}
+"""What the default of a setting may follow of the device, for a controller that knows it, by its number in the model.
+
+``simulation.nominal`` gives each its value.
+"""
 
 Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
 """What makes the numbers of a law from its settings."""

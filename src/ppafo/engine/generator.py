@@ -2,7 +2,7 @@
 
 import ast
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import FunctionType
 from typing import Any
@@ -24,17 +24,23 @@ from ppafo.model.declaration import PlainFunction
 
 @dataclass(slots=True)
 class Composed:
-    """A function of the step in the module: its name, what it reads and sets, what is known of its arguments."""
+    """A function of the step in the module."""
 
     function: FunctionType
     name: str
+    """Its name in the module."""
     effects: Effects
+    """What it reads of a lane, and what it sets."""
     handed: tuple[str, ...]
+    """Names that it is handed before its own arguments: groups of a lane, and the lane's number."""
     known: Mapping[str, Any]
+    """Arguments whose values are known while it is composed; it has no parameters for them."""
     row: Any
     """The NamedTuple class of what it returns, None where that is one value."""
     is_phase: bool
+    """True where the loop over steps calls it, false where another function of the step does."""
     ending: str
+    """What its name ends with where another program has a function of that name that is written otherwise."""
 
     @property
     def own(self) -> str:
@@ -121,37 +127,37 @@ class StepText:
         return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
 
     def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
-        done = self.composed.get(function)
-        if done is None:
-            done = self.composed[function] = self._compose(function, known, is_phase)
-        if done.known != known or done.is_phase != is_phase:
+        """A function of the step in the module, composed once. ProgramError where it is called in two ways."""
+        composed = self.composed.get(function)
+        if composed is None:
+            composed = self.composed[function] = self._compose(function, known, is_phase)
+        if composed.known != known or composed.is_phase != is_phase:
             raise ProgramError(f"{function.__name__} stands in one step for two different functions")
-        return done
+        return composed
 
     def _compose(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
+        """Reduce a function of the step and put it into the module, where it returns what it sets.
+
+        ProgramError where it gives a value and sets groups of its lane.
+        """
         reduction = Reduction(self, function, known)
-        tree = reduction.reduced()
-        effects = reduction.effects
+        tree, effects = reduction.reduced(), reduction.effects
         if is_phase:
             # What nothing has rows for lives in this phase.
             effects.groups = {name: fields for name, fields in effects.groups.items() if name in self.rows}
-        returns = any(isinstance(node, ast.Return) for node in ast.walk(tree))
-        if returns and effects.results:
-            raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
         row = None
-        if not returns and len(effects.results) > 1:
-            row = self._result_row(function, tuple(effects.results))
-        if not returns:
-            results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in effects.results]
-            value = results[0] if len(results) == 1 else ast.Tuple(results, ast.Load())
-            whole = value if row is None else ast.Call(ast.Name(self.keep(row), ast.Load()), results, [])
-            tree.body = [*tree.body, ast.copy_location(ast.Return(whole), tree)]
-        handed = tuple(argument.arg for argument in tree.args.args)
-        handed = handed[: len([name for name in handed if name in effects.reads or name == NUMBER])]
-        name = self._written(function, tree, handed)
+        if not any(isinstance(node, ast.Return) for node in ast.walk(tree)):
+            # A single result is returned as it is.
+            row = self._result_row(function, tuple(effects.results)) if len(effects.results) > 1 else None
+            tree.body = [*tree.body, ast.copy_location(self._return(effects.results, row), tree)]
+        elif effects.results:
+            raise reduction.refuse(tree, f"'{function.__name__}' gives a value and sets groups of its lane")
+        parameters = [argument.arg for argument in tree.args.args]
+        # The groups that it reads come before its own parameters.
+        handed = tuple(name for name in parameters if name in effects.reads or name == NUMBER)
         return Composed(
             function=function,
-            name=name,
+            name=self._written(function, tree, handed),
             effects=effects,
             handed=handed,
             known=known,
@@ -159,6 +165,13 @@ class StepText:
             is_phase=is_phase,
             ending=self.ending,
         )
+
+    def _return(self, names: Sequence[str], row: Any) -> ast.Return:
+        """The statement that returns what is set: one value, a ``row`` of several, or an empty tuple."""
+        results: list[ast.expr] = [ast.Name(name, ast.Load()) for name in names]
+        if row is not None:
+            return ast.Return(ast.Call(ast.Name(self.keep(row), ast.Load()), results, []))
+        return ast.Return(results[0] if len(results) == 1 else ast.Tuple(results, ast.Load()))
 
     def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...]) -> str:
         """Put the text of a reduced function into the module; return its name there."""

@@ -23,7 +23,7 @@ from ppafo.engine.going_on import MATH, quotient, whole_part
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, numbers, rebuild
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
 from ppafo.model.declaration import PlainFunction
@@ -103,7 +103,7 @@ class PythonLanes:
                 start = 0
                 for name, row in groups.items():
                     count = len(leaf_paths(row, name))
-                    lane[name] = rebuild(row, table[start : start + count, number].tolist()) if count else ()
+                    lane[name] = rebuilt(row, table[start : start + count, number].tolist()) if count else ()
                     start += count
             lane.trace, lane.command_history = trace[:, :, number], command_history[:, number]
             lane.signal_history = signal_history[:, :, number]

@@ -1,9 +1,7 @@
 """Runs many devices at once: blocks of up to 32 lanes, spread over threads, the same numbers in any order.
 
 A run's result does not depend on its block, its place in it or the number of threads, because every lane goes
-through the same instructions and no lane sees another. A run on inputs that were recorded (``replay``), the command and
-any parameter that changed meanwhile, goes on its own between two changes, so that a recording with a constant supply
-costs only a few calls.
+through the same instructions and no lane sees another.
 """
 
 import copy
@@ -11,35 +9,34 @@ import logging
 import math
 import os
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo import interrupts
-from ppafo.control.kind import ProfileKind
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.entries import INLINE
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
-from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
-from ppafo.signals.meter import MeterKind
 
 logger = logging.getLogger("ppafo")
 
 Floats = NDArray[np.float64]
 
-PYTHON_STEP, LONGEST_UNSAID = 2.0e-4, 120.0
-"""Time [s] that Python takes for a step, and for which nobody has to be prepared."""
+PYTHON_STEP = 2.0e-4
+"""Time [s] that Python takes for a step of one run."""
+LONGEST_UNSAID = 120.0
+"""Time [s] that a run by Python may take without a word of warning."""
 
 STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
@@ -121,12 +118,12 @@ def load_program(program: Program) -> Advancing:
 
 def load_programs(programs: Iterable[Program]) -> None:
     """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
-    chosen = dict.fromkeys(programs)
-    compilers = compilers_to_try() if len(chosen) > 1 else ()
+    different = dict.fromkeys(programs)
+    compilers = compilers_to_try() if len(different) > 1 else ()
     if compilers:
         from ppafo.engine.cache.making import load_all  # most runs have one program
 
-        load_all([_current_source(program) for program in chosen], compilers[0], compiled)
+        load_all([_current_source(program) for program in different], compilers[0], compiled)
 
 
 def _current_source(program: Program) -> str:
@@ -175,7 +172,10 @@ def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
 
 
 def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads: int | None = None) -> None:
-    """Run a batch block by block, and give each result away at once: ``take(runs, result)``, from several threads."""
+    """Run a batch block by block on ``threads`` threads (all cores by default), and give each result away at once.
+
+    ``take(runs, result)`` is called from several threads.
+    """
     module = load_program(batch.program)
     runs = batch.states.shape[1]
     lanes = lanes_of(batch.program)
@@ -191,18 +191,11 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
 
     def work() -> None:
         for start in waiting:
-            if stop.is_set():
-                break
             members = slice(start, min(start + lanes, runs))
-            parameters, states = batch.parameters[:, members], batch.states[:, members]
-            block = LaneBlock(module, batch.program, batch.clock, parameters, states)
-            for done in range(0, batch.clock.step_count, STEPS_PER_CALL):
-                if stop.is_set():
-                    break
-                # An interrupt is seen between two calls only: compiled code cannot be stopped.
-                interrupts.check()
-                block.advance(min(STEPS_PER_CALL, batch.clock.step_count - done))
-            take(members, block.result())
+            result = _run_block(module, batch, members, stop)
+            if result is None:
+                break
+            take(members, result)
 
     # One block needs no pool of threads, and an interrupt reaches it at once.
     if workers == 1:
@@ -212,10 +205,23 @@ def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads
 
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for done in [pool.submit(work) for _ in range(workers)]:
-                done.result()
+            for worker in [pool.submit(work) for _ in range(workers)]:
+                worker.result()
         finally:
             stop.set()
+
+
+def _run_block(module: Advancing, batch: Batch, members: slice, stop: threading.Event) -> BatchResult | None:
+    """Run some members of a batch to their end; None where another thread has said stop before."""
+    clock = batch.clock
+    block = LaneBlock(module, batch.program, clock, batch.parameters[:, members], batch.states[:, members])
+    for first_step in range(0, clock.step_count, STEPS_PER_CALL):
+        if stop.is_set():
+            return None
+        # An interrupt is seen between two calls only: compiled code cannot be stopped.
+        interrupts.check()
+        block.advance(min(STEPS_PER_CALL, clock.step_count - first_step))
+    return None if stop.is_set() else block.result()
 
 
 def _say_how_long(steps: int) -> None:
@@ -270,6 +276,7 @@ class LaneBlock:
         interval = float(clock.record_every or clock.measure_every)
         # Samples before this step are taken; one that lies on it to rounding is still to come.
         taken = math.ceil((self._next_step - SAME_MOMENT) / interval) if interval else 0
+        # In the order of ``lane_rows.ARGUMENTS``: compiled code takes no names.
         self._module.advance(
             self.states,
             self._parameters,
@@ -306,9 +313,9 @@ class LaneBlock:
 
 def begin_block(batch: Batch) -> LaneBlock:
     """One block of all runs of a batch, not begun; ValueError for more than its program takes at once."""
-    runs, most = batch.states.shape[1], lanes_of(batch.program)
-    if runs > most:
-        raise ValueError(f"{runs} runs do not fit a block of {most}; the others would stand still")
+    runs, lanes = batch.states.shape[1], lanes_of(batch.program)
+    if runs > lanes:
+        raise ValueError(f"{runs} runs do not fit a block of {lanes}; the others would stand still")
     return LaneBlock(load_program(batch.program), batch.program, batch.clock, batch.parameters, batch.states)
 
 
@@ -320,92 +327,3 @@ def _pad_columns(columns: Floats) -> Floats:
     # Lanes that nobody asked for repeat the last run: zeros could fail, and be slow, in the physics.
     padded[:, width:] = columns[:, -1:]
     return padded
-
-
-def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
-    """The batch with meters at every sample that it would record, and traces of channels every so many samples."""
-    program = replace(batch.program, meters=tuple(meters), traced=tuple(traced))
-    clock, interval = batch.clock, batch.clock.record_every
-    clock = replace(clock, record_every=0, measure_every=interval, trace_every=trace_every)
-    rows = len(row_numbers(program.state_rows()))
-    # Meters begin with zeros; their first sample fills them.
-    states = np.zeros((rows, batch.states.shape[1]))
-    states[: batch.states.shape[0]] = batch.states
-    return Batch(program, clock, batch.parameters, states)
-
-
-def meters_of(program: Program, states: Floats) -> dict[str, Any]:
-    """The last state of each meter by its name, with arrays (runs,), in the units of the meter."""
-    groups = program.state_rows()
-    return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}
-
-
-COMMAND = "result.command"
-
-
-class Segment(NamedTuple):
-    """A straight piece of a recorded angle: a time [s], the angle [rad] then, and the angular velocity [rad/s]."""
-
-    start: float
-    level: float
-    rate: float
-
-
-def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
-    """Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s^2] at a time [s] on a straight piece."""
-    return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
-
-
-def segment_bounds(_segment: Segment) -> tuple[float, float]:
-    """Bounds [rad] of a segment: none, because the next one may lead anywhere between the stops."""
-    return -math.inf, math.inf
-
-
-RECORDED_ANGLE = ProfileKind(
-    name="recorded",
-    summary="A recorded angle, straight from sample to sample; its parameters change at every sample.",
-    quantities=(),
-    parameters=Segment,
-    value=segment_value,
-    bounds=segment_bounds,
-)
-"""Not in the catalogue: a scenario file cannot name it, because its values come from a recording.
-
-Where it is the angle of a program, its parameters are ``path.start``, ``.level`` and ``.rate``.
-"""
-
-
-@dataclass(frozen=True, slots=True)
-class StepInputs:
-    """Inputs of every step of a run: the command [-], and parameters by path such as ``plant.supply_pressure`` (SI).
-
-    ``command`` None leaves the command to the controller of the program.
-    """
-
-    command: Floats | None
-    parameters: Mapping[str, Floats]
-
-
-def replay(batch: Batch, inputs: StepInputs) -> BatchResult:
-    """Run devices on the same recorded inputs; with a command, the program must leave it to the caller."""
-    runs = batch.states.shape[1]
-    lanes = lanes_of(batch.program)
-    blocks = [slice(first, min(first + lanes, runs)) for first in range(0, runs, lanes)]
-    program, parameters, command = batch.program, inputs.parameters, inputs.command
-    command_row = row_numbers(program.state_rows())[COMMAND]
-    numbered = row_numbers(program.parameter_rows())
-    rows = [numbered[path] for path in parameters]
-    table = np.array([*parameters.values(), *(() if command is None else (command,))])
-    # Steps at which any input differs from the step before, the first step among them.
-    starts = [0, *(np.flatnonzero((np.diff(table, axis=1) != 0.0).any(axis=0)) + 1).tolist()]
-    results = []
-    for of_block in blocks:
-        block = begin_block(replace(batch, parameters=batch.parameters[:, of_block], states=batch.states[:, of_block]))
-        for start, end in zip(starts, [*starts[1:], batch.clock.step_count], strict=True):
-            if command is not None:
-                block.states[command_row] = command[start]
-            if rows:
-                block.set_parameters(rows, table[: len(rows), start])
-            block.advance(end - start)
-        results.append(block.result())
-    return join_results(results)

@@ -1,13 +1,24 @@
-"""How NamedTuples of floats lie in the rows of a lane block: one row for each number, nested ones flattened."""
+"""NamedTuples of numbers, nested or not, in a row: the paths of their numbers, and the way there and back.
+
+A path such as ``state.angle`` or ``law.knots[3]`` names a number; nested rows stand in their place. A field that is a
+tuple of a fixed length is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
+"""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, lru_cache
-from typing import Annotated, Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import number_of
+
+
+class Member(NamedTuple):
+    """A part of a row: what its path ends with (``.name``, ``[3]``), and its type."""
+
+    access: str
+    kind: Any
 
 
 def is_row(candidate: object) -> bool:
@@ -16,29 +27,27 @@ def is_row(candidate: object) -> bool:
 
 
 @cache
-def members(row: Any) -> tuple[tuple[str, Any], ...]:
-    """What a NamedTuple class or a tuple of a fixed length is made of: how each is got at (``.name``, ``[3]``), and it.
-
-    A field that is such a tuple is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
-    """
+def members(row: Any) -> tuple[Member, ...]:
+    """The parts of a NamedTuple class, or of a declared tuple of a fixed length; none of anything else."""
     if is_row(row):
         hints = get_type_hints(row, include_extras=True)
-        # What is declared of a number is for files, and none of the engine's business.
-        return tuple((f".{name}", float if number_of(hints[name]) else hints[name]) for name in row._fields)
+        # Unit and range of a declared number are for files: here it is a float.
+        return tuple(Member(f".{name}", float if number_of(hints[name]) else hints[name]) for name in row._fields)
     if get_origin(row) is Annotated:
         items, length = get_args(row)
-        return tuple((f"[{number}]", get_args(items)[0]) for number in range(length))
+        return tuple(Member(f"[{number}]", get_args(items)[0]) for number in range(length))
     return ()
 
 
+# Far more than the classes of a process: this is asked again and again while texts are composed.
 @lru_cache(maxsize=4096)
 def is_number(row: Any) -> bool:
-    """True for the type of a single number, false for a NamedTuple or a tuple."""
+    """True for the type of a single number, false for a NamedTuple class or a declared tuple."""
     return not is_row(row) and get_origin(row) is not Annotated
 
 
 def leaf_paths(row: Any, prefix: str) -> list[str]:
-    """Paths of all numbers in a NamedTuple class (or a float), in order, each beginning with ``prefix``: ``a.b[3]``."""
+    """Paths of all numbers of a NamedTuple class (or of a float), in order, each beginning with ``prefix``."""
     return list(_leaf_paths(row, prefix))
 
 
@@ -46,31 +55,34 @@ def leaf_paths(row: Any, prefix: str) -> list[str]:
 def _leaf_paths(row: Any, prefix: str) -> tuple[str, ...]:
     if is_number(row):
         return (prefix,)
-    return tuple(path for way, inner in members(row) for path in _leaf_paths(inner, f"{prefix}{way}"))
+    return tuple(path for member in members(row) for path in _leaf_paths(member.kind, f"{prefix}{member.access}"))
 
 
 def row_numbers(groups: Mapping[str, type], first: int = 0) -> dict[str, int]:
-    """Row of every number of some groups of rows, by its path such as ``state.angle``, from row ``first`` on."""
+    """Number of the row of each number of some groups, by its path, from row ``first`` on."""
     paths = [path for name, row in groups.items() for path in leaf_paths(row, name)]
     return {path: number for number, path in enumerate(paths, first)}
 
 
-def row_expression(row: Any, path: str, cells: dict[str, str], name_of: Callable[[type], str]) -> str:
-    """Source text that makes a NamedTuple (or a float) from the cells that hold its numbers; an empty one is ``()``."""
+def row_expression(row: Any, path: str, cells: Mapping[str, str], name_of: Callable[[type], str]) -> str:
+    """Source text that makes a NamedTuple (or a float) of a path; an empty one is ``()``.
+
+    ``cells`` has the expression of each number by its path, ``name_of`` gives the name of a class in the text.
+    """
     if is_number(row):
         return cells[path]
-    inner = [row_expression(kind, f"{path}{way}", cells, name_of) for way, kind in members(row)]
-    if not inner:
+    parts = [row_expression(member.kind, f"{path}{member.access}", cells, name_of) for member in members(row)]
+    if not parts:
         return "()"
-    return f"{name_of(row)}({', '.join(inner)})" if is_row(row) else f"({', '.join(inner)},)"
+    return f"{name_of(row)}({', '.join(parts)})" if is_row(row) else f"({', '.join(parts)},)"
 
 
 def leaves(row: Any) -> list[Any]:
     """All numbers of a NamedTuple, floats or arrays (runs,), in the order of ``leaf_paths``."""
-    flat: list[Any] = []
+    values: list[Any] = []
     for value in row:
-        flat += leaves(value) if isinstance(value, tuple) else [value]
-    return flat
+        values += leaves(value) if isinstance(value, tuple) else [value]
+    return values
 
 
 def numbers(row: Any) -> list[float]:
@@ -80,31 +92,26 @@ def numbers(row: Any) -> list[float]:
 
 def table(groups: Sequence[Any], runs: int) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
     """Rows (numbers, runs) of some NamedTuples whose numbers are floats, the same for all runs, or arrays (runs,)."""
-    flat = [value for group in groups for value in leaves(group)]
-    rows = np.empty((len(flat), runs))
-    for row, value in zip(rows, flat, strict=True):
+    values = [value for group in groups for value in leaves(group)]
+    rows = np.empty((len(values), runs))
+    for row, value in zip(rows, values, strict=True):
         # Broadcast: a float fills the row of all runs.
         row[:] = value
     return rows
 
 
-def rebuild(row: type, values: "np.ndarray[Any, Any] | list[float]") -> Any:
-    """The NamedTuple whose numbers are ``values``, in the units of its fields; the inverse of ``numbers``."""
-    return rebuilt(row, [float(value) for value in values])
-
-
 def rebuilt(row: Any, values: Iterable[Any]) -> Any:
-    """The NamedTuple whose numbers, floats or arrays, are the next of ``values``; the inverse of ``leaves``."""
+    """The NamedTuple of a class with the next of ``values``, floats or arrays, as its numbers: undoes ``leaves``."""
     # Of an iterator this is the iterator itself: nested rows go on where the one before ended.
     rest = iter(values)
     if is_number(row):
         return next(rest)
-    inner = [rebuilt(kind, rest) for _, kind in members(row)]
-    return row(*inner) if is_row(row) else tuple(inner)
+    parts = [rebuilt(member.kind, rest) for member in members(row)]
+    return row(*parts) if is_row(row) else tuple(parts)
 
 
-def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, Any]") -> Any:
-    """The NamedTuple of a group of rows (rows, runs), such as ``Program.state_rows`` names, with arrays (runs,).
+def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, np.dtype[np.float64]]") -> Any:
+    """The NamedTuple of one of the ``groups`` that lie in ``rows`` (numbers, runs), with arrays (runs,).
 
     KeyError where no group has that name.
     """

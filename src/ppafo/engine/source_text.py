@@ -456,19 +456,13 @@ class SourceCollector:
         lines = " ".join(map(str, [tree.lineno, *_line_numbers(tree.body), (tree.end_lineno or tree.lineno) + 1]))
         return f"{ORIGIN} {one_line(file)}: {lines}\n{self.decorator}\n{ast.unparse(tree)}"
 
-    def _function_text(self, function: Any, name: str) -> str:
+    def _function_text(self, function: FunctionType, name: str) -> str:
+        """The text of a function under its name in the module; all that it calls is added before.
+
+        ProgramError where something in it cannot be compiled, or where it calls itself.
+        """
         tree = parse_definition(function, self.adapt)
-        file = function.__code__.co_filename
-        made = Made(
-            function=function,
-            code=function.__code__,
-            defaults=function.__defaults__,
-            named_defaults=dict(function.__kwdefaults__ or {}),
-        )
-        # A function is noted before its body is read, so that one met again inside it calls itself.
-        if any(known.function is function for known in self.made_from.functions):
-            raise refusal(file, tree, f"'{function.__name__}' calls itself, which cannot be compiled")
-        self.made_from.functions.append(made)
+        self._note_function(function, tree)
         composer = Composer(
             function,
             lambda called: self.add_inside(function, called),
@@ -476,31 +470,32 @@ class SourceCollector:
             lambda callee: self.needs.get(callee, ()),
             self.stands_for,
         )
-        arguments = tree.args
-        asked = self.effects.get(function, ())
-        if asked:
-            # Structs of effects come first, in every function: callers can then hand them over without knowing the
-            # rest.
-            arguments.args = sorted(arguments.args, key=lambda argument: argument.arg not in asked)
-        for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
-            argument.annotation = None
-        # What Python calls the function with, whatever the text of the default stands for by now.
-        arguments.defaults = [composer.literal(value, tree, "a default") for value in made.defaults or ()]
-        arguments.kw_defaults = [
-            composer.literal(made.named_defaults[argument.arg], tree, "a default")
-            if argument.arg in made.named_defaults
-            else None
-            for argument in arguments.kwonlyargs
-        ]
+        rows = self.effects.get(function, ())
+        _compose_parameters(composer, tree, rows)
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
         tree.name, tree.returns = name, None
         tree.body = [composer.visit(statement) for statement in body]
+        # Rows that what it calls needs, and that it has no parameter for, are handed to it in its turn.
         handed = sorted(composer.needed)
-        arguments.args = [*map(ast.arg, handed), *arguments.args]
-        if asked or handed:
-            own = [argument.arg for argument in arguments.args if argument.arg in asked]
-            self.needs[name] = (*handed, *own)
-        return self.decorated(tree, file)
+        parameters = [*map(ast.arg, handed), *tree.args.args]
+        if rows or handed:
+            self.needs[name] = (*handed, *(argument.arg for argument in parameters if argument.arg in rows))
+        tree.args.args = parameters
+        return self.decorated(tree, function.__code__.co_filename)
+
+    def _note_function(self, function: FunctionType, tree: ast.FunctionDef) -> None:
+        """Keep a function as it is now, before its body is read, so that one met again inside it calls itself."""
+        if any(known.function is function for known in self.made_from.functions):
+            problem = f"'{function.__name__}' calls itself, which cannot be compiled"
+            raise refusal(function.__code__.co_filename, tree, problem)
+        self.made_from.functions.append(
+            Made(
+                function=function,
+                code=function.__code__,
+                defaults=function.__defaults__,
+                named_defaults=dict(function.__kwdefaults__ or {}),
+            )
+        )
 
     def add_inside(self, function: Any, called: Any) -> str:
         """Add what a function calls; a law of an effect that calls its own port gets what was there before it."""
@@ -511,6 +506,23 @@ class SourceCollector:
                 f"{place_of(function)}: '{called.__name__}' is the law of an effect: call its port instead"
             )
         return self.add(called)
+
+
+def _compose_parameters(composer: Composer, tree: ast.FunctionDef, rows: tuple[str, ...]) -> None:
+    """Write the parameters of a function as the module has them: without annotations, ``rows`` of effects first."""
+    function, arguments = composer.function, tree.args
+    if rows:
+        # In every function, so that callers can hand them over without knowing the rest.
+        arguments.args = sorted(arguments.args, key=lambda argument: argument.arg not in rows)
+    for argument in (*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs):
+        argument.annotation = None
+    # What Python calls the function with, whatever the text of the default stands for by now.
+    arguments.defaults = [composer.literal(value, tree, "a default") for value in function.__defaults__ or ()]
+    named = function.__kwdefaults__ or {}
+    arguments.kw_defaults = [
+        composer.literal(named[argument.arg], tree, "a default") if argument.arg in named else None
+        for argument in arguments.kwonlyargs
+    ]
 
 
 def check_is_plain(function: Any) -> None:

@@ -1,4 +1,4 @@
-"""How a component declares its parameters: name, unit, range and meaning; what its functions are. No physics.
+"""What a component declares: its numbers, with name, unit, range and meaning, and its laws, which are plain functions.
 
 A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
 ``area: Annotated[float, Number("m^2", "area of the opening")]``.
@@ -10,68 +10,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from types import CodeType
-from typing import Annotated, Any, ClassVar, Protocol, get_args, get_origin, get_type_hints
-
-VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
-PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
-"""What a default may follow."""
-
-NOMINAL = {
-    name: f"nominal {name.replace('_', ' ')}"
-    for name in (
-        "flow",
-        "gas_product",
-        "valve_conductance",
-        "leak_conductance",
-        "critical_ratio",
-        "supply_pressure",
-        "dorsiflexion_pressure",
-        "atmospheric_pressure",
-        "relieving",
-        "torque_constant",
-        "displacement_per_radian",
-        "dead_volume_1",
-        "dead_volume_2",
-        "chamber_growth",
-        "chamber_rest_1",
-        "chamber_rest_2",
-        "angle_min",
-        "angle_max",
-        "pair",
-        "opening_delay",
-        "closing_delay",
-        "switching_interval",
-        "delay",
-        "lag",
-        "dead_band",
-        "joining_time",
-        "line_droop_1",
-        "line_largest_flow_1",
-        "line_volume_1",
-        "line_droop_2",
-        "line_largest_flow_2",
-        "line_volume_2",
-        "line_relieving",
-    )
-}
-"""What a default may follow of the device itself, for a controller that knows it."""
+from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
 
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One parameter of a component: name, unit, meaning, default and range, in SI. ``default`` None: it must be given.
-
-    What the default ``follows`` is added to it: some of those above, or of ``control.torque_loop``.
-    """
+    """One parameter of a component: default and range in the SI ``unit``, ``summary`` its meaning."""
 
     name: str
     unit: str
     summary: str
     default: float | None = None
+    """None where it must be given."""
     minimum: float = -math.inf
     maximum: float = math.inf
     minimum_allowed: bool = True
+    """False where it must be above ``minimum``."""
     follows: tuple[str, ...] = ()
+    """Names of numbers that are added to the default: of ``control.kind``, or of a loop in ``control``."""
 
 
 Number = partial(Quantity, "")
@@ -84,13 +40,13 @@ def quantities_of(section: type) -> tuple[Quantity, ...]:
 
     They are in the order of its fields; a field without a ``Number`` is none.
     """
-    found: list[Quantity] = []
+    quantities: list[Quantity] = []
     for name, hint in get_type_hints(section, include_extras=True).items():
         if isinstance(hint, type) and issubclass(hint, tuple):
-            found += quantities_of(hint)
+            quantities += quantities_of(hint)
         elif (number := number_of(hint)) is not None:
-            found.append(replace(number, name=name))
-    return tuple(found)
+            quantities.append(replace(number, name=name))
+    return tuple(quantities)
 
 
 def row_with(name: str, row: Any, **hints: Any) -> Any:
@@ -106,32 +62,6 @@ def number_of(hint: Any) -> Quantity | None:
     """Return what the type of a field declares of a number, None where it declares none."""
     declared = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
     return next((item for item in declared if isinstance(item, Quantity)), None)
-
-
-class Holding(Protocol):
-    """A section of a scenario or device that has numbers of its fields ``HELD``, mappings or objects, as its own."""
-
-    HELD: ClassVar[tuple[str, ...]]
-
-
-def held_in(section: Holding, name: str) -> str | None:
-    """Return which field of ``HELD`` has a number; None where none has it."""
-    for field in section.HELD:
-        inner = getattr(section, field)
-        if name in inner if isinstance(inner, Mapping) else hasattr(inner, name):
-            return field
-    return None
-
-
-def held(section: Holding, name: str) -> Any:
-    """Return a number of one of the fields of ``HELD``, for ``__getattr__``; AttributeError where none has it."""
-    # A copy asks for names that begin so, and for the fields themselves, before there are any.
-    if not name.startswith("_") and name not in section.HELD:
-        field = held_in(section, name)
-        if field is not None:
-            inner = getattr(section, field)
-            return inner[name] if isinstance(inner, Mapping) else getattr(inner, name)
-    raise AttributeError(f"{type(section).__name__} has no '{name}'")
 
 
 def range_rule(quantity: Quantity, limits: str) -> str:

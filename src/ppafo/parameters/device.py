@@ -3,19 +3,45 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Protocol
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.declaration import Number, held
+from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
 from ppafo.parameters.joint import ANKLE, Joint
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
+
+
+class Holding(Protocol):
+    """A section of a device or scenario that shows numbers of its fields ``HELD``, mappings or objects, as its own."""
+
+    HELD: ClassVar[tuple[str, ...]]
+
+
+def held_in(section: Holding, name: str) -> str | None:
+    """Return which field of ``HELD`` has a number; None where none has it."""
+    for field_name in section.HELD:
+        holder = getattr(section, field_name)
+        if name in holder if isinstance(holder, Mapping) else hasattr(holder, name):
+            return field_name
+    return None
+
+
+def held(section: Holding, name: str) -> Any:
+    """Return a number of one of the fields of ``HELD``, for ``__getattr__``; AttributeError where none has it."""
+    # A copy asks for names that begin so, and for the fields themselves, before there are any.
+    if not name.startswith("_") and name not in section.HELD:
+        field_name = held_in(section, name)
+        if field_name is not None:
+            holder = getattr(section, field_name)
+            return holder[name] if isinstance(holder, Mapping) else getattr(holder, name)
+    raise AttributeError(f"{type(section).__name__} has no '{name}'")
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,9 +200,14 @@ class Device:
     joint: Joint = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
+    @property
+    def has_torque_constant(self) -> bool:
+        """True where the torque is a constant times the difference of both pressures."""
+        return ACTUATORS[self.actuator.kind].model.has_torque_constant
+
     def check_torque_constant(self, what: str) -> None:
         """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""
-        if not ACTUATORS[self.actuator.kind].model.has_torque_constant:
+        if not self.has_torque_constant:
             raise ParameterError(
                 f"{what} needs a torque that is a constant times the difference of both pressures, as a vane has it; "
                 f"'{self.name}' has an actuator '{self.actuator.kind}', whose torque depends on the angle, too"

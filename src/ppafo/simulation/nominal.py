@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.binding import bind
+from ppafo.control.kind import NOMINAL
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import first
-from ppafo.model.declaration import NOMINAL
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.model.valves.proportional import spool_lag

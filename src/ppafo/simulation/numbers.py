@@ -5,10 +5,10 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ppafo.model.catalog import VALVES, device_effects
-from ppafo.model.declaration import Quantity, held_in
+from ppafo.model.declaration import Quantity
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
 from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
-from ppafo.parameters.device import Device, Orifice, SonicOrifice
+from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path
 from ppafo.parameters.plant import number_under, part_of

@@ -14,8 +14,8 @@ from ppafo.documents.json_text import plain
 from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE
 from ppafo.errors import ScenarioError
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import Number, held
-from ppafo.parameters.device import Device, Supply
+from ppafo.model.declaration import Number
+from ppafo.parameters.device import Device, Supply, held
 from ppafo.parameters.graph import Graph, outside
 from ppafo.simulation.motion_kind import MOTIONS, MotionKind
 

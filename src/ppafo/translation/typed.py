@@ -1,6 +1,7 @@
 """What the typed walk finds in a composed module: terms and statements that say the same in every language."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeAlias
 
 from ppafo.translation.value_types import FLOAT, Array, Items, Row, Scalar, Shared, Type, types_in
@@ -8,7 +9,7 @@ from ppafo.translation.value_types import FLOAT, Array, Items, Row, Scalar, Shar
 _NONE: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Term:
     """A value: what makes it, its type, the terms that it is made of, and a name or number where it has one.
 
@@ -20,13 +21,13 @@ class Term:
     type: Type
     parts: tuple["Term", ...] = ()
     detail: Any = None
-    reads: frozenset[str] = field(init=False, compare=False, repr=False)
-    """Local names whose values it takes."""
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def reads(self) -> frozenset[str]:
+        """Local names whose values it takes."""
         # Gathered once: asked again and again while scopes are found.
         names = frozenset((self.detail,)) if self.kind == "name" else _NONE
-        object.__setattr__(self, "reads", names.union(*(part.reads for part in self.parts)) if self.parts else names)
+        return names.union(*(part.reads for part in self.parts)) if self.parts else names
 
 
 SIGNS = frozenset({"+", "-", "*", "/", "//", "%", "&", "|", "^", ">>", "<", "<=", ">", ">=", "==", "!=", "and", "or"})

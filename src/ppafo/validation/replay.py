@@ -7,7 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.engine.lanes import Batch, Floats, StepInputs, replay
+from ppafo.engine.lanes import Batch, Floats
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.errors import DataError, PpafoError, SimulationError
@@ -20,7 +21,7 @@ from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import Start
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
 from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import Measured
 
@@ -163,8 +164,7 @@ def replayed_scenario(request: Replay) -> Scenario:
         motion = locked_vane(start.angle)
     elif request.motion == "leg":
         # The leg on the test fixture is the scenario's of figure 7.
-        fixture = load_scenario("step-response").motion
-        leg = request.leg or (fixture.leg if isinstance(fixture, FreeMotion) else None)
+        leg = request.leg or vane_motion(load_scenario("step-response")).leg
         motion = FreeMotion(start.angle, start.angular_velocity, leg=leg)
     highest = with_highest_supply(request.device, recording, recording.names)
     duration = recording.duration + max(request.extra, sample_period(recording.time))

@@ -8,12 +8,8 @@ from typing import Annotated, Any
 from pydantic import BaseModel, Field
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.walking.catalog import (
-    TIMINGS,
-    WALKING_CONTROLLERS,
-    load_walking_controller,
-    walking_controllers,
-)
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS, load_walking_controller, walking_controllers
+from ppafo.control.walking.timings import TIMINGS
 from ppafo.documents.models import make_schema, one_of, optional, quote, table
 from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.model.declaration import Quantity

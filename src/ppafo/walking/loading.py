@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ppafo.arguments import Overrides, checked
-from ppafo.control.walking.catalog import TIMINGS, walking_controllers, with_timing
+from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
+from ppafo.control.walking.catalog import walking_controllers
+from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
-from ppafo.model.declaration import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.shut_off import SHUT_OFF
@@ -23,6 +24,7 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
@@ -73,7 +75,7 @@ from ppafo.walking.motion import (
     walk_of,
     with_duration,
 )
-from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
+from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import TaskSequence, load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
@@ -399,7 +401,7 @@ def _terms(valve: Valve) -> dict[str, Term]:
     """Return how lags and delays [s] of valve and sensors, which a controller may follow, come from their settings."""
     kind = VALVES[valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
-    paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay
+    paths, delay = tuple(f"valve.{name}" for name in names), venting_valve(valve).command_delay
     return {
         VALVE_LAG: Term(paths, kind.lag or delay, (kind.settings,)),
         VALVE_DELAY: Term(paths, delay, (kind.settings,)),

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ppafo.control.walking.catalog import TIMINGS
+from ppafo.control.walking.timings import TIMINGS
 from ppafo.gait import Gait
 from ppafo.gait.plausible import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs

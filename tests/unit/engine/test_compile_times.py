@@ -77,7 +77,7 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
         "ppafo: compiling 2 models for this computer"
     ]
     assert len(caplog.messages) == 2
-    kept = [item.place / "seconds.txt" for item in list_programs(fresh_cache)]
+    kept = [item.path / "seconds.txt" for item in list_programs(fresh_cache)]
     assert len(kept) == 3
     assert all(float(file.read_text()) >= 0.0 for file in kept)
 

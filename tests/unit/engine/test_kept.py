@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.engine.cache.folder import TEXTS
 from ppafo.engine.cache.texts import kept_bytes
-from ppafo.engine.cache.tidying import clear, kept_sizes
+from ppafo.engine.cache.tidying import clear, list_texts
 
 
 class Maker:
@@ -117,7 +117,7 @@ def test_the_largest_size_is_kept_by_removing_what_was_used_first(
     monkeypatch.setattr("ppafo.engine.cache.texts.MAXIMUM_BYTES", 1000)
     for number in range(6):
         kept_bytes("text", f"program {number}", Maker(bytes(300)))
-    assert sum(kept_sizes(fresh_cache)) <= 1000
+    assert sum(text.size for text in list_texts(fresh_cache)) <= 1000
     last = Maker()
     kept_bytes("text", "program 5", last)
     assert last.times == 0

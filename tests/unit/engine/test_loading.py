@@ -123,7 +123,7 @@ def test_a_compiler_without_headers_is_reported_once_and_the_next_one_compiles(
     assert chosen() == "gcc"
     assert result_of(text("x[0, 0] * 5.0")) == 10.0
     assert caplog.messages == []
-    assert {item.place.name.split("_")[1] for item in list_programs(fresh_cache)} == {"gcc"}
+    assert {item.path.name.split("_")[1] for item in list_programs(fresh_cache)} == {"gcc"}
 
 
 @on_unix

@@ -35,7 +35,7 @@ def compiled(fresh_cache: Path) -> Path:
     """The folder of the one program in a fresh cache."""
     assert loaded() == 42.0
     (program,) = list_programs(fresh_cache)
-    return program.place
+    return program.path
 
 
 def loaded() -> float:
@@ -259,7 +259,7 @@ def test_a_program_is_this_users_whatever_the_habits_of_files(fresh_cache: Path)
     finally:
         os.umask(before)
     (kept,) = list_programs(fresh_cache)
-    assert not any(place.stat().st_mode & 0o022 for place in (kept.place, *kept.place.rglob("*")))
+    assert not any(place.stat().st_mode & 0o022 for place in (kept.path, *kept.path.rglob("*")))
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="no permission bits here")

@@ -14,7 +14,7 @@ import pytest
 
 from ppafo.engine.compilers import FLAGS
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, rebuild
+from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import batch_of
 from ppafo.engine.step import (
     energy_balance,
@@ -60,7 +60,7 @@ def lane_of(name: str, *overrides: str) -> tuple[Program, Lane]:
         begin = 0
         for group, row in groups.items():
             count = len(leaf_paths(row, group))
-            lane[group] = rebuild(row, table[begin : begin + count, 0].tolist()) if count else ()
+            lane[group] = rebuilt(row, table[begin : begin + count, 0].tolist()) if count else ()
             begin += count
     return program, lane
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ppafo.engine.lanes import StepInputs, replay
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, RealTime, Row

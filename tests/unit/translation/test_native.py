@@ -69,11 +69,11 @@ def test_a_program_of_gcc_is_kept_found_again_and_made_anew_where_it_is_damaged(
     forget_programs(monkeypatch)
     expected = by("gcc", batch, monkeypatch)
     (kept,) = list_programs(fresh_cache)
-    assert kept.place.name.startswith("ppafo_gcc_")
+    assert kept.path.name.startswith("ppafo_gcc_")
     forget_programs(monkeypatch)
     assert by("gcc", batch, monkeypatch) == expected
     assert len(compiled) == 1
-    library = kept.place / "program.so"
+    library = kept.path / "program.so"
     # Another file in its place: what is loaded already stays as it is.
     copy = library.with_name("copy")
     copy.write_bytes(library.read_bytes() + b"x")

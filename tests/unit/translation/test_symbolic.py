@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuild, rebuilt
+from ppafo.engine.rows import leaf_paths, leaves, numbers, rebuilt
 from ppafo.engine.scheme.pneumatics import GAMMA, SlopedFlows, linearise, sloped_flows
 from ppafo.engine.scheme.thermal_gas import transport
 from ppafo.errors import ProgramError
@@ -109,7 +109,7 @@ CASES: dict[str, tuple[Callable[..., Any], tuple[Any, ...], Callable[[random.Ran
         (solenoid.TimedSolenoid, solenoid.PairState, float, float),
         lambda draw: (
             solenoid.TimedSolenoid(0.01, draw.choice([0.0, 0.02]), 0.05),
-            rebuild(solenoid.PairState, [draw.choice([0.0, 1.0]) for _ in range(8)]),
+            rebuilt(solenoid.PairState, map(float, [draw.choice([0.0, 1.0]) for _ in range(8)])),
             draw.choice([-1.0, 0.0, 1.0, 2.0]),
             draw.uniform(0.0, 2.0),
         ),

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.lanes import Segment, segment_value
+from ppafo.engine.replay import Segment, segment_value
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Channel, Recording

@@ -98,11 +98,10 @@ def compared(
     Without a study the noise of the sensors alone is drawn, where there is any. StudyError where too many runs fail,
     and for a study that draws a value in which the configurations differ.
     """
-    scenarios = {
-        (task, configuration.name): with_overrides(configuration.scenario, texts)
-        for task, texts in overrides.items()
-        for configuration in configurations
-    }
+    scenarios: dict[tuple[str, str], Scenario] = {}
+    for task, texts in overrides.items():
+        for configuration in configurations:
+            scenarios[task, configuration.name] = with_overrides(configuration.scenario, texts)
     metrics = compared_metrics(scenarios.values())
     distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
     uncertainty = distributions.with_noise_of(scenarios.values())

@@ -8,9 +8,9 @@ import math
 from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
-from ppafo.control.kind import ControllerKind
+from ppafo.control.kind import NOMINAL, ControllerKind
 from ppafo.control.torque_loop import CONVERGENCE
-from ppafo.model.declaration import NOMINAL, Number, Quantity, quantities_of
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
 

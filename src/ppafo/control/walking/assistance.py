@@ -116,15 +116,19 @@ class TorqueRequest(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """One sample: phase, clock and gait phase as a time, safety, request; 1 where the task goes on; 1 where it acts."""
+    """What a controller makes of one sample, before its law answers."""
 
     phase: PhaseState
     clock: Any
+    """What the timing remembers, by its kind."""
     time: GaitTime
+    """The gait phase as a time."""
     safety: SafetyState
     request: TorqueRequest
     continues: float
+    """1 where the task of the sample before goes on, 0 where another begins."""
     acts: float
+    """1 where the law commands the valve, 0 where both chambers are vented."""
 
 
 class AssistingParameters(Protocol):
@@ -173,7 +177,7 @@ EASING_TIME = 0.1
 """Time [s] after a landing on the toes in which a torque in plantarflexion is taken off by the law; it vents after."""
 
 EASED = 0.3
-"""Torque in plantarflexion [N m] above which it is."""
+"""Torque in plantarflexion [N m] above which the law takes it off."""
 
 LARGEST_PRESS = 0.7
 """Largest torque in plantarflexion [N m] that is requested in the swing."""
@@ -217,23 +221,36 @@ def timed_phase(
     return after, followed, threshold_time(parameters.timing, followed, after)
 
 
+def filtered_rate(last: TorqueRequest, angle: float, time_constant: float, period: float) -> float:
+    """Rate of the angle [rad/s] after a sample of it [rad], behind a filter of first order with a time constant [s].
+
+    The step is implicit, so that it is stable for any time constant: (1 + period / tau) r = r_last + turned / tau.
+    """
+    # An angle of 0 marks that there was no sample before.
+    turned = angle - last.angle if last.angle > 0.0 else 0.0
+    return last.rate + (turned - period * last.rate) / (period + time_constant)
+
+
+def is_eased(phase: PhaseState, torque: float) -> bool:
+    """True where a torque of the actuator [N m] in plantarflexion is taken off by the law, after a landing on the toes.
+
+    A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel.
+    """
+    # A stance that began on the toes has been in mid-stance since its strike: it had no landing.
+    on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
+    return on_toes and phase.since_strike < EASING_TIME and torque > EASED
+
+
 def assess(
     parameters: AssistingParameters, state: AssistingState, measurement: GaitMeasurement, period: float
 ) -> Assessment:
-    """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s]."""
+    """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s], and whether to act on it."""
     phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
-    last = state.request
-    # An angle of exactly 0 marks that there was no sample before.
-    turned = measurement.angle - last.angle if last.angle > 0.0 else 0.0
-    # Implicit first-order filter of the angle's difference.
-    rate = last.rate + (turned - period * last.rate) / (period + parameters.assistance.hold.rate_filter)
-    torque = requested_torque(parameters.assistance, phase, time, measurement.angle, rate)
-    # A foot that lands on its toes turns far, and gas left in the chamber would then push on a loaded heel.
-    # A stance that has been mid-stance since its strike began on the toes.
-    on_toes = phase.phase == MID_STANCE and phase.in_phase >= phase.since_strike
-    bends = on_toes and phase.since_strike < EASING_TIME and measurement.torque > EASED
-    works = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or bends
+    rules = parameters.assistance
+    rate = filtered_rate(state.request, measurement.angle, rules.hold.rate_filter, period)
+    torque = requested_torque(rules, phase, time, measurement.angle, rate)
+    has_task = phases.lifts(phase.phase) or phase.phase == PUSH_OFF or is_eased(phase, measurement.torque)
     return Assessment(
         phase=phase,
         clock=clock,
@@ -241,7 +258,7 @@ def assess(
         safety=watch,
         request=TorqueRequest(measurement.angle, rate, torque),
         continues=1.0 if same_task(state.phase.phase, phase.phase) else 0.0,
-        acts=1.0 if works and safety.permits(watch, phase.phase) else 0.0,
+        acts=1.0 if has_task and safety.permits(watch, phase.phase) else 0.0,
     )
 
 

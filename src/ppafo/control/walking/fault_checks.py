@@ -9,6 +9,7 @@ Flags are joined by ``&`` and ``|``: ``and`` and ``or`` are branches, which keep
 
 from typing import Annotated, NamedTuple
 
+from ppafo.control.kind import PRESSURE_LAG, VALVE_LAG
 from ppafo.control.walking.fault_flags import (
     ANGLE_RANGE,
     FORCE_GONE,
@@ -24,7 +25,7 @@ from ppafo.control.walking.fault_flags import (
 )
 from ppafo.control.walking.observer import NOMINAL_QUANTITIES, NominalDevice, pressure_above
 from ppafo.control.walking.phases import PhaseState, lifts
-from ppafo.model.declaration import PRESSURE_LAG, VALVE_LAG, Number, quantities_of
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 

@@ -16,6 +16,7 @@ Every number is a setting whose default follows the device; ``nominal_flow`` 0 s
 import math
 from typing import NamedTuple
 
+from ppafo.control.kind import NOMINAL, PRESSURE_LAG
 from ppafo.control.walking.fault_flags import (
     LEAK,
     NO_FLAG,
@@ -25,11 +26,7 @@ from ppafo.control.walking.fault_flags import (
     VALVE_OPEN,
     VALVE_SHUT,
 )
-from ppafo.model.declaration import (
-    NOMINAL,
-    PRESSURE_LAG,
-    Quantity,
-)
+from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import LineState, SupplyLines, step_lines
 from ppafo.model.valves.kind import VENTS_ABOVE
 

@@ -16,8 +16,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple
 
+from ppafo.control.kind import FORCE_LAG, VALVE_DELAY
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.model.declaration import FORCE_LAG, VALVE_DELAY, Number, Quantity, quantities_of
+from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.helping import LANDING, SWING
 from ppafo.model.sensors import GaitMeasurement
 

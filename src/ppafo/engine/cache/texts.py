@@ -29,9 +29,9 @@ def kept_bytes(kind: str, made_from: str, make: Callable[[], bytes]) -> bytes:
         content = make()
         with contextlib.suppress(OSError):
             _write(file, content)
-            from ppafo.engine.cache.tidying import evict_beyond, measured, texts  # most texts are there
+            from ppafo.engine.cache.tidying import evict_beyond, list_texts  # most texts are there
 
-            evict_beyond(measured(texts(folder)), MAXIMUM_BYTES)
+            evict_beyond(list_texts(folder), MAXIMUM_BYTES)
     return content
 
 

@@ -1,4 +1,4 @@
-"""The numbers of one run, by group, and the step that all runs are at."""
+"""The numbers of one run by group, as the functions of the step see them, and the step that all runs are at."""
 
 from functools import reduce
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:  # rows of what few devices have
+if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
     from ppafo.engine.scheme.pneumatics import (
         Flows,
@@ -38,27 +38,29 @@ MAXIMUM_PARTS = 100_000
 
 
 class LaneTiming(NamedTuple):
-    """Longest step and sample period [s]; shares of a step by which commands and signals are late beyond whole steps.
-
-    ``tolerance`` is the error over the one that a run is allowed by default [-].
-    """
+    """The grid of a run in time."""
 
     step: float
+    """Longest step [s]."""
     period: float
+    """Time [s] between two samples of the controller."""
     command_lag: float
+    """Share of a step [-] by which commands are late beyond whole steps."""
     signal_lag: float
+    """Share of a step [-] by which signals are late beyond whole steps."""
     tolerance: float
+    """Error that a step may have, over the one that a run is allowed by default [-]."""
 
 
 class LaneResult(NamedTuple):
-    """Command in force [-], first time [s] at which a run left what is possible (huge where it did not).
-
-    ``too_many_parts`` is 1 where it failed because a step was cut into more parts than are made of one.
-    """
+    """The command in force, and whether and why the run has failed."""
 
     command: float
+    """Command in force [-]."""
     failure_time: float
+    """First time [s] at which the run left what is possible; huge where it did not."""
     too_many_parts: float
+    """1 where it failed because a step was cut into more than ``MAXIMUM_PARTS`` parts, else 0."""
 
 
 class LaneStart(NamedTuple):
@@ -74,40 +76,47 @@ class NoParameters(NamedTuple):
 class Now(NamedTuple):
     """The step of all lanes: its number, the controller's sample, and the share of it that is to be done.
 
-    The rest are places in rings of what comes late, which the loop works out once for all lanes: the commands that the
-    valve has before and after one arrives, signals that sensors show and take, and readings of a walk with the length
-    of their ring.
+    The rest are places in rings of what comes late, which the loop works out once for all lanes; 0 where nothing does.
     """
 
     step: int
+    """Number of the step, from 0 at the start of the run."""
     sample: int
+    """Number of the controller's last sample."""
     goal: float
+    """Share of the step [-] up to which it is to be done: less than 1 where a sample lies inside it."""
     early_command: int
+    """Place of the command that the valve has before one arrives in this step."""
     late_command: int
+    """Place of the command that the valve has after it."""
     late_signal: int
+    """Place of the signals that sensors show now."""
     next_signal: int
+    """Place of the signals that sensors take at the end of the step."""
     reading: int
+    """Place of the readings of a walk that are taken at this sample."""
     readings: int
+    """Length of their ring."""
 
 
 class Lane:
     """The numbers of one run by group: ``lane.state``, or ``lane["state"]`` where the name depends on the parts.
 
     Which groups there are is for ``Program`` to say. Groups of effects and meters have the names of these. Where a
-    group is ``Any``, the component that it belongs to has its class.
+    group is ``Any``, the component that it belongs to has its class. Units stand with the classes.
     """
 
-    # What a run is made of, and does not change.
+    # What a run is made of, and does not change: parameters.
     timing: LaneTiming
-    plant: Any
+    plant: Any  # of the actuator: at least the fields of ``PlantParameters``
     thermal: "ThermalParameters"
     valve: Any
     controller: Any
-    reference: Any
-    path: Any
+    reference: Any  # of the profile that the controller follows
+    path: Any  # of the profile that prescribes the angle
     sensors: "SensorParameters"
     leg: "LegParameters"
-    share: "DeviceShare"
+    share: "DeviceShare"  # what foot plate and vane add to the leg
     gait: "GaitSeries"
     gait_timing: "GaitTiming"
     gait_sensors: "GaitSensors"
@@ -115,69 +124,68 @@ class Lane:
     plant_faults: "PlantFaults"
     shut_off: "ShutOff"
     lines: "SupplyLines"
-    load: "FootLoad"
-    shank: Any
+    load: "FootLoad"  # of a foot on a prescribed shank
+    shank: Any  # of the profile of that shank
 
-    # Where it stands.
+    # Where it stands: states.
     result: LaneResult
-    pace: "Pace"
+    pace: "Pace"  # the length that the error of the last part allows the next one
     state: "PlantState"
-    masses: Any
+    masses: Any  # true masses, of gas that is not isothermal and ideal
     valve_state: Any
     controller_state: Any
     walk: "WalkState"
-    gait_seen: "GaitSeen"
+    gait_seen: "GaitSeen"  # last readings of a walk
     unpowered: "Unpowered"
     line_state: "LineState"
-    course: "Course"
+    course: "Course"  # of the reference over the whole run, for meters
     start: LaneStart
-    signal_history: NDArray[np.float64]
+    signal_history: NDArray[np.float64]  # rings of what comes late, and the traced samples
     command_history: NDArray[np.float64]
     trace: NDArray[np.float64]
 
     # What a step hands to the next one, and its phases to later ones.
-    held: "HeldChambers"
-    carried: "CarriedFoot"
-    place: "GaitPlace"
-    measured: "GaitMeasured"
-    next_gait: "GaitNow"
-    marks: "Marks"
-    begun: "FreePart"
-    prescribed: "PrescribedStep"
-    walk_begun: "WalkStep"
-    shown: Any
-    next_valve: Any
-    flowing: "SlopedFlows"
-    still_gas: "StillGas"
-    moving_gas: "MovingGas"
-    thermal_gas: "ThermalGas"
-    real_gas: "RealGas"
-    fed_gas: "FedGas"
-    fed_thermal_gas: "FedThermalGas"
-    passing: "StageFlows"
-    change: "GasChange"
+    held: "HeldChambers"  # chambers as the step begins
+    carried: "CarriedFoot"  # torques of leg and device on the foot as the step begins
+    place: "GaitPlace"  # where the gait is at the end of the step,
+    measured: "GaitMeasured"  # what was measured there,
+    next_gait: "GaitNow"  # the gait there,
+    marks: "Marks"  # and what marks a stride of a task sequence there
+    begun: "FreePart"  # first stage of an unconstrained vane
+    prescribed: "PrescribedStep"  # motion at the end of a prescribed step
+    walk_begun: "WalkStep"  # first stage of a walking leg
+    shown: Any  # what the valve shows beside its openings
+    next_valve: Any  # state of the valve at the end of a part
+    flowing: "SlopedFlows"  # flows as the step begins, with their derivatives
+    still_gas: "StillGas"  # first stage of the gas, by its kind: fixed volumes,
+    moving_gas: "MovingGas"  # moving volumes,
+    thermal_gas: "ThermalGas"  # energy balance,
+    real_gas: "RealGas"  # real gas,
+    fed_gas: "FedGas"  # behind supply lines,
+    fed_thermal_gas: "FedThermalGas"  # behind them with an energy balance
+    passing: "StageFlows"  # flows at the pressures to which the first stage leads
+    change: "GasChange"  # what the step adds to the gas, by its kind
     thermal_change: "ThermalFlows"
     real_change: "RealChange"
-    next_lines: "LineState"
-    gas_error: float
-    slid: "PartSlide"
-    moved: "PartEnd"
-    ahead: "HeldChambers"
-    ended: "WalkEnd"
-    # Length of a part of the step, what of the step was before it, and what is left from its begin on [s].
-    length: float
-    before: float
-    remaining: float
+    next_lines: "LineState"  # lines at the end of a part
+    gas_error: float  # of the pressures over what is allowed
+    slid: "PartSlide"  # an unconstrained vane at the end of a part without an event,
+    moved: "PartEnd"  # and where it truly ends
+    ahead: "HeldChambers"  # chambers at the angle to which a walk is assumed to lead
+    ended: "WalkEnd"  # second stage of a walking leg
+    length: float  # of a part of the step [s]
+    before: float  # what of the step was before the part [s]
+    remaining: float  # what is left of the step from the part's begin on [s]
 
     # What lives inside one phase.
-    second: "Flows"
+    second: "Flows"  # second stage of the gas
     thermal_second: "ThermalFlows"
-    fed: "PlantState"
-    warmed: Any
-    after: "PlantState"
+    fed: "PlantState"  # the state with the gas of the step, but the vane as it was
+    warmed: Any  # true masses with the gas of the step
+    after: "PlantState"  # state and walk after the step
     walk_after: "WalkState"
-    seen: Any
-    sample: "Sample"
+    seen: Any  # what the controller is shown
+    sample: "Sample"  # what meters and traces are shown
 
     def __getitem__(self, name: str) -> Any:
         """A group, or a number of one by its path such as ``state.angle``."""

@@ -215,58 +215,88 @@ def run_words(library: Library) -> dict[str, str]:
 
 
 def _words(library: Library, name: str) -> dict[str, str]:
-    program = library.program
-    outputs = ["time", *program.outputs]
+    """Marks of the templates of a library, and the text in the place of each; words of its own go before these."""
     # The last argument of the loop of a run in C, where it has both kinds of steps.
-    in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
+    in_parts = ", run->needs_parts" if library.program.program.chooses_parts else ""
     steps = {"name": name, "signal_rows": str(SIGNAL_ROWS), "in_parts": in_parts}
-    relations = _relations(library)
-    table = []
-    for setting in library.settings:
-        low, high = _limits(setting.quantity)
-        marks = setting.quantity.minimum_allowed, setting.name in library.defaults
-        flags = ", ".join("true" if mark else "false" for mark in marks)
-        table.append(f'    {{"{setting.name}", {setting.value!r}, {low!r}, {high!r}, {flags}}},')
+    surface = library.surface
     return {
         **run_words(library),
+        **_title_words(library, name),
+        **_struct_words(library),
+        **_check_words(library),
+        **_example_words(library),
+        "in_parts": in_parts,
+        "run": filled(template(_FOLDER, "run.h"), {"name": name}),
+        "steps": filled(template(_FOLDER, "steps.c"), steps),
+        "first": "".join(f"    before.{setting} = before.{surface.step};\n" for setting in surface.as_step),
+        "follow": "" if library.following is None else "    follow(&before, &all);",
+        **library.words,
+        **surface.words,
+    }
+
+
+def _title_words(library: Library, name: str) -> dict[str, str]:
+    """What a library is, as comments and pages say it."""
+    return {
         "name": name,
         "NAME": name.upper(),
         "title": library.title,
         "description": "\n * ".join(textwrap.wrap(in_comment(library.description), 110)),
         "about": in_markdown(library.description),
         "version": __version__,
-        "in_parts": in_parts,
-        "run": filled(template(_FOLDER, "run.h"), {"name": name}),
-        "steps": filled(template(_FOLDER, "steps.c"), steps),
-        "first": "".join(f"    before.{name} = before.{library.surface.step};\n" for name in library.surface.as_step),
-        "follow": "" if library.following is None else "    follow(&before, &all);",
-        "settings": _members(
-            (setting.name, setting.quantity.unit, _said(setting.quantity)) for setting in library.settings
-        ),
-        "outputs": _members((("time", "s", "since the start"), *((name, *OUTPUTS[name]) for name in program.outputs))),
+    }
+
+
+def _struct_words(library: Library) -> dict[str, str]:
+    """Members of the structs of settings, outputs and metrics, and the table of the settings with their ranges."""
+    settings, program = library.settings, library.program
+    outputs = (("time", "s", "since the start"), *((name, *OUTPUTS[name]) for name in program.outputs))
+    return {
+        "settings": _members((setting.name, setting.quantity.unit, _said(setting.quantity)) for setting in settings),
+        "outputs": _members(outputs),
         "metrics": _members((kind.name, kind.unit, kind.summary) for kind in program.metrics),
-        "table": "\n".join(table),
-        "relations": "\n".join(
-            f'    if (!({holds})) {{\n        return "{name}";\n    }}' for holds, name in relations
-        ),
-        "is_whole": _IS_WHOLE if any("is_whole(" in holds for holds, _ in relations) else "",
-        "needs_other": "\n".join(
-            f'    if ({condition}) {{\n        return "{name}";\n    }}'
-            for condition, name in conditions_of_program(library)
-        ),
+        "table": "\n".join(_table_line(setting, setting.name in library.defaults) for setting in settings),
+    }
+
+
+def _table_line(setting: Setting, follows: bool) -> str:
+    """Line of the table in C: name, value, range, whether its lower end is allowed, whether the default ``follows``."""
+    low, high = _limits(setting.quantity)
+    flags = ", ".join("true" if flag else "false" for flag in (setting.quantity.minimum_allowed, follows))
+    return f'    {{"{setting.name}", {setting.value!r}, {low!r}, {high!r}, {flags}}},'
+
+
+def _check_words(library: Library) -> dict[str, str]:
+    """Lines in C that return the name of a setting which contradicts another one, or which needs another program."""
+    relations = _relations(library)
+    refused = [(f"!({condition})", name) for condition, name in relations]
+    return {
+        "relations": _returning(refused),
+        "is_whole": _IS_WHOLE if any("is_whole(" in condition for condition, _ in relations) else "",
+        "needs_other": _returning(conditions_of_program(library)),
+    }
+
+
+def _returning(conditions: Iterable[tuple[str, str]]) -> str:
+    """Lines in C that return a name under its condition."""
+    return "\n".join(f'    if ({condition}) {{\n        return "{name}";\n    }}' for condition, name in conditions)
+
+
+def _example_words(library: Library) -> dict[str, str]:
+    """What the example prints of outputs and metrics, and the setting that it changes."""
+    outputs = ["time", *library.program.outputs]
+    # Every scenario has a supply pressure, which is what a user would try first.
+    (pressure,) = [setting for setting in library.settings if setting.name == "supply_pressure"]
+    return {
         "csv_head": ",".join(outputs),
         "csv_form": ",".join(["%.17g"] * len(outputs)),
         "csv_values": ",\n".join(f"            outputs.{name}" for name in outputs),
         "print_metrics": "\n".join(
             f'        print_metric("{kind.name}", metrics.{kind.name}, "{kind.unit}", "{kind.summary}");'
-            for kind in program.metrics
+            for kind in library.program.metrics
         ),
-        # Every scenario has a supply pressure, which is what a user would try first.
-        "example": next(
-            f"{setting.name} = {setting.value!r};" for setting in library.settings if setting.name == "supply_pressure"
-        ),
-        **library.words,
-        **library.surface.words,
+        "example": f"{pressure.name} = {pressure.value!r};",
     }
 
 

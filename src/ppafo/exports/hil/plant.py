@@ -8,8 +8,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
 from ppafo.model.controlled import TORQUE
-from ppafo.model.valves import vent_valve
-from ppafo.parameters.plant import valve_settings
+from ppafo.parameters.plant import venting_valve
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
 
@@ -44,9 +43,8 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
         controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)
-    valve = chosen.device.valve
-    if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve_settings(valve))))
+    # A controller at the wire may vent both chambers.
+    run = replace(run, program=replace(run.program, valve=venting_valve(chosen.device.valve)))
     module = load_program(batch_of(run).program)
     return Plant(chosen, run, module, backend_described(), period)
 

@@ -30,7 +30,7 @@ from ppafo.simulation.recorded.channels import (
 from ppafo.simulation.recorded.inputs import between_stops, supply_paths, with_highest_supply
 from ppafo.simulation.recorded.replay import replay_control
 from ppafo.simulation.recorded.rest import value_at_rest
-from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors
+from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """What a recording is compared in [rad], [Pa], [Pa]."""
@@ -84,24 +84,23 @@ def check_experiment(experiment: Experiment) -> None:
             have = ", ".join(recording.names)
             raise IdentificationError(f"{said}: {recording.label} has no channel '{name}'{use}; it has {have}")
     scenario, has_torque = experiment.scenario, EXTERNAL_TORQUE in inputs
-    is_free, follows = isinstance(scenario.motion, FreeMotion), {ANGLE} & set(inputs) & set(experiment.channels)
+    motion, follows = vane_motion(scenario), {ANGLE} & set(inputs) & set(experiment.channels)
     is_python = scenario.controller.is_outside and COMMAND not in inputs
-    has_leg = isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is not None
     refuse_first(
         said,
         (not experiment.channels, "there is no channel to compare"),
         (bool(follows), "the angle of the vane is prescribed by the recording, so it cannot be compared"),
         (
-            experiment.channels == (ANGLE,) and not is_free,
+            experiment.channels == (ANGLE,) and motion.profile is not None,
             "the angle of the vane is prescribed, so it carries no information; add a pressure",
         ),
         (is_python, "a Python controller cannot run in a batch; use one of the catalogue"),
         (
-            has_torque and not is_free,
+            has_torque and motion.profile is not None,
             "a torque has no effect on a vane whose angle is prescribed; remove it from inputs",
         ),
         (
-            has_torque and has_leg,
+            has_torque and motion.leg is not None,
             "the leg of the motion prescribes T_ex; remove it from inputs, or let the motion be free",
         ),
         *(
@@ -197,8 +196,8 @@ def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
     found = {
         full_path(path, scenario): item for path, item in numbers.device_numbers(device).items() if path not in other
     }
-    if isinstance(scenario.motion, FreeMotion):
-        leg = scenario.motion.leg
+    leg = vane_motion(scenario).leg
+    if vane_motion(scenario).profile is None:
         found |= {f"motion.{item.name}": item for item in (FREE if leg is None else LEG)}
         found |= {} if leg is None else {f"motion.shank.{item.name}": item for item in shank_settings(leg.shank.kind)}
     found |= {f"initial.{item.name}": item for item in INITIAL}

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import StepInputs, replay, run_batch
+from ppafo.engine.lanes import run_batch
 from ppafo.engine.program import Program
+from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.rows import leaves, rebuilt, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.actuators import pressures_of

@@ -21,7 +21,7 @@ from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -97,7 +97,7 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
     the logarithm of this velocity, so that is moved.
     """
     limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
-    moves = any(isinstance(one.scenario.motion, FreeMotion) and ANGLE not in one.inputs for one in experiments)
+    moves = any(vane_motion(one.scenario).profile is None and ANGLE not in one.inputs for one in experiments)
     friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
     if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
         yield FreeParameter(

@@ -11,7 +11,7 @@ from ppafo.control.walking.assistance import Assistance, Hold, TorqueProfile, pr
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import PhaseState, Switch
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
-from ppafo.engine.rows import rebuild
+from ppafo.engine.rows import rebuilt
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -159,7 +159,7 @@ def test_nothing_is_done_once_safety_has_vented() -> None:
 def default_parameters(name: str) -> Any:
     """Parameters of a controller at their defaults, but patient with pressures that do not answer the valve."""
     kind = WALKING_CONTROLLERS[name]
-    parameters = rebuild(kind.parameters, list(settings_of_law(kind).values()))
+    parameters = rebuilt(kind.parameters, map(float, list(settings_of_law(kind).values())))
     return parameters._replace(safety=parameters.safety._replace(fill_time=10.0, vent_time=10.0))
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from ppafo.control.walking import fault_flags
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.engine.rows import rebuild
+from ppafo.engine.rows import rebuilt
 from ppafo.model.helping import HELPS, LIFTS, PAUSED, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -61,7 +61,7 @@ class Watched:
 def rules_of(name: str, resume_strides: float) -> Any:
     """Parameters of a controller at their defaults, but patient with pressures, which are not simulated here."""
     kind = WALKING_CONTROLLERS[name]
-    parameters = rebuild(kind.parameters, list(settings_of_law(kind).values()))
+    parameters = rebuilt(kind.parameters, map(float, list(settings_of_law(kind).values())))
     rules = parameters.safety._replace(fill_time=1.0e3, vent_time=1.0e3, resume_strides=resume_strides)
     return parameters._replace(safety=rules)
 

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 
 from ppafo.control.walking import estimated_timing, phases, timing
 from ppafo.control.walking import timing as gait_clock
-from ppafo.control.walking.catalog import TIMINGS, WALKING_CONTROLLERS, keeps_time, with_timing
+from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.estimated_timing import EstimationRules, LearntStride, Window
 from ppafo.control.walking.phases import PhaseRules
 from ppafo.control.walking.timing import TimingKind
+from ppafo.control.walking.timings import TIMINGS, keeps_time, with_timing
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ppafo.engine.lanes import add_meters
+from ppafo.engine.metering import add_meters
 from ppafo.errors import ScenarioError
 from ppafo.metrics import METRICS
 from ppafo.parameters.overrides import over

@@ -1,0 +1,127 @@
+"""The frame in which a torque law walks, one for all laws.
+
+The phases of the gait say which torque is requested, safety watches, the law follows the request. What differs is data:
+the law, and what it remembers where another task of the gait begins.
+"""
+
+import functools
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from ppafo.control.binding import bind
+from ppafo.control.kind import ControllerKind
+from ppafo.control.walking import assistance, phases, safety
+from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess
+from ppafo.control.walking.fault_checks import SafetyRules
+from ppafo.control.walking.phases import PhaseRules, PhaseState
+from ppafo.control.walking.safety import SafetyState
+from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
+from ppafo.errors import ScenarioError
+from ppafo.model.controlled import TORQUE
+from ppafo.model.declaration import row_with
+from ppafo.model.sensors import GaitMeasurement
+
+
+class LawParameters(NamedTuple):
+    """The law, what is requested, rules of phases, safety and timing; ``row_with`` makes one for each law."""
+
+    law: Any
+    assistance: Assistance
+    phases: PhaseRules
+    safety: SafetyRules
+    timing: Any
+
+
+class LawState(NamedTuple):
+    """Phase, clock, safety, the requested torque, and the state of the law; ``row_with`` makes one for each law."""
+
+    phase: PhaseState
+    clock: Any
+    safety: SafetyState
+    request: TorqueRequest
+    law: Any
+
+
+def law_update(parameters: Any, state: Any, reference: float, measurement: Any, period: float) -> tuple[float, Any]:
+    """Stand for the law, which ``bind`` puts here: command [-] and next state of a torque law."""
+    raise NotImplementedError
+
+
+def law_restart(state: Any, requested: float, continues: float) -> Any:
+    """Stand for what the law remembers, at a requested torque [N m], where another task may begin (``continues`` 0)."""
+    raise NotImplementedError
+
+
+LAW_START = None
+"""Stands for the start of the law's state."""
+
+
+def restart_anew(state: Any, requested: float, continues: float) -> Any:
+    """The state of a law that starts again where another task begins (``continues`` 0, else 1)."""
+    return state if continues > 0.5 else LAW_START
+
+
+def keep_state(state: Any, requested: float, continues: float) -> Any:
+    """The state of a law that has no memory, and so nothing to reset."""
+    return state
+
+
+def law_that_walks_update(
+    parameters: Any, state: LawState, reference: float, measurement: GaitMeasurement, period: float
+) -> tuple[float, LawState]:
+    """Command from -1 to 1, or ``VENT``, and the next state; the reference is not used."""
+    assessment = assess(parameters, state, measurement, period)
+    requested = assessment.request.torque
+    # Before the update: what the law remembers of another task must not act on this one.
+    law = law_restart(state.law, requested, assessment.continues)
+    sample = assistance.torque_measurement(measurement)
+    command, law = law_update(parameters.law, law, requested, sample, period)
+    command, watch = assistance.valve_command(assessment, command, period)
+    return command, LawState(
+        phase=assessment.phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law
+    )
+
+
+def shared_settings(law: ControllerKind) -> set[str]:
+    """Return the settings of a torque law whose names every controller of walking has, too."""
+    return {quantity.name for quantity in law.quantities} & {quantity.name for quantity in ASSISTING_QUANTITIES}
+
+
+@functools.cache
+def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
+    """Return a torque law in this frame as a controller of walking, with a name and a summary of its own.
+
+    ScenarioError where a setting of the law has the name of one of walking.
+    """
+    shared = shared_settings(law)
+    # Settings of law and frame stand in one section of a file, where a name can mean only one thing.
+    if shared:
+        raise ScenarioError(
+            f"controller '{law.name}' cannot walk: its setting '{min(shared)}' has the name of one that every "
+            f"controller of walking has"
+        )
+    # One class for each law, named after it: exported C has structs of these names.
+    title = "".join(part.capitalize() for part in name.split("_"))
+    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
+    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
+    # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
+    anew = bind(restart_anew, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep_state
+    components = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
+    return replace(
+        law,
+        name=name,
+        summary=summary,
+        source=f"the paper, figure 1A (phases); {law.source}",
+        quantities=(*law.quantities, *ASSISTING_QUANTITIES),
+        parameters=parameters,
+        initial=state(
+            phase=phases.START,
+            clock=ThresholdClock(),
+            safety=safety.START,
+            request=assistance.START,
+            law=law.initial,
+        ),
+        update=bind(law_that_walks_update, f"update_{name}", components),
+        restart=None,
+        controls=(TORQUE,),
+    )

@@ -1,0 +1,124 @@
+"""A stretch of time between two events, solved by LSODA: to its end, or to where a root function falls to 0."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.engine.continuous_time import Roots
+from ppafo.errors import SimulationError
+from ppafo.rig.dynamics import RigState
+
+Floats = NDArray[np.float64]
+
+Slopes = Callable[[float, Floats], Floats]
+"""Right-hand side: slopes [SI/s] of the unknowns (unknowns,) at a time [s]."""
+Distances = Callable[[float, Floats], Roots]
+"""Root functions of a time [s] and the unknowns (unknowns,): positive while the stretch lasts."""
+
+RELATIVE_TOLERANCE = 1.0e-8
+"""Error of a step over an unknown [-]: five digits below the 1e-3 to which the rig and the model are compared."""
+
+ABSOLUTE_TOLERANCES = RigState(
+    angle=1e-10,
+    angular_velocity=1e-9,
+    mass_1=1e-13,
+    energy_1=1e-8,
+    mass_2=1e-13,
+    energy_2=1e-8,
+    line_mass_1=1e-13,
+    line_energy_1=1e-8,
+    line_mass_2=1e-13,
+    line_energy_2=1e-8,
+    supplied_mass=1e-13,
+    vented_mass=1e-13,
+    leaked_mass=1e-13,
+    supply_drop_1=1e-2,
+    supply_drop_2=1e-2,
+    enthalpy_in=1e-8,
+    work_done=1e-8,
+    heat_in=1e-8,
+    sensor_angle=1e-9,
+    sensor_pressure_1=1e-2,
+    sensor_pressure_2=1e-2,
+)
+"""Errors [SI] below a millionth of usual values: a chamber has some 1e-4 kg and 10 J, a supply 1e5 Pa."""
+
+VALVE_TOLERANCE = 1e-10
+"""Absolute tolerance of each unknown of the valve, of which 1 is fully open [-]."""
+
+MAXIMUM_STEPS = 100_000
+"""Steps of one stretch above which the solver crawls and is stopped; usual stretches take some hundred."""
+
+_ROOT_TOLERANCE = 4.0 * float(np.finfo(np.float64).eps)
+"""Least relative tolerance [-] that ``scipy.optimize.brentq`` takes."""
+
+
+def absolute_tolerances(valve_unknowns: int) -> Floats:
+    """Return the absolute tolerances [SI] of all unknowns (unknowns,): those of ``RigState``, then the valve's."""
+    return np.array([*ABSOLUTE_TOLERANCES, *[VALVE_TOLERANCE] * valve_unknowns])
+
+
+class Stretch(NamedTuple):
+    """Unknowns (times, unknowns) at times [s]: the start, those wanted, and the last one, where the stretch ended."""
+
+    times: Floats
+    unknowns: Floats
+
+
+def solve_stretch(
+    slopes: Slopes,
+    tolerances: Floats,
+    distances: Distances | None,
+    unknowns: Floats,
+    start: float,
+    end: float,
+    wanted: Floats,
+) -> Stretch:
+    """Return the unknowns from ``start`` to ``end`` [s], or to where one of the distances falls to 0.
+
+    They are given at the ``wanted`` times [s] in between, too. A distance that is 0 at the start ends nothing.
+    SimulationError where the solver gives up.
+    """
+    from scipy.integrate import LSODA
+
+    solver = LSODA(slopes, start, unknowns, end, rtol=RELATIVE_TOLERANCE, atol=tolerances)
+    times, states = [start], [np.array(unknowns)]
+    before = None if distances is None else distances(start, unknowns)
+    # The ends are states of the solver itself, not of its interpolant.
+    waiting = list(wanted[(wanted > start) & (wanted < end)])
+    for _ in range(MAXIMUM_STEPS):
+        message = solver.step()
+        if solver.status == "failed":
+            raise SimulationError(f"the rig's solver stopped at t = {solver.t:.6g} s: {message}")
+        reached, event = float(solver.t), None
+        # The interpolant is valid in the last step only, so it is asked for in each.
+        interpolant = solver.dense_output()
+        if distances is not None and before is not None:
+            after = distances(reached, solver.y)
+            # Strictly above 0 before: a vane that just came to rest has not done so again.
+            crossed = [number for number in range(len(after)) if before[number] > 0.0 >= after[number]]
+            roots = [_root(distances, number, interpolant, float(solver.t_old), reached) for number in crossed]
+            event = min(roots, default=None)
+            before = after
+        last = reached if event is None else event
+        while waiting and waiting[0] < last:
+            times.append(waiting.pop(0))
+            states.append(interpolant(times[-1]))
+        if event is not None or solver.status == "finished":
+            times.append(last)
+            states.append(interpolant(last) if event is not None else np.array(solver.y))
+            return Stretch(np.array(times), np.array(states))
+    raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
+
+
+def _root(distances: Distances, number: int, interpolant: Callable[[float], Floats], start: float, end: float) -> float:
+    """Return the time [s] at which the distance of a number falls to 0 within a step from ``start`` to ``end`` [s]."""
+    from scipy.optimize import brentq
+
+    def distance(time: float) -> float:
+        return distances(time, interpolant(time))[number]
+
+    root: float = brentq(distance, start, end, xtol=1.0e-15, rtol=_ROOT_TOLERANCE)
+    return root
