@@ -250,6 +250,7 @@ def _tolerance_text(tolerance: Known, before: ParameterSet) -> str:
 
     def with_its_error(value: float, error: float) -> str:
         """Return a value and its error [SI] as text with the unit in which they are shown."""
+        # A unit with an offset, such as degC, has none in a difference.
         (level, shown_unit), (upper, _), (zero, _) = (
             _shown(number, quantity, unit, before) for number in (value, error, 0.0)
         )
