@@ -40,13 +40,19 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _TRIED_RUNS = 8
+"""Runs of each configuration that are made before a study begins, so that it is refused at once where it cannot run."""
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN, _OVER_TIME = "-", "_over_time"
 ASKED_ABOVE = 10_000_000_000
 """Bytes above which a study is only started with ``--yes``."""
 _FIXED_BYTES_OF_ROW = 3
-_BYTES_OF_NUMBER, _BYTES_OF_SAMPLE = 8, 4
+"""Bytes of the texts of a row, each by its number in a list of texts."""
+_BYTES_OF_NUMBER = 8
+"""Bytes of a number of a row."""
+_BYTES_OF_SAMPLE = 4
+"""Bytes of a sample of a channel over time, which is kept in single precision unless bands are made of it."""
 _BYTES_OF_FILE = 12_000
+"""Bytes of a file beside its rows, with its note: names, units and meanings of the columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,6 +241,7 @@ def note_file(number: int) -> str:
 
 
 def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
+    """Return the runs of a chunk, whose varied ``values`` [SI] are by path; StudyError for one that cannot vary so."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
     every = outputs.every if outputs.traces else 0.0
@@ -289,6 +296,7 @@ def check_room(study: Study, location: Place, agreed: bool) -> None:
 
 
 def _bytes_text(size: int) -> str:
+    """Return a number of bytes as text, ``1.2 GB``."""
     for unit, scale in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if size >= scale:
             return f"{size / scale:.3g} {unit}"

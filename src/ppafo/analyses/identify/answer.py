@@ -231,18 +231,19 @@ def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
         (number for number in known if number.share >= _SHOWN or is_far[number.name]), key=lambda number: -number.share
     )
     rows = []
-    for one in shown:
-        quantity = one.name.partition(" of ")[0]
-        numbers = (one.before, one.before_error, one.after, one.after_error)
-        (start, unit), (error, _), (after, _), (after_error, _) = (
-            _shown(number, quantity, one.unit, before) for number in numbers
+    for tolerance in shown:
+        path = tolerance.name.partition(" of ")[0]
+        numbers = (tolerance.before, tolerance.before_error, tolerance.after, tolerance.after_error)
+        (stated, unit), (error, _), (fitted, _), (fitted_error, _) = (
+            _shown(number, path, tolerance.unit, before) for number in numbers
         )
-        zero, _ = _shown(0.0, quantity, one.unit, before)
-        stated, fitted = with_error(start, error - zero), with_error(after, after_error - zero)
-        text = f"tolerance: {one.name}: stated {stated} {unit}".rstrip(" -") + f", fitted {fitted} {unit}".rstrip(" -")
-        rows.append(
-            f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
-        )
+        # A unit with an offset, such as degC, has none in a difference.
+        zero, _ = _shown(0.0, path, tolerance.unit, before)
+        text = f"tolerance: {tolerance.name}: stated {with_error(stated, error - zero)} {unit}".rstrip(" -")
+        text += f", fitted {with_error(fitted, fitted_error - zero)} {unit}".rstrip(" -")
+        if tolerance.share >= _SHOWN:
+            text += f"; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
+        rows.append(text)
     rest = len(known) - len(shown)
     if rest:
         do = "does" if rest == 1 else "do"
