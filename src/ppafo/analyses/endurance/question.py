@@ -72,7 +72,7 @@ def bottle(
     from ppafo.signals import Recording
     from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
     from ppafo.walking import WalkResult
-    from ppafo.walking.bottle import Schedule
+    from ppafo.walking.bottle.coupling import Schedule
 
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(given) == (gas_per_stride is not None):
