@@ -28,6 +28,7 @@ Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recording
 """
 
 _SIGNIFICANCE = 0.01
+"""Probability [-] below which a difference is no chance."""
 _PARTING = 0.05
 """Fraction of the covariance of all by which a group's alone must be larger for its direction to be tested."""
 

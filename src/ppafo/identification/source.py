@@ -100,9 +100,13 @@ def _digest(recording: Recording) -> str:
 
 _NO_SENSORS = ("command", "direction", "repetition")
 _SHARE_THAT_IS_CLIPPED = 0.05
+"""Share of the samples at one value from which a sensor is clipped."""
 _FEWEST_CLIPPED = 4
+"""Samples at one value without which none is clipped."""
 _FRACTION_THAT_MOVES = 0.02
+"""Fraction of its largest value by which what drives a channel must move for a constant one to be clipped."""
 _LARGEST_NUMBER = 1.0e12
+"""Size of a number above which no bench has measured it, in any SI unit."""
 _GROSS_SAMPLE, _GROSS_READING = 1.0 / 6.0, 0.25
 """Shares of the usual range from which a sample over time, by 6 of them, and a reading are grossly wrong.
 

@@ -13,6 +13,7 @@ from ppafo.signals.recording import Floats
 _OF_ANY_SIZE = 1.0e8
 """Standard deviation of an error of which nothing is known, over the noise [-]."""
 _ROUNDS = 20
+"""Rounds of noise and numbers at most; most fits settle in a few."""
 
 _RANK = 1.0e-13
 """Eigenvalue [-] of scaled numbers from which they are seen."""

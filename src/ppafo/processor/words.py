@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 SAMPLES_OF_TABLE = 1000
+"""Samples of each controller in the table, unless another number is given."""
 
 
 @dataclass(frozen=True, slots=True)

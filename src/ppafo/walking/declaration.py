@@ -34,7 +34,7 @@ from ppafo.simulation.schema import (
     number_type,
     quantity_fields,
 )
-from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
+from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
 

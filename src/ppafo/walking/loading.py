@@ -53,7 +53,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.simulation.torque_loop import IN_WALK, PERIOD_PATH, loop_terms
-from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
+from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     DURATION,

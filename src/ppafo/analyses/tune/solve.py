@@ -172,6 +172,7 @@ def have_come_together(costs: Floats) -> bool:
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 """Metrics that are never below what the supply lacks of the largest reference."""
 _NOISE_CONFIDENCE = 0.95
+"""Confidence of the interval of the share of sensor noise."""
 
 
 def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:

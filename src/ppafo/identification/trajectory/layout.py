@@ -8,7 +8,7 @@ from pydantic import Field
 from ppafo.documents.models import NAME, StrictTable, Text, Texts
 from ppafo.errors import IdentificationError
 from ppafo.identification.keys import Columns, Confidence
-from ppafo.identification.trajectory.problem import ALL_INPUTS
+from ppafo.identification.trajectory.experiment import ALL_INPUTS
 
 _Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
 _Noise = dict[str, Text]

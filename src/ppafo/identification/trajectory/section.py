@@ -15,20 +15,17 @@ from ppafo.identification.keys import positive_in, quantity_in
 from ppafo.identification.source import Source, Use, double_use, told_of_readings
 from ppafo.identification.tolerances import Tolerances, deviation_of_limit, quantity_of
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
-from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
-from ppafo.identification.trajectory.layout import ExperimentSection, ParameterSection, TrajectorySection
-from ppafo.identification.trajectory.problem import (
+from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     INPUTS,
-    TIME_OFFSET,
     Experiment,
-    FreeParameter,
-    TrajectoryProblem,
-    declaration_of,
-    full_path,
     refuse_first,
     use_of,
 )
+from ppafo.identification.trajectory.fitting import TrajectoryFit, fit
+from ppafo.identification.trajectory.layout import ExperimentSection, ParameterSection, TrajectorySection
+from ppafo.identification.trajectory.numbers import TIME_OFFSET, FreeParameter, declaration_of, full_path
+from ppafo.identification.trajectory.problem import TrajectoryProblem
 from ppafo.identification.trajectory.tolerances import stated_by, tolerance_parameters
 from ppafo.identification.wording import in_shown_unit
 from ppafo.parameters import apply_overrides, build_device

@@ -5,16 +5,14 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.tolerances import Tolerances, deviation_of_limit
-from ppafo.identification.trajectory.problem import (
-    FITTED_CHANNELS,
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, Experiment, scenario_of
+from ppafo.identification.trajectory.numbers import (
     GAIN_OF,
     ZERO_OF,
-    Experiment,
     FreeParameter,
     declared_numbers,
     full_path,
     number_at,
-    scenario_of,
 )
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.plant import switches_of
