@@ -68,7 +68,7 @@ def bottle(
     from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-    from ppafo.report.recording_figure import stated_units
+    from ppafo.report.stored_figure import stated_units
     from ppafo.signals import Recording
     from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
     from ppafo.walking import WalkResult

@@ -30,6 +30,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
+    check_forces(scenario)
     if scenario.controlled != TORQUE:
         raise ScenarioError(
             f"{scenario.name}: reference.of = '{scenario.controlled}': a controller at the wire is sent a torque; "
@@ -47,6 +48,14 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     run = replace(run, program=replace(run.program, valve=venting_valve(chosen.device.valve)))
     module = load_program(batch_of(run).program)
     return Plant(chosen, run, module, backend_described(), period)
+
+
+def check_forces(scenario: Scenario) -> None:
+    """Refuse a scenario whose controller reads what the wire does not carry."""
+    if scenario.motion.motion_kind.reads_forces:
+        raise ScenarioError(
+            f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
+        )
 
 
 def check_baud(baud: int, rate: int) -> None:
