@@ -17,7 +17,7 @@ from ppafo.page.workbench import openings_of
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
-from ppafo.walking.bottle import Schedule
+from ppafo.walking.bottle.coupling import Schedule
 
 FLOWS = np.geomspace(2e-6, 5e-3, 24)
 """Mean flows [kg/s] of the table."""

@@ -59,7 +59,7 @@ SOMETHING_ELSE = ("answers?", "whole numbers?")
 ALLOWED_IN_MESSAGES: Mapping[str, tuple[str, str]] = {
     "analyses/endurance/walk_gas.py": ("'course'", "the old key of a walk"),
     "exports/c_library/program.py": ("'course'|course=", "source text, in which it is the time course of a reference"),
-    "identification/trajectory/section.py": ("held: is now locked", "the old key of a problem file"),
+    "identification/trajectory/layout.py": ("held: is now locked", "the old key of a problem file"),
 }
 """By file: what stands there as a name, and of what."""
 ALLOWED_IN_FILES: Mapping[str, tuple[str, str]] = {

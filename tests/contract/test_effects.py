@@ -23,8 +23,8 @@ from ppafo.exports.c_library.files import c_identifier
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
-from ppafo.identification.trajectory.problem import declaration_of
-from ppafo.identification.trajectory.problem import with_numbers as with_fitted
+from ppafo.identification.trajectory.numbers import declaration_of
+from ppafo.identification.trajectory.numbers import with_numbers as with_fitted
 from ppafo.model.catalog import EFFECTS
 from ppafo.page.wasm import module_of
 from ppafo.parameters.building import build_device

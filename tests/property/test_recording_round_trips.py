@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
-from ppafo.storage import read_csv, read_netcdf, write_csv, write_netcdf
+from ppafo.storage import read_csv, write_csv, write_netcdf
+from ppafo.storage.netcdf_reading import read_netcdf
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 UNITS = {

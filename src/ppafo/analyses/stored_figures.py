@@ -6,13 +6,8 @@ from typing import TYPE_CHECKING, Any
 from ppafo.analyses.endurance.walk_gas import WALK_FILE
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.errors import DataError, reason
-from ppafo.report.recording_figure import (
-    draw_stored_result,
-    draw_stored_walk,
-    recording_figure,
-    stated_atmosphere,
-    stated_units,
-)
+from ppafo.report.recording_figure import recording_figure
+from ppafo.report.stored_figure import draw_stored_result, draw_stored_walk, stated_atmosphere, stated_units
 from ppafo.rig.experiments import RIG_FILE
 from ppafo.storage import read_recording, read_result
 from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json

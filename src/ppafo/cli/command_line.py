@@ -188,8 +188,8 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     # argparse gives an optional word nothing where options stand between it and a repeated one.
     is_alone = sum(not option_of(parameter, reading) for parameter, reading in readings) == 1
     for parameter, reading in readings:
-        said = helps.get(parameter.name, reading.word.help)
-        _add_parameter(parser, parameter, reading, said, command.lists and is_alone, is_listing)
+        help_text = helps.get(parameter.name, reading.word.help)
+        _add_parameter(parser, parameter, reading, help_text, command.lists and is_alone, is_listing)
     if command.lists:
         parser.add_argument("--list", action="store_true", help="list what comes with the package")
     output.add_json_argument(parser)
@@ -211,15 +211,17 @@ def _add_parameter(
     parser: argparse.ArgumentParser,
     parameter: inspect.Parameter,
     reading: Reading,
-    said: str,
+    help_text: str,
     may_be_missing: bool,
     is_listing: bool,
 ) -> None:
+    """Add a parameter of a verb as a word or an option; a word that ``may_be_missing`` is refused by ``run``."""
     word, is_required = reading.word, parameter.default is inspect.Parameter.empty
     default = None if is_required else parameter.default
-    said = said.replace("{default}", f"{100.0 * default:g}%") if isinstance(default, float) else said
+    if isinstance(default, float):
+        help_text = help_text.replace("{default}", f"{100.0 * default:g}%")
     # argparse formats its help texts with %, so a per cent sign is doubled.
-    options: dict[str, Any] = {"help": said.replace("%", "%%"), "default": default}
+    options: dict[str, Any] = {"help": help_text.replace("%", "%%"), "default": default}
     option = option_of(parameter, reading)
     if option:
         options["dest"] = parameter.name
@@ -255,9 +257,9 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         return _list(command, parsed.json)
     verb = command.function()
     parameters = inspect.signature(verb).parameters
-    values = {each: getattr(parsed, each) for each in parameters if each not in (PROGRESS, PLUGINS)}
+    values = {name: getattr(parsed, name) for name in parameters if name not in (PROGRESS, PLUGINS)}
     name_plugins(parsed.plugin)
-    for text in _texts(values[each] for each in _NAMING if each in values):
+    for text in _texts(values[parameter] for parameter in _NAMING if parameter in values):
         name_modules_in(text)
     for parameter, reading in parameters_of(verb):
         if command.lists and values[parameter.name] is None and parameter.default is inspect.Parameter.empty:
@@ -272,8 +274,8 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
     with output.progress_line() as progress, without_names():
-        found = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
-    return output.deliver(found, parsed.json, folder, name, has_written=OUT in parameters)
+        answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
+    return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
 
 
 _NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form")
@@ -281,6 +283,7 @@ _NAMING = ("overrides", "tasks", "metric", "metrics", "also", "such_that", "form
 
 
 def _texts(values: Iterable[Any]) -> Iterator[str]:
+    """Yield the texts among values, and those inside of them."""
     for value in values:
         if isinstance(value, str):
             yield value
@@ -294,7 +297,7 @@ def _list(command: Command, as_json: bool) -> int:
     noun = command.listed or (library.noun if library is not None else "")
     if command.listing:
         listed: output.Said | list[dict[str, Any]] = kind_at(command.listing)()
-        said = listed if isinstance(listed, output.Said) else output.listing(noun, listed)
+        listing = listed if isinstance(listed, output.Said) else output.listing(noun, listed)
     else:
         assert library is not None
         files = {name: library.parse(library.read(name), name) for name in library.names()}
@@ -302,8 +305,8 @@ def _list(command: Command, as_json: bool) -> int:
             {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
             for name, file in files.items()
         ]
-        said = output.listing(noun, rows, ("name", list(rows[0])[-1]))
-    return output.deliver(said, as_json, None, "")
+        listing = output.listing(noun, rows, ("name", list(rows[0])[-1]))
+    return output.deliver(listing, as_json, None, "")
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")

@@ -2,12 +2,14 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, counting_number
 from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_INTERRUPTED, Said
-from ppafo.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from ppafo.exports.hil.result import HardwareRun
 
 
 def hil(
@@ -39,51 +41,60 @@ def hil(
     ppafo.errors.ScenarioError: no controller answers within 0.2 s; came in: nothing
     """
     from ppafo.exports.hil.loop import stop_by_interrupt
+    from ppafo.exports.hil.plant import check_forces
     from ppafo.exports.hil.run import run_at
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
     chosen = load_scenario(scenario, overrides)
-    if chosen.motion.motion_kind.reads_forces:
-        raise ScenarioError(
-            f"'{chosen.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
-        )
+    check_forces(chosen)
     # Before the first sample: a folder that is refused must not cost a run with a bench.
     folder = out if out is not None else Path("out") / f"{chosen.name}-hil"
     with output.blame_out_option():
         check_result_folder(folder)
     with stop_by_interrupt() as is_stopped:
-        found = run_at(port, chosen, rate, baud, lock_step, patience, is_stopped, _say)
+        ran = run_at(
+            port,
+            chosen,
+            rate=rate,
+            baud=baud,
+            in_lock_step=lock_step,
+            patience=patience,
+            is_stopped=is_stopped,
+            say=_say,
+        )
         from ppafo.report.drawing import load_drawing
 
         load_drawing()
         from ppafo.report.recording_figure import figure_files
 
-        found.save(folder, figure_files(found.plot_signals()))
+        ran.save(folder, figure_files(ran.plot_signals()))
+    return _said(ran, port, folder)
+
+
+def _said(ran: "HardwareRun", port: str, folder: Path) -> Said:
+    """Return what is said of a run that is written."""
     from ppafo.report.display_units import metrics_lines
 
-    result = found.result
-    lines = metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure)
-    ended = "stopped" if found.exchange.is_stopped else "vented" if found.exchange.vented else result.status.kind
-    text = "\n".join(
-        [
-            f"{result.scenario.name} at {port}: {ended}",
-            "",
-            found.text(),
-            "",
-            *lines,
-            "",
-            f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
-        ]
-    )
-    document = {**found.outcome(port), "folder": str(folder)}
-    if found.exchange.is_stopped:
-        aside = f"stopped at {found.exchange.vented_at:.6g} s and vented; {folder} is whole"
+    result, exchange = ran.result, ran.exchange
+    ended = "stopped" if exchange.is_stopped else "vented" if exchange.vented else result.status.kind
+    lines = [
+        f"{result.scenario.name} at {port}: {ended}",
+        "",
+        ran.text(),
+        "",
+        *metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure),
+        "",
+        f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
+    ]
+    text, document = "\n".join(lines), {**ran.outcome(port), "folder": str(folder)}
+    if exchange.is_stopped:
+        aside = f"stopped at {exchange.vented_at:.6g} s and vented; {folder} is whole"
         return Said(text, document, exit_code=EXIT_INTERRUPTED, aside=aside)
-    if found.is_good:
+    if ran.is_good:
         return Said(text, document)
-    said = found.exchange.vented or found.result.status.message
-    return Said(text, document, exit_code=EXIT_CHECK_FAILED, aside=f"{chosen.name}: {said}")
+    aside = f"{result.scenario.name}: {exchange.vented or result.status.message}"
+    return Said(text, document, exit_code=EXIT_CHECK_FAILED, aside=aside)
 
 
 def _say(text: str) -> None:

@@ -125,6 +125,8 @@ class Definition:
             is_nested = any(isinstance(inner, ast.GeneratorExp) for inner in ast.walk(node))
             self.codes[id(node)] = compile(whole, "<parts>", "eval"), is_nested
         code, is_nested = self.codes[id(node)]
+        # Evaluated is the text of a function that Python has loaded, with its own globals, as a call of it would: calls
+        # and generators too, so that no smaller evaluator would do. No file, setting or argument comes in as text.
         # What stands in a generator sees no local names.
         return eval(code, {**scope, **known}) if is_nested else eval(code, scope, known)
 

@@ -17,6 +17,7 @@ from ppafo.gait.plausible import check_gait
 from ppafo.units import from_si, parse_quantity, to_si
 
 _MAXIMUM_HARMONICS = 40
+"""Harmonics of a curve in a gait file at most."""
 _SUMMARIES = {
     "shank_angle": "shank angle from the vertical, above 0 while the ankle is in front of the knee",
     "ankle_angle": "ankle angle, 90 deg neutral, growing in plantarflexion",

@@ -11,8 +11,9 @@ import numpy as np
 
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
+from ppafo.gait.recorded.curves import PHASES
 from ppafo.gait.recorded.footfalls import Stride
-from ppafo.gait.recorded.importing import PHASES, ImportedGait
+from ppafo.gait.recorded.importing import ImportedGait
 from ppafo.report.display_units import display_unit, display_value, display_values, quantity_of_unit
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import Kind
@@ -41,6 +42,7 @@ _PLAIN = (
 """Fields of a gait that are plain data as they stand."""
 
 _NOISE = 1e-9
+"""Number [SI] below which a deviation or a misfit is rounding."""
 _CAPTION = "The curves over the stride: mean, standard deviation between strides as a band, toe-off dashed."
 
 

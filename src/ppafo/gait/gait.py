@@ -269,7 +269,9 @@ def _recorded_speed(gait: Gait) -> float:
 
 
 _RATE = 200.0
+"""Samples a second of the recording of a gait, unless another rate is given."""
 _MAXIMUM_STRIDES = 100_000
+"""Strides of such a recording at most."""
 
 
 def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:

@@ -523,7 +523,9 @@ def _misfit(measured: Floats, expected: Floats) -> float:
 
 
 KNEE_TRAVEL = (0.5, 80.0)
+"""Range of a knee's acceleration over the stride, in m/s^2, that a walk may have."""
 KNEE_MEAN = 1.5
+"""Mean of a knee's acceleration over the stride, in m/s^2, that a walk may have: it comes back to where it was."""
 _HELD_BACK = 0.2
 """Fraction of its range by which a knee has to decelerate where others are driven for its sign to be reversed.
 

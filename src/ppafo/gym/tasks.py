@@ -13,7 +13,9 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 from ppafo.model.valves.kind import VENT
 
 BAR = 1.0e5
+"""Pascals of a bar, the unit in which an agent sees pressures."""
 GRAM = 1.0e-3
+"""Kilograms of a gram, the unit in which gas is paid for."""
 LOADED, UNLOADED = 60.0, 30.0
 """Force under the heel [N] above which it counts as loaded and below which it does not, as in the walking laws."""
 LONGEST_SINCE = 10.0

@@ -71,8 +71,11 @@ _LEVERAGE = 0.1
 
 
 _PASSES = 4
+"""Passes of the search at most, each with the noise of the one before."""
 _SETTLED = 0.03
+"""Change of the logarithm of the noise from pass to pass below which no further pass is made."""
 _EVALUATIONS, _FEW_EVALUATIONS = 40, 10
+"""Evaluations of a pass at most: of the first two, and of those after them, which only settle."""
 _ROUGH, _FINE = 1.0e-3, 1.0e-4
 """Relative gain of squares that ends the robust pass, and those after it; the steps after whitening are finer."""
 _LAST_STEPS = 12
@@ -83,7 +86,9 @@ _CONVERGED = 0.5
 """Gain of the last step [-] below which the numbers are where they would end, within a fraction of their errors."""
 
 _SHOWN = 0.01
+"""Share of the variance of a number from which what widens it is listed."""
 _OTHER_STARTS = 32
+"""Other places from which the search is tried."""
 
 
 @on_one_thread

@@ -94,6 +94,7 @@ def _with_estimate(parameter_set: ParameterSet, estimate: Estimate, quantity: Qu
 
 
 _DIGITS = 3
+"""Digits of the half interval to which a value is written."""
 
 
 def _in_digits_of(value: float, half_width: float) -> float:

@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from ppafo.signals.recording import Floats
 
 HIGHEST_ORDER = 12
+"""Order of the autoregression of the noise at most."""
 SAMPLES_PER_COEFFICIENT = 100
 """Samples for each coefficient of the autoregression at least; 100 white ones then get none in 7 of 10 fits."""
 _LARGEST_REFLECTION = 1.0 - 1.0e-9

@@ -27,7 +27,7 @@ from ppafo.identification.keys import Columns, Confidence, positive_in, quantity
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import Source
 from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit
-from ppafo.identification.trajectory.section import TrajectorySection, refuse_removed
+from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers

@@ -73,9 +73,9 @@ class Work:
     ) -> None:
         self.residuals, self.numbers, self.blocks, self.report = residuals, numbers, blocks, report
         self.memory, self.is_motion = memory, is_motion
-        self.scale = np.array([one.scale for one in numbers])
+        self.scale = np.array([number.scale for number in numbers])
         self.start, self.low, self.high, deviation = (
-            np.array([getattr(one, name) for one in numbers]) / self.scale
+            np.array([getattr(number, name) for number in numbers]) / self.scale
             for name in ("start", "low", "high", "deviation")
         )
         self.prior = 1.0 / deviation
@@ -109,20 +109,22 @@ class Work:
         values = self.at(np.concatenate([point[:, None] + np.diag(side - point) for side in sides], axis=1))
         centre, count = self.one(point), len(point)
         slopes = np.empty((len(centre), count))
-        for place in range(count):
-            tried = [(float(side[place]), values[:, place + number * count]) for number, side in enumerate(sides)]
-            ran = [(end, own) for end, own in tried if np.isfinite(own).all()]
+        for index in range(count):
+            tried = [
+                (float(side[index]), values[:, index + side_number * count]) for side_number, side in enumerate(sides)
+            ]
+            ran = [(end, column) for end, column in tried if np.isfinite(column).all()]
             if not is_central and not ran:
                 return self.jacobian(point, weight)
-            (up, last), (down, first) = [*ran, (float(point[place]), centre)][:2]
+            (up, last), (down, first) = [*ran, (float(point[index]), centre)][:2]
             # Neither side runs: at a bound, or where a device is none.
             if up == down:
-                free = self.numbers[place]
+                free = self.numbers[index]
                 raise IdentificationError(
-                    f"{free.name}: no run succeeds near {point[place] * free.scale:.6g}; give other bounds or "
+                    f"{free.name}: no run succeeds near {point[index] * free.scale:.6g}; give other bounds or "
                     "another start"
                 )
-            slopes[:, place] = (last - first) / (up - down)
+            slopes[:, index] = (last - first) / (up - down)
         # With a thousandth of the number 7 of 16 intervals held, with thirty units of noise 11, with three 28.
         sizes = np.linalg.norm(slopes * weight[:, None], axis=0)
         self.step = np.clip(_UNITS_OF_NOISE / np.maximum(sizes, 1.0e-300), *_STEPS)
@@ -130,21 +132,21 @@ class Work:
 
     def rows_of(self, channel: str) -> list[slice]:
         """Return the rows of a channel in each recording."""
-        return [one.rows for one in self.blocks if one.channel == channel]
+        return [block.rows for block in self.blocks if block.channel == channel]
 
     @property
     def channels(self) -> tuple[str, ...]:
         """The channels, each once."""
-        return tuple(dict.fromkeys(one.channel for one in self.blocks))
+        return tuple(dict.fromkeys(block.channel for block in self.blocks))
 
     def shared(self) -> Floats:
         """Return the errors [SI] that rows of a recording share, a column for each recording that has some."""
-        names = dict.fromkeys(one.recording for one in self.blocks if one.shared is not None)
+        names = dict.fromkeys(block.recording for block in self.blocks if block.shared is not None)
         columns = np.zeros((self.blocks[-1].rows.stop, len(names)))
-        for place, name in enumerate(names):
-            for one in self.blocks:
-                if one.recording == name and one.shared is not None:
-                    columns[one.rows, place] = one.shared
+        for index, name in enumerate(names):
+            for block in self.blocks:
+                if block.recording == name and block.shared is not None:
+                    columns[block.rows, index] = block.shared
         return columns
 
     def deviations(self, series: Floats) -> tuple[Floats, dict[str, float]]:
@@ -152,14 +154,14 @@ class Work:
 
         ``series`` are residuals, and in further columns what the error of the numbers may hide of them.
         """
-        found, by_channel = np.empty(len(series)), {}
+        noise, by_channel = np.empty(len(series)), {}
         for channel in self.channels:
-            own = np.concatenate([series[rows] for rows in self.rows_of(channel)])
-            pooled = math.sqrt(float(np.square(own).sum()) / len(own))
+            samples = np.concatenate([series[rows] for rows in self.rows_of(channel)])
+            pooled = math.sqrt(float(np.square(samples).sum()) / len(samples))
             # Of its own size at the start: channels have units of their own, and a law may fit exactly.
-            least = self.least.setdefault(channel, 1.0e-12 * (float(np.abs(own[:, 0]).max()) or 1.0))
-            blocks = [one for one in self.blocks if one.channel == channel]
+            least = self.least.setdefault(channel, 1.0e-12 * (float(np.abs(samples[:, 0]).max()) or 1.0))
+            blocks = [block for block in self.blocks if block.channel == channel]
             by_channel[channel] = max(pooled, least, float(np.min(blocks[0].floor)))
-            for one in blocks:
-                found[one.rows] = np.maximum(max(pooled, least), one.floor)
-        return found, by_channel
+            for block in blocks:
+                noise[block.rows] = np.maximum(max(pooled, least), block.floor)
+        return noise, by_channel

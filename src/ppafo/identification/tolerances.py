@@ -46,6 +46,7 @@ _OTHER_SETTING = 0.1
 """Limit [-] of a setting of the valve, an effect or an actuator of another kind."""
 
 _LARGEST_FRACTION = 0.5
+"""Largest limit of a gain [-]: beyond it a sensor is broken and not inexact."""
 
 
 def deviation_of_limit(limit: float) -> float:

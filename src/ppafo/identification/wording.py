@@ -39,27 +39,26 @@ def with_error(value: float, error: float) -> str:
     return f"({text})e{power:+03d}" if power else text
 
 
-def widened_by(found: Fit, name: str) -> str:
+def widened_by(fitted: Fit, name: str) -> str:
     """Return the tolerances that widen the interval of a number, largest first."""
     named = [
-        f"{other} ({percentage(share, 2)})" for other, share in found.shares[name] if other != name and share >= _SHARE
+        f"{other} ({percentage(share, 2)})" for other, share in fitted.shares[name] if other != name and share >= _SHARE
     ][:_MOST_NAMED]
     return f"variance from {', '.join(named)}" if named else "interval from the scatter of the readings"
 
 
-def conflict_in_words(found: Fit, remedy: str) -> str:
+def conflict_in_words(fitted: Fit, remedy: str) -> str:
     """Return which readings alone give other values than all together, and a remedy; empty where they agree."""
-    one = found.conflict
-    if one is None:
+    conflict = fitted.conflict
+    if conflict is None:
         return ""
-    if one.group == STATED:
-        return f"{one.number} is {one.standard_errors:.1f} standard errors beyond its stated limit; {remedy}"
-    if one.number == SMOOTH:
-        return (
-            f"what is left of {one.group} is {one.standard_errors:.0f} times its noise, too smooth for noise; {remedy}"
-        )
-    give = "give" if _SEVERAL & set(one.group.split()) else "gives"
+    errors = conflict.standard_errors
+    if conflict.group == STATED:
+        return f"{conflict.number} is {errors:.1f} standard errors beyond its stated limit; {remedy}"
+    if conflict.number == SMOOTH:
+        return f"what is left of {conflict.group} is {errors:.0f} times its noise, too smooth for noise; {remedy}"
+    give = "give" if _SEVERAL & set(conflict.group.split()) else "gives"
     return (
-        f"fitted alone, {one.group} {give} different values, {one.number} by {one.standard_errors:.1f} standard "
+        f"fitted alone, {conflict.group} {give} different values, {conflict.number} by {errors:.1f} standard "
         f"errors; {remedy}"
     )

@@ -103,8 +103,9 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
 
 
 def growth_and_problem(device: Device) -> tuple[Any, Problem]:
-    """Return how chamber 1 of an actuator that is no vane grows [m^3/rad], and where it does not; in columns too."""
-    _, growth = shape_and_growth(device)
+    """Return how chamber 1 of an actuator grows on average [m^3/rad], and where it does not; in columns too."""
+    # That of a vane is a number of its set, which is above 0.
+    growth = device.actuator.displacement_per_radian if device.actuator.kind == VANE else shape_and_growth(device)[1]
 
     def line(run: int) -> str:
         return f"chamber 1 must grow with the angle, and grows by {at(growth, run):.4g} m^3/rad at supply pressure"

@@ -200,9 +200,14 @@ class Device:
     joint: Joint = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
+    @property
+    def has_torque_constant(self) -> bool:
+        """True where the torque is a constant times the difference of both pressures."""
+        return ACTUATORS[self.actuator.kind].model.has_torque_constant
+
     def check_torque_constant(self, what: str) -> None:
         """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""
-        if not ACTUATORS[self.actuator.kind].model.has_torque_constant:
+        if not self.has_torque_constant:
             raise ParameterError(
                 f"{what} needs a torque that is a constant times the difference of both pressures, as a vane has it; "
                 f"'{self.name}' has an actuator '{self.actuator.kind}', whose torque depends on the angle, too"

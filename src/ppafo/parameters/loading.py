@@ -25,7 +25,7 @@ from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
 from ppafo.parameters.joint import ANKLE, OPPOSITES, Joint
-from ppafo.parameters.overrides import check_valve, read_overrides
+from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
     Accepted,
     Citation,
@@ -34,7 +34,6 @@ from ppafo.parameters.parameter_set import (
     ParameterSet,
     TextEntry,
     chosen_valve,
-    with_overrides,
     written_units,
 )
 from ppafo.plugins import Plugins, name_plugins

@@ -1,14 +1,34 @@
 """Overrides are a set: each value once, each orifice in one form, the same result in any order; two sets are layers.
 
 A form is one of the ways to give a thing, of which only one is taken: files, overrides and columns of studies are
-checked by the same table. What the kinds of a scenario add is in ``simulation/overrides.py``.
+checked by the same table. At the end a parameter set takes them; what the kinds of a scenario add is in
+``simulation/overrides.py``.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
-from ppafo.errors import ParameterError, PpafoError, one_line
-from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
+from ppafo.arguments import Name, Overrides, checked
+from ppafo.errors import ParameterError, PpafoError, UnitError, nearest_name, one_line
+from ppafo.model.catalog import EFFECTS, find_effects
+from ppafo.model.gas import SPECIES
+from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
+from ppafo.parameters.graph import ATMOSPHERE_PATH, acting
+from ppafo.parameters.parameter_set import (
+    SOURCE,
+    Entry,
+    FlagEntry,
+    ParameterSet,
+    TextEntry,
+    atmospheric_pressure,
+    chosen_valve,
+    entry_in_si,
+    entry_text,
+    links_of_set,
+    with_followers,
+)
+from ppafo.units import SI, from_si, split_number
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
@@ -140,3 +160,126 @@ def either(path: str, forms: Forms = FORMS) -> str:
     section = path.rpartition(".")[0]
     ways = forms["valve" if section.startswith(NAMED_VALVE) else section]
     return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"
+
+
+@checked("parameter_set", "overrides", "valve")
+def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
+    """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
+
+    A dictionary of paths does as well, in which a number is in SI.
+
+    ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
+    Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
+    orifice in the form of ISO 6358 drops its area and discharge coefficient, and the reverse. What follows a number
+    (``links_of_set``) is set with it, unless it is given too. ParameterError for an override that does not fit the set,
+    and for two that give one value.
+
+    >>> import ppafo
+    >>> changed = ppafo.apply_overrides(ppafo.load_parameter_set("ppafo2011"), ["supply.pressure=70 psi_g"])
+    >>> changed.numbers["supply.pressure"].value, changed.numbers["supply.pressure"].unit
+    (70.0, 'psi_g')
+    """
+    return with_overrides(parameter_set, read_overrides(overrides), valve)
+
+
+def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], valve: str | None) -> ParameterSet:
+    """Return the set with overrides in it; the other words as of ``apply_overrides``."""
+    chosen = chosen_valve(parameter_set, valve)
+    overrides_by_path = {
+        f"{NAMED_VALVE}{chosen}.{path.removeprefix(CHOSEN_VALVE)}" if path.startswith(CHOSEN_VALVE) else path: override
+        for path, override in override_set(overrides, valve=chosen).items()
+    }
+    if not overrides_by_path:
+        return parameter_set
+    followers = {
+        path: overrides_by_path[link.sources[0]]
+        for path, link in acting(links_of_set(parameter_set, overrides_by_path), overrides_by_path).items()
+        if link.when_set
+    }
+    # A gas brings numbers, and gauge pressures count from the atmosphere, so these two come first.
+    first = [path for path in (SPECIES_PATH, ATMOSPHERE_PATH) if path in overrides_by_path]
+    every = {**{path: overrides_by_path[path] for path in first}, **overrides_by_path, **followers}
+    for path, text in every.items():
+        parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
+    return parameter_set
+
+
+def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
+    find_effects([path])
+    declared = parameter_set.declarations()
+    if path not in declared:
+        # So that the hint knows the values of effects that no set of this run has named.
+        EFFECTS.load_own()
+        declared = parameter_set.declarations()
+        allowed = [*declared, SPECIES_PATH, RELIEVING_PATH]
+        if override.typed.startswith(CHOSEN_VALVE):
+            allowed = [one_path(known, path.split(".")[1]) for known in allowed]
+        # Nothing is spelt alike: values of the same section stand for what there is.
+        near = [name for name in allowed if name.startswith(f"{override.typed.partition('.')[0]}.")] or allowed
+        hint = nearest_name(override.typed, allowed) or f"; for example {', '.join(near[:6])}"
+        worked = _in_conductance(override)
+        raise ParameterError(
+            f"override '{override}': {parameter_set.file} has no value '{override.typed}'{hint}{worked}"
+        )
+    try:
+        value, unit = split_number(override.text)
+        unit = declared[path].unit if unit == SI else unit
+        entry = Entry(value=value, unit=unit, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+        entry_in_si(entry, declared[path], atmospheric_pressure(parameter_set))
+    except UnitError as error:
+        raise ParameterError(f"override '{override}': {error}") from error
+    kept = {key: old for key, old in parameter_set.numbers.items() if key not in other_forms(path)}
+    return replace(parameter_set, numbers={**kept, path: entry})
+
+
+def _in_conductance(override: Override) -> str:
+    """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
+    section, _, name = override.typed.rpartition(".")
+    if name.lower() not in ("cv", "kv", "qn"):
+        return ""
+    from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of  # few valves are given so
+
+    conductance = conductance_of(name.lower(), override.text)
+    if conductance is None:
+        return ""
+    return (
+        f": --set '{section}.sonic_conductance={from_si(conductance, 'L/(s bar)', 'm^3/(s Pa)'):.4g} L/(s bar)' "
+        f"--set '{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}'"
+    )
+
+
+def _with_species(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
+    species = SPECIES.get(override.text)
+    if species is None:
+        hint = nearest_name(override.text, SPECIES)
+        raise ParameterError(f"override '{override}': unknown gas{hint}; available: {', '.join(SPECIES)}")
+    note = f"follows from the override {path}={override.text}"
+    constants = {"gas.molar_mass": (species.molar_mass, "kg/mol")}
+    constants["gas.heat_capacity_ratio"] = (species.heat_capacity_ratio, "")
+    numbers = {
+        key: Entry(value=value, unit=unit, origin="datasheet", source=species.source, note=note)
+        for key, (value, unit) in constants.items()
+    }
+    chosen = TextEntry(value=override.text, origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    return replace(
+        parameter_set,
+        numbers={**parameter_set.numbers, **numbers},
+        texts={**parameter_set.texts, path: chosen},
+    )
+
+
+def _with_relieving(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
+    if override.text not in _FLAGS:
+        raise ParameterError(f"override '{override}': must be {' or '.join(_FLAGS)}")
+    entry = FlagEntry(value=_FLAGS[override.text], origin="assumed", source=SOURCE, note=_before(parameter_set, path))
+    return replace(parameter_set, flags={**parameter_set.flags, path: entry})
+
+
+_FLAGS = {"true": True, "false": False}
+_CHANGES = {SPECIES_PATH: _with_species, RELIEVING_PATH: _with_relieving}
+
+
+def _before(parameter_set: ParameterSet, path: str) -> str:
+    """Return what stood at the path, so that an override never hides the value it replaces."""
+    entry = with_followers(parameter_set).entries().get(path)
+    return f"the set has {entry_text(entry)} ({entry.origin}: {entry.source})" if entry else "the set has no value"

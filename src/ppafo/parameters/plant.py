@@ -11,6 +11,7 @@ from ppafo.model.columns import first, over_runs
 from ppafo.model.effects.kind import SECTION, Effect
 from ppafo.model.orifice import FlowCurve, area_conductance, isentropic_curve, iso6358_curve, sonic_conductance_mass
 from ppafo.model.plant import PlantParameters
+from ppafo.model.valves.kind import ValveModel
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, Gas, Orifice, SonicOrifice, Valve
 
@@ -60,6 +61,18 @@ def valve_settings(valve: Valve) -> Any:
 def first_settings(valve: Valve) -> Any:
     """Return the settings [SI] of a valve in the first run of an ensemble: they choose the model for all of them."""
     return valve_settings(valve)._make(map(first, valve_settings(valve)))
+
+
+def venting_valve(valve: Valve) -> ValveModel:
+    """The model of a valve that a command can vent: a proportional one has a vent valve beside it.
+
+    Of an ensemble the first run decides which model it is.
+    """
+    if valve.kind == "proportional":
+        from ppafo.model.valves import vent_valve  # a vane on a bench needs none
+
+        return vent_valve.choose(first_settings(valve))
+    return VALVES[valve.kind].choose(first_settings(valve))
 
 
 def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParameters:

@@ -9,6 +9,7 @@ from ppafo.cli.output import Said
 from ppafo.errors import ScenarioError, nearest_name
 
 MOST_SAMPLES = 10_000_000
+"""Drawn samples that are compared at most."""
 
 
 COMMAND = "export firmware"

@@ -14,6 +14,7 @@ from ppafo.processor.fixed_point import SETTINGS, Converter, converter_of
 
 Settings = Mapping[str, float]
 _ROUNDING = 1.0e-9
+"""Torque [N m] by which a reference may pass what the converter shows: rounding."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.errors import ScenarioError
 from ppafo.processor.catalog import target_of
+from ppafo.processor.images import missing_tools
 from ppafo.processor.lock_step import (
     TRIED,
     Comparison,
@@ -16,7 +17,6 @@ from ppafo.processor.lock_step import (
     processor_figure,
     run_on_processor,
 )
-from ppafo.processor.simulators import missing_tools
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _SHOWN = {"rms_error": ("N m", 1.0), "gas_supplied": ("g", 1.0e3)}
 SAMPLES_OF_TABLE = 1000
+"""Samples of each controller in the table, unless another number is given."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ table's (``units/shown.py``).
 import math
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,45 +18,63 @@ from ppafo.units import from_si, without_exponent
 from ppafo.units.shown import shown_unit
 
 Floats = NDArray[np.float64]
-QUANTITIES: MappingProxyType[str, tuple[str, str]] = MappingProxyType(
+
+
+class Units(NamedTuple):
+    """The unit of a quantity in SI, and the one in which it is shown unless a parameter set writes another."""
+
+    si: str
+    shown: str
+
+
+QUANTITIES: Mapping[str, Units] = MappingProxyType(
     {
-        "acceleration": ("m/s^2", "m/s^2"),
-        "angle": ("rad", "deg"),
-        "angular acceleration": ("rad/s^2", "rad/s^2"),
-        "angular velocity": ("rad/s", "deg/s"),
-        "area": ("m^2", "mm^2"),
-        "duration": ("s", "min"),
-        "energy": ("J", "J"),
-        "force": ("N", "N"),
-        "fraction": ("1", "%"),
-        "frequency": ("Hz", "Hz"),
-        "gas mass": ("kg", "g"),
-        "gas mass per energy": ("kg/J", "g/J"),
-        "length": ("m", "mm"),
-        "mass": ("kg", "kg"),
-        "mass flow": ("kg/s", "g/s"),
-        "part mass": ("kg", "g"),
-        "power": ("W", "W"),
-        "pressure": ("Pa_a", "psi_g"),
-        "pressure change": ("Pa_d", "psi_d"),
-        "temperature": ("K", "degC"),
-        "time": ("s", "s"),
-        "torque": ("N m", "N m"),
-        "velocity": ("m/s", "m/s"),
-        "volume": ("m^3", "cm^3"),
-        "displacement per radian": ("m^3/rad", "cm^3/rad"),
-        "volume flow": ("m^3/s", "L/min"),
-        "body length": ("m", "cm"),
-        "conductance": ("m^3/(s Pa)", "L/(s bar)"),
+        "acceleration": Units("m/s^2", "m/s^2"),
+        "angle": Units("rad", "deg"),
+        "angular acceleration": Units("rad/s^2", "rad/s^2"),
+        "angular velocity": Units("rad/s", "deg/s"),
+        "area": Units("m^2", "mm^2"),
+        "duration": Units("s", "min"),
+        "energy": Units("J", "J"),
+        "force": Units("N", "N"),
+        "fraction": Units("1", "%"),
+        "frequency": Units("Hz", "Hz"),
+        "gas mass": Units("kg", "g"),
+        "gas mass per energy": Units("kg/J", "g/J"),
+        "length": Units("m", "mm"),
+        "mass": Units("kg", "kg"),
+        "mass flow": Units("kg/s", "g/s"),
+        "part mass": Units("kg", "g"),
+        "power": Units("W", "W"),
+        "pressure": Units("Pa_a", "psi_g"),
+        "pressure change": Units("Pa_d", "psi_d"),
+        "temperature": Units("K", "degC"),
+        "time": Units("s", "s"),
+        "torque": Units("N m", "N m"),
+        "velocity": Units("m/s", "m/s"),
+        "volume": Units("m^3", "cm^3"),
+        "displacement per radian": Units("m^3/rad", "cm^3/rad"),
+        "volume flow": Units("m^3/s", "L/min"),
+        "body length": Units("m", "cm"),
+        "conductance": Units("m^3/(s Pa)", "L/(s bar)"),
     }
 )
-"""Kind of quantity to its unit in SI and the unit in which it is shown unless a parameter set writes another."""
+"""Units by the kind of quantity."""
 _NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
-_OF_UNIT = {si: quantity for quantity, (si, _) in QUANTITIES.items() if quantity not in _NAMED}
-
-
-# Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
-_OF_UNIT |= {"Pa": "pressure", "kg": "mass"}
+"""Kinds that no unit tells from another kind: whoever shows one has to name it."""
+_OF_UNIT = {
+    **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in _NAMED},
+    # Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
+    "Pa": "pressure",
+    "kg": "mass",
+}
+"""Kind of quantity by its unit in SI."""
+_OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
+"""Kind of quantity of a metric by its unit in SI: masses among the metrics are masses of gas."""
+_ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
+"""Units that an axis writes in a form of their own."""
+_PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
+"""What an axis writes for the end of a unit of pressure."""
 
 
 def quantity_of_unit(si_unit: str) -> str:
@@ -68,13 +87,13 @@ def quantity_of_unit(si_unit: str) -> str:
 
 def si_unit(quantity: str) -> str:
     """Return the unit in SI of a quantity, as files write it; empty for a plain number."""
-    return QUANTITIES[quantity][0] if quantity else ""
+    return QUANTITIES[quantity].si if quantity else ""
 
 
 def _unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown: the set's, where it writes one, else the table's."""
-    si_unit, unit = QUANTITIES[quantity]
-    return unit if quantity in _NAMED else shown_unit(si_unit, unit)
+    units = QUANTITIES[quantity]
+    return units.shown if quantity in _NAMED else shown_unit(units.si, units.shown)
 
 
 def display_unit(quantity: str) -> str:
@@ -92,16 +111,19 @@ def change_unit(quantity: str) -> str:
 def axis_unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown, as the label of an axis writes it: with raised exponents."""
     unit = display_unit(quantity)
-    words = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
-    kinds = {"_g": " gauge", "_a": " absolute"}
-    typed = unit if quantity != "pressure" else f"{unit[:-2]}{kinds.get(unit[-2:], unit[-2:])}"
-    return words.get(unit, typed.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$"))
+    if unit in _ON_AXES:
+        return _ON_AXES[unit]
+    if quantity == "pressure":
+        unit = f"{unit[:-2]}{_PRESSURE_KINDS.get(unit[-2:], unit[-2:])}"
+    return unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$")
 
 
 def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
     """Return a value in SI in the unit in which it is shown; gauge counts from ``atmosphere`` [Pa absolute]."""
-    si, unit = (QUANTITIES[quantity][0], _unit(quantity)) if quantity in QUANTITIES else ("", "")
-    return float(value) if si == unit or not math.isfinite(value) else from_si(float(value), unit, si, atmosphere)
+    if quantity not in QUANTITIES or not math.isfinite(value):
+        return float(value)
+    si, unit = QUANTITIES[quantity].si, _unit(quantity)
+    return float(value) if si == unit else from_si(float(value), unit, si, atmosphere)
 
 
 def display_difference(value: float, quantity: str) -> float:
@@ -120,10 +142,6 @@ def display_values(values: Floats, quantity: str) -> Floats:
 def quantity_text(value: float, quantity: str, form: str = ".3g", atmosphere: float = STANDARD_ATMOSPHERE) -> str:
     """Return a value in SI as text with the unit in which it is shown; gauge counts from ``atmosphere`` [Pa]."""
     return f"{without_exponent(display_value(value, quantity, atmosphere), form)} {display_unit(quantity)}".rstrip()
-
-
-_OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
-"""Masses among the metrics are masses of gas."""
 
 
 def metric_quantity(si_unit: str) -> str:
@@ -148,14 +166,15 @@ def metric_words(name: str) -> str:
 def metrics_lines(metrics: Mapping[str, Metric], atmosphere: float = STANDARD_ATMOSPHERE) -> list[str]:
     """Return a line of text for each metric: name, value and unit as people are shown it, meaning.
 
-    Pressures count from ``atmosphere`` [Pa absolute].
+    Gauge pressures count from ``atmosphere`` [Pa absolute].
     """
-    rows = []
-    for name, metric in metrics.items():
-        value, unit = metric_level(metric.value, metric.unit, atmosphere)
-        rows.append((name, f"{value:.4g}", unit, metric.summary))
-    widths = [max((len(row[column]) for row in rows), default=0) for column in range(3)]
-    return [f"{row[0]:<{widths[0]}}  {row[1]:>{widths[1]}} {row[2]:<{widths[2]}}  {row[3]}" for row in rows]
+    levels = [metric_level(metric.value, metric.unit, atmosphere) for metric in metrics.values()]
+    values, units = [f"{value:.4g}" for value, _ in levels], [unit for _, unit in levels]
+    name_width, value_width, unit_width = (max(map(len, texts), default=0) for texts in (metrics, values, units))
+    return [
+        f"{name:<{name_width}}  {value:>{value_width}} {unit:<{unit_width}}  {metric.summary}"
+        for (name, metric), value, unit in zip(metrics.items(), values, units, strict=True)
+    ]
 
 
 def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> tuple[float, str]:

@@ -28,6 +28,19 @@ T_co = TypeVar("T_co", covariant=True)
 Cell = str | float | Interval | None
 """A number in SI, an estimate with its interval, a text, or None where there is nothing to say."""
 NOTHING = "-"
+"""The text of a cell in which there is nothing to say."""
+MARK = "*"
+"""What stands before a row that stands out."""
+REPORT = "report.html"
+FORMATS = ("png", "svg")
+"""Formats of a figure in a folder."""
+_UNIT_IN_BRACKETS = re.compile(r"\([^(]*\)$")
+_ORIGINS = {
+    "simulated": "Every run is of the model; nothing on this page was measured.",
+    "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
+    "measured": "",
+}
+"""What a page says of where its numbers come from, by their kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,13 +93,17 @@ def facts(rows: Iterable[Sequence[Cell]]) -> list[Column]:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """A part of a finding: what is said, a table, remarks below it, a figure, a text to copy.
+    """A part of a finding, of which all may be left out: a heading, what is said, a table, a figure, a text to copy.
 
-    A table whose columns have no title is a list of facts; its first ``left`` columns are names, set to the left, and
-    ``marked`` are the numbers of its rows that stand out. ``name`` is the stem of the figure's files: of ``panels``,
-    ``across`` of them side by side, each of a ``size`` [inches], or of what ``draw`` returns, which may be the bytes of
-    an animation (GIF). ``panels`` may be a function, called where the figure is wanted. A part that ``is_detail`` is on
-    the page only.
+    The table: ``columns``, of which the first ``left`` are names and set to the left; without titles they are a list of
+    facts. ``marked`` are the numbers of the rows, from 0, that stand out; ``remarks`` stand below.
+
+    The figure: ``name`` is the stem of its files, empty where there is none. It is made of ``panels``, or of a function
+    that makes them where the figure is wanted: ``across`` side by side, each of a ``size`` [inches], under a ``title``
+    and with a ``note``. Or ``draw`` makes all of it, which may be the bytes of an animation (GIF). The ``caption`` is
+    on the page.
+
+    ``code`` is a text to copy. A part that ``is_detail`` is on the page only.
     """
 
     heading: str = ""
@@ -138,6 +155,7 @@ class LivePart:
 
 
 def _units_of(finding: "Finding[Any]", *_: Any, **__: Any) -> Mapping[str, str]:
+    """Return the units in which a finding is shown, whatever else its function takes."""
     return finding.units
 
 
@@ -207,17 +225,6 @@ class Finding(Generic[T_co]):
         write_marked_folder(Path(folder), files_of(self), self.command or self.name)
 
 
-MARK = "*"
-REPORT = "report.html"
-_UNIT = re.compile(r"\([^(]*\)$")
-FORMATS = ("png", "svg")
-_ORIGINS = {
-    "simulated": "Every run is of the model; nothing on this page was measured.",
-    "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
-    "measured": "",
-}
-
-
 @in_units(_units_of)
 def text_of(finding: Finding[Any]) -> str:
     """Return what is said first and every part that is no mere detail of the page."""
@@ -231,6 +238,7 @@ def text_of(finding: Finding[Any]) -> str:
 
 
 def _table_lines(part: Part) -> list[str]:
+    """Return the table of a part as aligned lines, its head first, its marked rows after a mark; none without rows."""
     rows: list[tuple[str, ...]] = part.rows
     if not rows:
         return []
@@ -238,7 +246,7 @@ def _table_lines(part: Part) -> list[str]:
         return align_columns(rows, len(part.columns))
     rows = [tuple(column.head for column in part.columns), *rows]
     if part.marked:
-        marks = ["", *(MARK if place in part.marked else "" for place in range(len(rows) - 1))]
+        marks = ["", *(MARK if number in part.marked else "" for number in range(len(part.rows)))]
         rows = [(mark, *row) for mark, row in zip(marks, rows, strict=True)]
     return align_columns(rows, part.left + bool(part.marked))
 
@@ -251,24 +259,21 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
     values = {
         "finding": finding,
         "parts": [
-            (
-                part,
-                # A unit in brackets at the end of a title is not broken over two lines.
-                [
-                    _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), column.head)
-                    for column in part.columns
-                ]
-                if part.has_head
-                else [],
-                inline_figure(drawn[part.name]) if part.name else "",
-            )
-            for part in finding.parts
+            (part, _head_of(part), inline_figure(drawn[part.name]) if part.name else "") for part in finding.parts
         ],
         "origin": _ORIGINS[finding.kind],
         "versions": f"ppafo {__version__}",
         "live": None if finding.live is None else finding.live(),
     }
     return render_page("finding.html.jinja", values).encode()
+
+
+def _head_of(part: Part) -> list[str]:
+    """Return the titles of a table; a unit in brackets at the end of one is not broken over two lines."""
+    if not part.has_head:
+        return []
+    heads = [column.head for column in part.columns]
+    return [_UNIT_IN_BRACKETS.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), head) for head in heads]
 
 
 @in_units(_units_of)
@@ -278,10 +283,11 @@ def files_of(finding: Finding[Any]) -> dict[str, bytes]:
     for name, part in finding.figures.items():
         figure = part.drawn(finding.kind)
         drawn[name] = {"gif": figure} if isinstance(figure, bytes) else render_figure(figure, FORMATS)
+    on_page = {name: formats.get("svg") or formats["gif"] for name, formats in drawn.items()}
     return {
-        **{f"{name}.{form}": content for name, forms in drawn.items() for form, content in forms.items()},
+        **{f"{name}.{form}": content for name, formats in drawn.items() for form, content in formats.items()},
         **{name: content() for name, content in finding.files.items()},
         f"{finding.name}.json": f"{json_text(finding.to_dict())}\n".encode(),
         f"{finding.name}.txt": f"{text_of(finding)}\n".encode(),
-        REPORT: page_of(finding, {name: forms.get("svg") or forms["gif"] for name, forms in drawn.items()}),
+        REPORT: page_of(finding, on_page),
     }

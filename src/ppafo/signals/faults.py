@@ -18,20 +18,26 @@ FEWEST_AT_LIMIT = 20
 MINIMUM_SAMPLES = 10
 """Fewer do not show how large their noise is."""
 
-# The standard deviation of a normal distribution over the median of its sizes, which a few jumps do not move.
 _SPREAD_OF_MEDIAN = 1.4826
+"""Standard deviation of a normal distribution over the median of its sizes, which a few jumps do not move."""
 _KEPT = 3.0
+"""Standard deviations up to which a difference counts as usual."""
 _SHARE_OF_KEPT = 0.98658
 """Standard deviation of a normal distribution cut at 3 standard deviations, over the whole's."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
 """Standard deviation of the third difference of white noise over the noise's."""
-# White noise turns at two of three samples, a smooth curve at hardly any.
 _NOISY_FRACTION = 0.2
+"""Fraction of turns from which a signal is noisy: white noise turns at two of three samples, a smooth curve hardly."""
 _ABRUPT_FRACTION = 0.3
+"""Fraction of the fastest movement of a signal from which it runs into a plateau."""
 _BEFORE = 5
+"""Samples over which a movement is looked at."""
 _EXCEPTIONAL = 5
+"""Lengths of the next longest plateau that one lasts which is no step of a coarse converter."""
 _PARTS = 20
+"""Parts of a signal whose means show what lasts."""
 _SMOOTH = 1.0e-6
+"""Fraction of the range of a signal up to which rounding alone puts a value off the line between its neighbours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +157,7 @@ def off_neighbours(values: Floats) -> Floats:
 
 
 def _five_around(values: Floats) -> Floats:
+    """Return each value with the two before and the two behind it (values, 5)."""
     # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
 
@@ -158,6 +165,7 @@ def _five_around(values: Floats) -> Floats:
 _ROUNDING = 1.0e-9
 """Fraction of a range [-] that is no step of a converter but how a file rounds."""
 _SHARE_THAT_DIFFERS = 0.5
+"""Share of the values that may differ from all others, where a converter's step shows."""
 
 
 def resolution_of(values: Floats) -> float:

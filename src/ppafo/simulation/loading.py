@@ -21,8 +21,16 @@ from ppafo.parameters import ParameterSet, build_device, list_sets, load_paramet
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
 from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
-from ppafo.parameters.overrides import FORMS, Override, check_valve, either, in_two_forms, read_overrides
-from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set, with_overrides
+from ppafo.parameters.overrides import (
+    FORMS,
+    Override,
+    check_valve,
+    either,
+    in_two_forms,
+    read_overrides,
+    with_overrides,
+)
+from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
 from ppafo.simulation.declaration import (
     ACCURACY,

@@ -23,7 +23,12 @@ MATLAB_SUFFIX = ".mat"
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HDF5_AT = 512
 """Byte at which HDF5 begins, behind the header of MATLAB."""
-_MOST_COLUMNS, _DEEPEST, _MOST_ELEMENTS = 300, 8, 300
+_MOST_COLUMNS = 300
+"""Columns, or else rows, of a matrix that get a name each; one with more of both has none."""
+_DEEPEST = 8
+"""Structures within structures that are looked into."""
+_MOST_ELEMENTS = 300
+"""Elements of an array of structures or a cell array that are looked into."""
 _OF_DAMAGE = (
     OSError,
     ValueError,
@@ -37,6 +42,7 @@ _OF_DAMAGE = (
 )
 """What the libraries raise on damaged files."""
 _LABELS = ("colheaders", "labels", "names")
+"""Fields of a structure that may have the names of the columns of another."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,6 +80,8 @@ def _plainly(name: str, kind: str) -> str:
 
 @dataclass(slots=True)
 class _Contents:
+    """What was found in a file so far, as ``MatlabFile`` has it."""
+
     columns: dict[str, Floats] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)
     words: list[str] = field(default_factory=list)
@@ -121,6 +129,7 @@ Tree = dict[str, Any] | list[Any] | NDArray[Any] | str | _Object
 
 
 def _read_older(path: str | Path, contents: _Contents) -> None:
+    """Add the variables of a file of version 4 to 7 to the contents."""
     import zlib
 
     from scipy.io import loadmat

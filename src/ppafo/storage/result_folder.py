@@ -23,7 +23,6 @@ from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import csv_bytes, read_csv
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
 from ppafo.storage.netcdf import netcdf_bytes
-from ppafo.storage.netcdf_reading import read_netcdf
 
 if TYPE_CHECKING:
     from ppafo.storage.column_map import ColumnMap
@@ -246,6 +245,8 @@ def read_result(folder: str | Path) -> StoredResult:
     >>> ppafo.read_result(folder).document["status"]
     {'kind': 'completed', 'time': None, 'message': 'completed'}
     """
+    from ppafo.storage.netcdf_reading import read_netcdf
+
     folder_path = Path(folder)
     if not folder_path.is_dir():
         raise DataError(f"{folder}: is not a folder")
@@ -316,6 +317,7 @@ def read_recording(
             )
         file /= WALK_RECORDING
     if file.suffix == ".nc":
+        from ppafo.storage.netcdf_reading import read_netcdf
         from ppafo.storage.trial_reading import check_can_be_read
 
         # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.

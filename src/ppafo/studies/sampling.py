@@ -26,12 +26,16 @@ from ppafo.studies.study import Drawn, Sample
 
 Words = NDArray[np.uint64]
 Factor = tuple[tuple[float, ...], ...]
-# Four rounds of a Feistel network are a pseudo-random permutation (Luby and Rackoff, 1988); six leave a margin.
 _ROUNDS = 6
+"""Rounds of a Feistel network: four are a pseudo-random permutation (Luby and Rackoff, 1988), six leave a margin."""
 _WORDS_PER_STEP = 4
+"""Words of 64 bits that a step of Philox makes."""
 _FRACTION_BITS = 53
+"""Bits of a float's fraction, with the one that is not stored."""
 _SOBOL_BITS = 32
+"""Bits of a number of the Sobol sequence, which repeats after 2**32 draws."""
 MAXIMUM_SOBOL_DIMENSIONS = 21201
+"""Dimensions for which SciPy has direction numbers (Joe and Kuo, 2008)."""
 
 
 def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> Floats:

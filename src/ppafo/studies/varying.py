@@ -15,8 +15,8 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
-from ppafo.parameters.overrides import read_overrides
-from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, with_overrides
+from ppafo.parameters.overrides import read_overrides, with_overrides
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.loading import set_name

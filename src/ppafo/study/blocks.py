@@ -14,10 +14,13 @@ from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
 
 MAXIMUM_RUNS_OF_CHUNK = 65_536
+"""Runs of a chunk at most, unless the study says another number."""
 _FEWEST_RUNS_OF_CHUNK = 512
+"""Runs of a chunk at least, however much memory their channels over time take."""
 _SLOW_RUNS_OF_CHUNK = 64
 """Where a Python object controls: some seconds, after which progress is said and nothing of it is lost."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
+"""Bytes of the channels over time of a chunk, while it is computed."""
 
 
 @dataclass(frozen=True, slots=True)

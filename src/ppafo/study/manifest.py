@@ -29,6 +29,7 @@ SCHEMA_VERSION = 2
 _NAMED = 4
 """Differences that a message names."""
 _COMPARED = ("ppafo", "study", "scenarios", "varied", "drawn", "programs")
+"""Keys of the document in which a study must be the same to go on with its results."""
 
 
 def manifest(study: Study) -> dict[str, Any]:
@@ -93,6 +94,7 @@ def read_manifest(location: Place) -> dict[str, Any]:
 
 
 def _channel(name: str) -> str:
+    """Return the name of a channel; ValueError where there is none of that name."""
     if name not in CHANNELS:
         raise ValueError(f"there is no channel '{one_line(name)}'")
     return name
@@ -102,6 +104,8 @@ _Channel = Annotated[str, AfterValidator(_channel)]
 
 
 class _Part(BaseModel):
+    """A table of the document; what a later version writes beside it is left alone."""
+
     model_config = ConfigDict(strict=True)
 
 
@@ -201,12 +205,12 @@ def check_same_study(location: Place, stored: Mapping[str, Any], requested: Mapp
 
 
 def _plain(document: Any) -> Any:
-    """A document as it is once it was written and read: lists for tuples."""
+    """Return a document as it is once it was written and read: lists for tuples."""
     return json.loads(json.dumps(document))
 
 
 def _differences(path: str, before: Any, now: Any) -> Iterator[str]:
-    """Give a line for every key at which two documents differ."""
+    """Yield a line for every key at which two documents differ."""
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys((*before, *now)):
             yield from _differences(f"{path}.{key}", before.get(key), now.get(key))

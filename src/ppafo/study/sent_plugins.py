@@ -33,6 +33,7 @@ def plugins_to_send() -> tuple[SentPlugin, ...]:
 
 
 def _files_of(plugin: Plugin) -> tuple[tuple[str, bytes], ...]:
+    """Return name and content of every file of a module's folder that this process has loaded."""
     if not plugin.folder:
         return ()
     loaded = {getattr(module, "__file__", None) for module in [*sys.modules.values()]}
@@ -56,6 +57,7 @@ def take_plugins(sent: Iterable[SentPlugin]) -> None:
 
 
 def _has(path: Path, content: bytes) -> bool:
+    """Tell whether a file with this content is there."""
     return path.is_file() and path.read_bytes() == content
 
 

@@ -40,13 +40,19 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 _TRIED_RUNS = 8
+"""Runs of each configuration that are made before a study begins, so that it is refused at once where it cannot run."""
 STATUSES = ("completed", "diverged", "refused")
 _PLAIN, _OVER_TIME = "-", "_over_time"
 ASKED_ABOVE = 10_000_000_000
 """Bytes above which a study is only started with ``--yes``."""
 _FIXED_BYTES_OF_ROW = 3
-_BYTES_OF_NUMBER, _BYTES_OF_SAMPLE = 8, 4
+"""Bytes of the texts of a row, each by its number in a list of texts."""
+_BYTES_OF_NUMBER = 8
+"""Bytes of a number of a row."""
+_BYTES_OF_SAMPLE = 4
+"""Bytes of a sample of a channel over time, which is kept in single precision unless bands are made of it."""
 _BYTES_OF_FILE = 12_000
+"""Bytes of a file beside its rows, with its note: names, units and meanings of the columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,48 +175,79 @@ def check_types(table: "pa.Table", name: str) -> None:
 
 
 def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
-    """Return the file of a chunk, computed here and not yet written."""
+    """Return the file of a chunk, computed here and not yet written: a row for every run, in SI units, nan for none."""
     study, part = task.study, chunk(task.study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
     result = _result(study, part, values, task.threads)
-    # A row for every run: number, configuration, varied values, status, metrics; SI units, nan where none.
-    configuration = study.configurations[part.configuration]
-    name = configuration.name
-    own = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
-    names = [configuration.name for configuration in study.configurations]
-    first = part.configuration * study.runs_of_configuration + part.first
-    numbers = np.arange(first, first + part.runs, dtype=np.int64)
     columns = {
-        "run": TableColumn(numbers, _PLAIN, "number of the run in the study"),
-        "configuration": TableColumn(
-            encode_texts(np.full(part.runs, part.configuration), names), _PLAIN, "name of the base scenario"
-        ),
+        **_columns_of_runs(study, part, values),
+        **_columns_of_endings(study.configurations[part.configuration], result),
+        **_columns_of_metrics(study, result, part.runs),
+        **_columns_of_traces(study, part, result),
     }
-    for path, column in values.items():
-        shown = own.get(path, column) if study.varies(path, name) else np.full(part.runs, np.nan)
-        columns[path] = TableColumn(shown, study.units[path], "varied value")
-    columns["status"] = TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended")
-    columns["failure_time"] = TableColumn(result.failure_time, "s", "time at which the run diverged")
-    columns["reason"] = TableColumn(texts_of_some(result.reasons, part.runs), _PLAIN, "why the run has no metrics")
-    columns[OSCILLATES] = TableColumn(
-        _flags(configuration, result), _PLAIN, "1 where the loop oscillates, empty where that is not known"
-    )
-    for metric in study.outputs.metrics:
-        computed = result.metrics.get(metric, np.full(part.runs, np.nan))
-        columns[metric] = TableColumn(computed, stored_unit(METRICS[metric].unit), METRICS[metric].summary)
-        if metric in result.errors:
-            unit = "Pa_d" if METRICS[metric].unit == "Pa" else METRICS[metric].unit
-            columns[f"{metric}_error"] = TableColumn(result.errors[metric], unit, f"estimated error of {metric}")
-    for channel in study.outputs.traces:
-        # What bands are read from is kept as it was computed, all else in single precision.
-        trace = result.traces[channel].T
-        trace = trace if trace.size else np.full((part.runs, samples_of(study, configuration)), np.nan)
-        trace = trace.astype(np.float64 if channel in study.outputs.bands else np.float32)
-        said = f"{CHANNELS[channel].summary}, every {study.outputs.every:g} s"
-        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), said)
     facts = {"study": study.name, "chunk": str(number), "rows": str(part.runs), "every": f"{study.outputs.every!r} s"}
     content = parquet_bytes(table_of(columns, facts))
     return Finished(number, part.runs, int(np.count_nonzero(result.status))), content
+
+
+def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> dict[str, TableColumn]:
+    """Return the number of each run, its configuration, and what varies: nan where it does not vary in that one."""
+    configuration = study.configurations[part.configuration]
+    first = part.configuration * study.runs_of_configuration + part.first
+    numbers = np.arange(first, first + part.runs, dtype=np.int64)
+    names = [each.name for each in study.configurations]
+    of_configuration = encode_texts(np.full(part.runs, part.configuration), names)
+    columns = {
+        "run": TableColumn(numbers, _PLAIN, "number of the run in the study"),
+        "configuration": TableColumn(of_configuration, _PLAIN, "name of the base scenario"),
+    }
+    # Gauge pressures as absolute ones, each from the atmosphere of its run.
+    in_effect = absolute(configuration.scenario, varied_columns(study, configuration, dict(values)), study.gauge)
+    for path, drawn in values.items():
+        varies = study.varies(path, configuration.name)
+        shown = in_effect.get(path, drawn) if varies else np.full(part.runs, np.nan)
+        columns[path] = TableColumn(shown, study.units[path], "varied value")
+    return columns
+
+
+def _columns_of_endings(configuration: Configuration, result: EnsembleResult) -> dict[str, TableColumn]:
+    """Return how each run ended, when and why it failed, and whether its loop oscillates."""
+    return {
+        "status": TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended"),
+        "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
+        "reason": TableColumn(texts_of_some(result.reasons, result.status.size), _PLAIN, "why the run has no metrics"),
+        OSCILLATES: TableColumn(
+            _flags(configuration, result), _PLAIN, "1 where the loop oscillates, empty where that is not known"
+        ),
+    }
+
+
+def _columns_of_metrics(study: Study, result: EnsembleResult, runs: int) -> dict[str, TableColumn]:
+    """Return the metrics of each run, each with its estimated error where the study asks for it."""
+    columns = {}
+    for name in study.outputs.metrics:
+        metric = METRICS[name]
+        columns[name] = TableColumn(
+            result.metrics.get(name, np.full(runs, np.nan)), stored_unit(metric.unit), metric.summary
+        )
+        if name in result.errors:
+            unit = "Pa_d" if metric.unit == "Pa" else metric.unit
+            columns[f"{name}_error"] = TableColumn(result.errors[name], unit, f"estimated error of {name}")
+    return columns
+
+
+def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dict[str, TableColumn]:
+    """Return the channels over time that the study keeps of each run."""
+    columns = {}
+    samples = samples_of(study, study.configurations[part.configuration])
+    for channel in study.outputs.traces:
+        trace = result.traces[channel].T
+        trace = trace if trace.size else np.full((part.runs, samples), np.nan)
+        # What bands are read from is kept as it was computed, all else in single precision.
+        trace = trace.astype(np.float64 if channel in study.outputs.bands else np.float32)
+        summary = f"{CHANNELS[channel].summary}, every {study.outputs.every:g} s"
+        columns[trace_column(channel)] = TableColumn(lists_of(trace), stored_unit(CHANNELS[channel].unit), summary)
+    return columns
 
 
 def work_on_chunk(task: Task, number: int) -> Finished:
@@ -235,6 +272,7 @@ def note_file(number: int) -> str:
 
 
 def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int | None) -> EnsembleResult:
+    """Return the runs of a chunk, whose varied ``values`` [SI] are by path; StudyError for one that cannot vary so."""
     configuration, outputs = study.configurations[part.configuration], study.outputs
     columns = varied_columns(study, configuration, values) or unvaried(configuration.scenario, part.runs)
     every = outputs.every if outputs.traces else 0.0
@@ -289,6 +327,7 @@ def check_room(study: Study, location: Place, agreed: bool) -> None:
 
 
 def _bytes_text(size: int) -> str:
+    """Return a number of bytes as text, ``1.2 GB``."""
     for unit, scale in (("TB", 1e12), ("GB", 1e9), ("MB", 1e6)):
         if size >= scale:
             return f"{size / scale:.3g} {unit}"

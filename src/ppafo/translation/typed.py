@@ -4,6 +4,7 @@ The typed walk (``walk.py``) makes them of Python's syntax trees; writers of C, 
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 from ppafo.translation.value_types import FLOAT, Array, Items, Row, Scalar, Shared, Type, types_in
@@ -13,7 +14,7 @@ FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
 _NONE: frozenset[str] = frozenset()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Term:
     """A value. Its ``kind`` says what makes it, and with it what ``parts`` and ``detail`` are.
 
@@ -31,13 +32,13 @@ class Term:
     type: Type
     parts: tuple["Term", ...] = ()
     detail: Any = None
-    reads: frozenset[str] = field(init=False, compare=False, repr=False)
-    """Local names whose values it takes."""
 
-    def __post_init__(self) -> None:
+    @cached_property
+    def reads(self) -> frozenset[str]:
+        """Local names whose values it takes."""
         # Gathered once: asked again and again while scopes are found.
         names = frozenset((self.detail,)) if self.kind == "name" else _NONE
-        object.__setattr__(self, "reads", names.union(*(part.reads for part in self.parts)) if self.parts else names)
+        return names.union(*(part.reads for part in self.parts)) if self.parts else names
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,14 +40,18 @@ from ppafo.validation.replay import Motion, Replay, Replayed, replay_recording
 DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
-ENGINE_ERROR, LEAST_NOISE = 3.0e-5, 1.0e-4
-"""Over the full range: what the engine is off (tests/convergence), and the noise of samples that is taken at least."""
+ENGINE_ERROR = 3.0e-5
+"""What the engine is off, over the full range [-] (tests/convergence)."""
+LEAST_NOISE = 1.0e-4
+"""Noise of samples that is taken at least, over the full range [-]."""
 _UNMOVED = 1.0e-3
 """Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
 _WITHIN_NOISE = 1.5
 """Size of white noise over its estimate up to which it may be noise."""
 _SHIFTS = 81
+"""Delays that are tried first, from one limit to the other."""
 _MAXIMUM_SAMPLES = 4000
+"""Samples of a channel by which a delay is sought."""
 _MINIMUM_GAIN = 25.0
 """In variances of one sample: five standard deviations of white noise. Less is noise and no delay."""
 _SMALLEST_GAIN = 1.0e-12
@@ -55,7 +59,9 @@ _SMALLEST_GAIN = 1.0e-12
 _RESOLUTION = 0.02
 """Fraction of a sample below which a delay counts as none."""
 _ACCURACY = 1.0e-7
+"""Accuracy of a delay, as a fraction of the limit."""
 _AT_LIMIT = 0.99
+"""Fraction of the limit from which a delay is at it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +81,7 @@ class Curve:
     limit: Limit | None = None
 
     def shift(self, delay: float, times: Floats) -> Floats:
-        """The model, ``delay`` [s] later, at some times; before its first and after its last value it stands still."""
+        """Return the model, ``delay`` [s] later, at some times; before and after its values it stands still."""
         return np.interp(times - delay, self.model_times, self.model_values)
 
 
@@ -93,7 +99,7 @@ class Delay:
 
 
 def estimate_delay(curves: list[Curve], limit: float) -> Delay:
-    """The delay, at most ``limit`` [s] either way, that brings the channels together best, each in its full range."""
+    """Return the delay, at most ``limit`` [s] either way, that brings the channels together best, in full ranges."""
     if limit <= 0.0 or not curves:
         return Delay(0.0, is_at_limit=False)
     # No more measured samples than the search needs.
@@ -105,7 +111,7 @@ def estimate_delay(curves: list[Curve], limit: float) -> Delay:
 
     def cost(delay: float) -> float:
         """Return the mean squared error over all samples and channels, in full ranges [-]."""
-        errors = [(one.shift(delay, one.times) - one.values) / one.full_range for one in thinned]
+        errors = [(curve.shift(delay, curve.times) - curve.values) / curve.full_range for curve in thinned]
         return sum(float(np.square(error).mean()) for error in errors) / len(errors)
 
     shifts = np.linspace(-limit, limit, _SHIFTS).tolist()
@@ -204,7 +210,7 @@ class RecordingAgreement:
 
 
 def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
-    """The errors in one channel with the model shifted by ``delay`` [s].
+    """Return the errors in one channel with the model shifted by ``delay`` [s].
 
     Without a limit of its own an RMS error passes up to 10 % of full range or half of the variance, and noise.
     """
@@ -258,12 +264,12 @@ def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> R
 
 def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
     """Return how far the model of a device is from one recording, on the inputs of that recording."""
-    wanted = replay_of(measured, device, settings)
-    replayed = replay_recording(wanted)
-    curves = _curves(measured, replayed, wanted.device, settings)
+    request = replay_of(measured, device, settings)
+    replayed = replay_recording(request)
+    curves = _curves(measured, replayed, request.device, settings)
     # Sums and multiples of two others do not count twice.
-    chosen = [one for one in curves if one.channel in (ANGLE, PRESSURE_1, PRESSURE_2)] or curves[:1]
-    delay = estimate_delay(chosen, settings.longest_delay)
+    of_sensors = [curve for curve in curves if curve.channel in (ANGLE, PRESSURE_1, PRESSURE_2)]
+    delay = estimate_delay(of_sensors or curves[:1], settings.longest_delay)
     longest = f"model and measurement are more than {settings.longest_delay:g} s apart in time; no delay was removed"
     late = [longest] if delay.is_at_limit else []
     return RecordingAgreement(
@@ -271,17 +277,20 @@ def compare_recording(measured: Measured, device: Device, settings: ReplaySettin
         sha256=measured.sha256,
         measured=measured.recording,
         model=replayed.recording,
-        motion=wanted.motion,
+        motion=request.motion,
         inputs=replayed.inputs,
         step=replayed.step,
         delay=delay,
-        channels=tuple(channel_agreement(one, delay.correction) for one in curves),
+        channels=tuple(channel_agreement(curve, delay.correction) for curve in curves),
         remarks=(*measured.remarks, *_remarks(measured, device, settings), *late),
     )
 
 
 def measured_values(recording: Recording, name: str) -> Floats | None:
-    """The values of a channel to compare; the pressure difference follows from both pressures where they are there."""
+    """Return the values of a channel to compare, None where there are none.
+
+    The pressure difference follows from both pressures where they are there.
+    """
     if name == PRESSURE_DIFFERENCE and PRESSURE_1 in recording and PRESSURE_2 in recording:
         return np.asarray(recording[PRESSURE_1] - recording[PRESSURE_2])
     if name not in recording:
@@ -290,7 +299,7 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
 
 
 def _curves(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Curve]:
-    """The channels that the recording has and that the model was not given."""
+    """Return the channels that the recording has and that the model was not given; DataError where there are none."""
     gauge = supply_gauge(measured.recording, device)
     # Channels that say nothing where the vane is locked, or where there is none.
     silent: tuple[str, ...] = (ANGLE,) if settings.motion == "locked" else ()
@@ -310,20 +319,22 @@ def _curves(measured: Measured, replayed: Replayed, device: Device, settings: Re
 
 
 def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
+    """Return what was taken otherwise than the set or the recording has it: the supply, the samples, the vane."""
     remarks = []
-    own = device.supply.pressure - device.supply.atmospheric_pressure
+    gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
     followed = supply_gauge(measured.recording, device)
-    if measured.has(SUPPLY) and abs(followed - own) > _OTHER_SUPPLY * own:
-        times = f"{followed / own:.3g} times the gauge pressure of" if own > 0.0 else "pressure, other than"
+    if measured.has(SUPPLY) and abs(followed - gauge_of_set) > _OTHER_SUPPLY * gauge_of_set:
+        times = "pressure, other than"
+        if gauge_of_set > 0.0:
+            times = f"{followed / gauge_of_set:.3g} times the gauge pressure of"
         remarks.append(f"the recorded supply has {times} supply.pressure; the recorded supply was used")
     if not measured.has(SUPPLY):
         # Said as values, for they may be the set's or given in its place.
         used = {"supply.pressure": device.supply.pressure}
         if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
-        room = device.supply.atmospheric_pressure
-        unit = device.shown.get("Pa_a", "psi_g")
-        shown = [f"{path} = {from_si(value, unit, 'Pa_a', room):.4g} {unit}" for path, value in used.items()]
+        atmosphere, unit = device.supply.atmospheric_pressure, device.shown.get("Pa_a", "psi_g")
+        shown = [f"{path} = {from_si(value, unit, 'Pa_a', atmosphere):.4g} {unit}" for path, value in used.items()]
         verb = "was" if len(shown) == 1 else "were"
         remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:

@@ -21,7 +21,7 @@ from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
 from ppafo.simulation.recorded.rest import Start
-from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
 from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import Measured
 
@@ -164,8 +164,7 @@ def replayed_scenario(request: Replay) -> Scenario:
         motion = locked_vane(start.angle)
     elif request.motion == "leg":
         # The leg on the test fixture is the scenario's of figure 7.
-        fixture = load_scenario("step-response").motion
-        leg = request.leg or (fixture.leg if isinstance(fixture, FreeMotion) else None)
+        leg = request.leg or vane_motion(load_scenario("step-response")).leg
         motion = FreeMotion(start.angle, start.angular_velocity, leg=leg)
     highest = with_highest_supply(request.device, recording, recording.names)
     duration = recording.duration + max(request.extra, sample_period(recording.time))

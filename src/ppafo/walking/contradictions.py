@@ -14,12 +14,12 @@ import numpy as np
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
-from ppafo.parameters.plant import valve_settings
+from ppafo.parameters.plant import valve_settings, venting_valve
 from ppafo.simulation.declaration import Reading, short_quantity_text, value_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import law_of, walking_valve
+from ppafo.walking.planning import law_of
 from ppafo.walking.wearer import Wearer
 
 COMPRESSION = 1.6
@@ -166,7 +166,7 @@ def _of_times(scenario: Scenario) -> Iterator[Contradiction]:
         ),
     )
     # A valve that has not moved yet neither fills nor vents, and would be taken for one that fails.
-    dead_time = walking_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
+    dead_time = venting_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
     for name in ("fill_time", "vent_time"):
         yield Contradiction(
             f"controller.{name}",

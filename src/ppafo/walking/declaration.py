@@ -34,7 +34,7 @@ from ppafo.simulation.schema import (
     number_type,
     quantity_fields,
 )
-from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
+from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
 
@@ -225,25 +225,11 @@ def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
 
 @functools.lru_cache(maxsize=8)
 def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
-    seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+    """Return the layout of the file of a walk, of which ``motions`` are the kinds of motion."""
     sensors = quantity_fields(WALK_SENSORS)
-    sensors["seed"] = (seed, Field(1, description=SEED.summary))
-    faults = {
-        part: optional(_fault(part), f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}")
-        for part in FAULTS
-    }
-    timings = []
-    for name, timing in TIMINGS.items():
-        own_fields = {
-            quantity.name: optional(number_type(quantity), quantity.summary) for quantity in timing.quantities
-        }
-        timings.append(table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | own_fields))
-    bottle: dict[str, Any] = {"name": optional(str, "name of a bottle, or the path of its file")}
-    bottle |= {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in BOTTLE_NUMBERS}
-    bottle["overrides"] = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
-    run = {"duration": optional(number_type(DURATION), DURATION.summary)}
-    run |= quantity_fields((STEP,))
-    which = {
+    sensors["seed"] = (Annotated[int, Field(ge=0, le=LARGEST_SEED)], Field(1, description=SEED.summary))
+    run = {"duration": optional(number_type(DURATION), DURATION.summary)} | quantity_fields((STEP,))
+    led_by = {
         "gait": optional(
             str, "name of a gait, or the path of a gait file; its subject walks; the built-in one unless given"
         ),
@@ -251,31 +237,55 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             str, "name of a task sequence, or the path of its file; stride after equal stride unless one is given"
         ),
     }
-    motion = one_of([table(f"{model_name(name)}Motion", kind_field(name, SUMMARY) | which) for name in motions])
-    own: dict[str, Any] = {
+    motion = one_of([table(f"{model_name(name)}Motion", kind_field(name, SUMMARY) | led_by) for name in motions])
+    sections: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
         "motion": optional(motion, "that it is a walk; gait and task sequence may stand here"),
-        **which,
+        **led_by,
         "controller": (
             controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
-        "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
+        "timing": optional(_timing_table(), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", quantity_fields((*WEARER, PERSON))),
             "who walks; the subject of the gait that is named, else the paper's, unless given",
         ),
         "sensors": optional(table("WalkSensors", sensors), "sensors of the controller; ideal unless given"),
-        "faults": optional(table("Faults", faults), "sensors and parts of the plant that fail during the walk"),
+        "faults": optional(_faults_table(), "sensors and parts of the plant that fail during the walk"),
         "shut_off": optional(
             table("ShutOffValve", quantity_fields(SHUT_OFF)),
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
-        BOTTLE: optional(
-            table("WalkBottle", bottle), "bottle that supplies the device; a supply without end unless given"
-        ),
+        BOTTLE: optional(_bottle_table(), "bottle that supplies the device; a supply without end unless given"),
     }
-    return file_model("WalkFile", own)
+    return file_model("WalkFile", sections)
+
+
+def _timing_table() -> Any:
+    """Return the table of each way to estimate the gait phase, of which a file has one."""
+    tables = []
+    for name, timing in TIMINGS.items():
+        numbers = {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in timing.quantities}
+        tables.append(table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | numbers))
+    return one_of(tables)
+
+
+def _faults_table() -> type[BaseModel]:
+    """Return the table of what fails: sensors, and parts of the plant."""
+    faults = {
+        part: optional(_fault(part), f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}")
+        for part in FAULTS
+    }
+    return table("Faults", faults)
+
+
+def _bottle_table() -> type[BaseModel]:
+    """Return the table of the bottle that a device hangs on, with its numbers in a walk and overrides of its file."""
+    fields: dict[str, Any] = {"name": optional(str, "name of a bottle, or the path of its file")}
+    fields |= {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in BOTTLE_NUMBERS}
+    fields["overrides"] = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
+    return table("WalkBottle", fields)
 
 
 def json_schema() -> dict[str, Any]:

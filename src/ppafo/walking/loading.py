@@ -24,6 +24,7 @@ from ppafo.parameters.device import Device, Valve
 from ppafo.parameters.graph import Graph, Term
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
@@ -52,7 +53,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.simulation.torque_loop import IN_WALK, PERIOD_PATH, loop_terms
-from ppafo.walking.bottle import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
+from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
     DURATION,
@@ -74,7 +75,7 @@ from ppafo.walking.motion import (
     walk_of,
     with_duration,
 )
-from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence, walking_valve
+from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import TaskSequence, load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
@@ -400,7 +401,7 @@ def _terms(valve: Valve) -> dict[str, Term]:
     """Return how lags and delays [s] of valve and sensors, which a controller may follow, come from their settings."""
     kind = VALVES[valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
-    paths, delay = tuple(f"valve.{name}" for name in names), walking_valve(valve).command_delay
+    paths, delay = tuple(f"valve.{name}" for name in names), venting_valve(valve).command_delay
     return {
         VALVE_LAG: Term(paths, kind.lag or delay, (kind.settings,)),
         VALVE_DELAY: Term(paths, delay, (kind.settings,)),

@@ -18,7 +18,7 @@ from ppafo.model.shut_off import SHUT_OFF
 from ppafo.simulation.declaration import THERMAL, line_paths
 from ppafo.simulation.motion_kind import Clock, MotionKind
 from ppafo.simulation.scenario import Scenario
-from ppafo.walking.bottle import BottleSupply
+from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.declaration import (
     FAULTS,
     FAULTY,
@@ -87,8 +87,11 @@ def person_remarks(scenario: Scenario) -> list[str]:
 
 
 SHORTEST_STRIDES = 5
+"""Strides of a walk at least: two of them are the controller's to learn in."""
 SHORTEST_TASK_SEQUENCE = 1.0
+"""Time of a walk on a task sequence at least [s]."""
 LONGEST_MINUTES = 60.0
+"""Minutes of a walk at most."""
 
 PLACES: Mapping[str, tuple[str, ...]] = {
     **{f"wearer.{quantity.name}": ("motion", "wearer", quantity.name) for quantity in WEARER},

@@ -39,6 +39,7 @@ LEVEL_FRACTION = 0.5
 gait file has one deviation for each curve."""
 
 _AT_ONCE = 1000
+"""People whose events are found together, so that memory stays small."""
 
 THRESHOLD_VARIATION = 0.15
 """Standard deviation of thresholds over their values: how a fitter sets them, and how a sensor sits. Assumed."""

@@ -16,7 +16,7 @@ from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
-from ppafo.model.catalog import ACTUATORS, VALVES
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import GaitNow, gait_at
@@ -25,10 +25,8 @@ from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.plant_faults import SOUND, PlantFaults
 from ppafo.model.sensors import GaitSensors
 from ppafo.model.shut_off import NOT_FITTED, ShutOff
-from ppafo.model.valves import vent_valve
-from ppafo.model.valves.kind import ValveModel
-from ppafo.parameters.device import Device, Valve
-from ppafo.parameters.plant import first_settings, plant_parameters
+from ppafo.parameters.device import Device
+from ppafo.parameters.plant import plant_parameters, venting_valve
 from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
@@ -115,7 +113,7 @@ def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors)
     is_outside = scenario.controller.is_outside
     return Components(
         device=device,
-        valve=walking_valve(device.valve),
+        valve=venting_valve(device.valve),
         controller=None if is_outside else law_of(scenario),
         settings={} if is_outside else scenario.controller.settings,
         reference=NO_REFERENCE,
@@ -275,10 +273,3 @@ def planned_task_sequence(sequence: TaskSequence, gait: Gait, number: Any = 0.0)
     """A task sequence in time, walked by the person with a number; ScenarioError for what the gait does not allow."""
     person = person_of(gait, number)
     return plan_task_sequence(sequence, gait, person.timing.frequency, person.timing, person.strike_angle)
-
-
-def walking_valve(valve: Valve) -> ValveModel:
-    """The valve of a walking device; a proportional one has a vent valve for free motion."""
-    # Which valve it is must be one for all runs of an ensemble, so the first decides.
-    settings = first_settings(valve)
-    return vent_valve.choose(settings) if valve.kind == "proportional" else VALVES[valve.kind].choose(settings)

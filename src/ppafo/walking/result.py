@@ -26,7 +26,7 @@ from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
-from ppafo.walking.bottle import UNITS, SupplyCourse
+from ppafo.walking.bottle.course import UNITS, SupplyCourse
 from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events

@@ -27,7 +27,8 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
-from ppafo.walking.bottle import WALKED, BottleLife, Schedule, life_on_bottle, run_on_bottle
+from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, run_on_bottle
+from ppafo.walking.bottle.course import WALKED
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
 from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
@@ -246,6 +247,7 @@ def healthy_metrics(configuration: Scenario) -> dict[str, Metric]:
 
 
 MAXIMUM_WEARERS = 1_000_000
+"""Wearers of a population at most."""
 
 STEPS_AT_ONCE = 1.0e8
 """Steps of all wearers of one group together, a few seconds."""

@@ -14,7 +14,8 @@ from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError
 from ppafo.parameters import load_parameter_set
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_csv, read_netcdf, read_recording, read_result
+from ppafo.storage import read_csv, read_recording, read_result
+from ppafo.storage.netcdf_reading import read_netcdf
 from ppafo.storage.result_folder import read_json
 
 KIND = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", ScenarioError)

@@ -19,7 +19,7 @@ from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.report.style import PAGE_COLOURS
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
-from ppafo.walking.bottle import Schedule
+from ppafo.walking.bottle.coupling import Schedule
 from scripts.live_page import missing, opened
 from scripts.page_tables import FLOWS
 

@@ -11,7 +11,7 @@ from ppafo.errors import ParameterError
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.joint import ANKLE, Joint
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
-from ppafo.report.recording_figure import draw_stored_result
+from ppafo.report.stored_figure import draw_stored_result
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import read_result

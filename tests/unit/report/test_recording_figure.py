@@ -10,7 +10,8 @@ import pytest
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.report.display_units import metrics_lines
-from ppafo.report.recording_figure import draw_stored_result, figure_files, recording_figure
+from ppafo.report.recording_figure import figure_files, recording_figure
+from ppafo.report.stored_figure import draw_stored_result
 from ppafo.report.style import house_style, render_figure
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.storage import StoredResult

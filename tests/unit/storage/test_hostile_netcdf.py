@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage import read_netcdf, read_recording, trial_reading
+from ppafo.storage import read_recording, trial_reading
+from ppafo.storage.netcdf_reading import read_netcdf
 
 SECRET = np.arange(3.0)
 

@@ -9,8 +9,9 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording, RecordingKind
-from ppafo.storage import dataset_of, read_netcdf, write_netcdf
+from ppafo.storage import dataset_of, write_netcdf
 from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.storage.netcdf_reading import read_netcdf
 
 
 def recording() -> Recording:

@@ -11,7 +11,7 @@ import pytest
 import ppafo
 from ppafo.analyses.find import solve as find_module
 from ppafo.analyses.sweep import statistic as statistic_module
-from ppafo.analyses.sweep.statistic import Statistic, parse_statistic
+from ppafo.analyses.sweep.statistic_kind import Statistic, parse_statistic
 from ppafo.errors import StudyError
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.loading import load_scenario

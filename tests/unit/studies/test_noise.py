@@ -10,7 +10,9 @@ import pytest
 
 import ppafo
 from ppafo.analyses.compare.question import compare
-from ppafo.analyses.sweep.statistic import Statistic, StoppingRule, draw_until, mean_of, quantile_of
+from ppafo.analyses.sweep.statistic import draw_until
+from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, quantile_of
+from ppafo.analyses.sweep.stopping import StoppingRule
 from ppafo.errors import StudyError
 from ppafo.report.kind import Interval
 from ppafo.studies.distributions import Floats, NormalAround, noise_interval

@@ -12,8 +12,9 @@ from ppafo.engine.rows import row_numbers
 from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters.bottles.bottle import FILE as BOTTLES
 from ppafo.parameters.overrides import over
-from ppafo.walking import bottle, load_walk, walk, walk_population
-from ppafo.walking.bottle import Schedule
+from ppafo.walking import load_walk, walk, walk_population
+from ppafo.walking.bottle import coupling
+from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import plan_walk
 from ppafo.walking.result import WalkResult
@@ -155,9 +156,9 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     chosen = load_walk(WALK, bottle=BOTTLE)
     run = plan_walk(with_duration(chosen, 12.0))
     rows = row_numbers(run.program.state_rows())
-    monkeypatch.setattr(bottle, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
+    monkeypatch.setattr(coupling, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
     assert walk_of(chosen).bottle is not None
-    _, course = bottle.run_on_bottle(run, chosen.device, walk_of(chosen).bottle, 1.1, lambda *_: None)
+    _, course = coupling.run_on_bottle(run, chosen.device, walk_of(chosen).bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"
     assert "diverged, and 255 g were left" in course.ending.message
     assert course.ending.time == pytest.approx(min(0.25, 0.1 * (good + 1)) if "failure" in wrong else 0.1 * (good + 1))

@@ -98,11 +98,10 @@ def compared(
     Without a study the noise of the sensors alone is drawn, where there is any. StudyError where too many runs fail,
     and for a study that draws a value in which the configurations differ.
     """
-    scenarios = {
-        (task, configuration.name): with_overrides(configuration.scenario, texts)
-        for task, texts in overrides.items()
-        for configuration in configurations
-    }
+    scenarios: dict[tuple[str, str], Scenario] = {}
+    for task, texts in overrides.items():
+        for configuration in configurations:
+            scenarios[task, configuration.name] = with_overrides(configuration.scenario, texts)
     metrics = compared_metrics(scenarios.values())
     distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
     uncertainty = distributions.with_noise_of(scenarios.values())
@@ -236,16 +235,10 @@ def _best(cases: Sequence[Case], metrics: Sequence[str], confidence: float) -> d
     rows = [case.rows for case in judged if case.rows is not None]
     if not rows:
         return {}
-    names = [case.configuration for case in judged]
-    # All at once: no pair says which of three is the best.
-    return {
-        metric: dict(
-            zip(
-                names,
-                best_probabilities([row[metric] for row in rows], COMPARED[metric], confidence),
-                strict=True,
-            )
-        )
-        for metric in metrics
-        if COMPARED[metric]
-    }
+    best: dict[str, dict[str, Interval]] = {}
+    for metric in metrics:
+        if COMPARED[metric]:
+            # All at once: no pair says which of three is the best. No shares where no draw has a value of all.
+            shares = best_probabilities([row[metric] for row in rows], COMPARED[metric], confidence)
+            best[metric] = dict(zip([case.configuration for case in judged], shares, strict=False))
+    return best

@@ -20,7 +20,8 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units import format_quantity
 from ppafo.units.shown import in_units, pressure_units
 from ppafo.version import __version__
-from ppafo.walking.bottle import Schedule, minutes_text, strides_text
+from ppafo.walking.bottle.coupling import Schedule
+from ppafo.walking.bottle.course import minutes_text, strides_text
 
 _MASS, _FLOW = Kind("Left in the bottle", "kg", "gas mass", ".3g"), Kind("", "kg/s", "mass flow", ".3g")
 _DURATION, _PRESSURE = Kind("Time", "s", "duration"), Kind("Pressure in the bottle", "Pa_a", "pressure", ".3g")

@@ -26,7 +26,8 @@ from ppafo.model.source import (
 from ppafo.parameters.bottles.bottle import Bottle
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
-from ppafo.walking.bottle import WALKED, BottleLife, Schedule, SupplyBalance, SupplyCourse
+from ppafo.walking.bottle.coupling import BottleLife, Schedule
+from ppafo.walking.bottle.course import WALKED, SupplyBalance, SupplyCourse
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
@@ -102,8 +103,11 @@ def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stop
 
 
 MAXIMUM_STRETCHES = 2000
+"""Walks and rests of a schedule at most: each is a solution of its own."""
 SAMPLES = 1001
+"""Samples of a course."""
 _RELATIVE, _ABSOLUTE = 1e-7, (1e-10, 1e-4, 1e-6, 1e-10, 1e-4, 1e-4)
+"""Tolerances of the solver: relative [-], and absolute ones of each part of the state, in its SI unit."""
 _ABOVE_FREEZING = 0.02
 """Kelvin above the cold end of the table at which a run stops, so that the end is approached and not sat on."""
 

@@ -68,11 +68,11 @@ def bottle(
     from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
-    from ppafo.report.recording_figure import stated_units
+    from ppafo.report.stored_figure import stated_units
     from ppafo.signals import Recording
     from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
     from ppafo.walking import WalkResult
-    from ppafo.walking.bottle import Schedule
+    from ppafo.walking.bottle.coupling import Schedule
 
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(given) == (gas_per_stride is not None):

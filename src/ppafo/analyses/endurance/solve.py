@@ -12,14 +12,17 @@ from ppafo.errors import DataError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle
 from ppafo.report.kind import Kind
 from ppafo.walking import WalkResult
-from ppafo.walking.bottle import Schedule
+from ppafo.walking.bottle.coupling import Schedule
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import bottle_life
 
 BETWEEN_RESTS = 600.0
+"""Time of walking between two rests [s], unless it is given."""
 STRIDE_TIME = 1.1
+"""Time of one stride [s], unless it is given."""
 LONGEST = 24.0 * 3600.0
+"""Time that is simulated at most [s], unless it is given: a day."""
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,10 @@ from ppafo.studies.varying import VariedPath, varied_path
 from ppafo.study.runs import Runs, Tally, oscillating, settled, with_companions
 from ppafo.units import split_quantity
 
-DEFAULT_GRID, FEWEST, MOST = 64, 3, 100_000
+DEFAULT_GRID = 64
+"""Values that are tried first, unless another number is given."""
+FEWEST, MOST = 3, 100_000
+"""Values that may be tried first, from both ends with one between."""
 _PARTS = 32
 """Parts into which a bracket is divided: that many runs side by side take little longer than one."""
 _STREAMS = 16
@@ -24,6 +28,7 @@ _STREAMS = 16
 ACCURACY = 1.0e-6
 """Width of the last bracket, as a fraction of the range."""
 _SEED = 1
+"""Seed of these streams."""
 _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
@@ -68,8 +73,16 @@ class Search:
         return float(values[met[0]]), float(values[met[0] - 1]) if met[0] else None
 
 
-def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
-    """Return path, low and high end [SI] of a text ``PATH=LOW..HIGH``; StudyError for any other text."""
+class SearchedRange(NamedTuple):
+    """The path that is varied, and the low and the high end [SI] between which it is."""
+
+    path: VariedPath
+    low: float
+    high: float
+
+
+def range_of(text: str, base: Scenario) -> SearchedRange:
+    """Return the range of a text ``PATH=LOW..HIGH`` for a scenario; StudyError for any other text."""
     parts = _RANGE.fullmatch(text)
     if parts is None:
         raise StudyError(
@@ -83,7 +96,7 @@ def range_of(text: str, base: Scenario) -> tuple[VariedPath, float, float]:
         low, high = path.level(lower), path.level(parts[3])
     if not low < high:
         raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
-    return path, low, high
+    return SearchedRange(path, low, high)
 
 
 def condition_of(text: str, base: Scenario, path: str) -> Limit:
@@ -157,36 +170,32 @@ def outermost(
     threads: int | None = None,
     progress: Report | None = None,
 ) -> Outcome:
-    """Return the search for the outermost value; StudyError for bad input, and where no run has the metric."""
-    path, low, high = range_of(vary, base)
-    condition = condition_of(such_that, base, path.path)
+    """Return the search for the outermost value; StudyError for bad input, and where no run has the metric.
+
+    ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; ``grid`` values
+    are tried first, the highest that meets the condition is sought, or else the lowest.
+    """
+    searched = range_of(vary, base)
+    condition = condition_of(such_that, base, searched.path.path)
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
-    seeds = seeds_of_noise([base], [path.path], 0, _STREAMS, _SEED)
+    seeds = seeds_of_noise([base], [searched.path.path], 0, _STREAMS, _SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
-    search = Search(base, path.path, condition, runs, seeds)
-    search.run(np.linspace(low, high, grid))
-    if not np.isfinite(search.metrics).any():
-        if search.oscillating:
-            raise StudyError(
-                f"scenario '{base.name}': in every run from {path.quote(low)} to {path.quote(high)} the loop "
-                "oscillates: leave its gains out, so that they follow the device"
-            )
-        raise StudyError(
-            f"scenario '{base.name}': no run from {path.quote(low)} to {path.quote(high)} has a "
-            f"'{condition.metric}'{runs.reason and '; the first: '}{runs.reason}"
-        )
+    search = Search(base, searched.path.path, condition, runs, seeds)
+    search.run(np.linspace(searched.low, searched.high, grid))
+    _check_has_metric(search, base, searched)
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
     value, beyond = search.ends(highest)
-    while value is not None and beyond is not None and abs(value - beyond) > ACCURACY * (high - low):
+    width = ACCURACY * (searched.high - searched.low)
+    while value is not None and beyond is not None and abs(value - beyond) > width:
         search.run(np.linspace(value, beyond, _PARTS + 1)[1:-1])
         value, beyond = search.ends(highest)
     order = np.argsort(search.values)
     return Outcome(
         scenario=base.name,
-        path=path,
+        path=searched.path,
         condition=condition,
         highest=highest,
         values=search.values[order],
@@ -202,3 +211,17 @@ def outermost(
         unsettled=search.unsettled,
         oscillating=search.oscillating,
     )
+
+
+def _check_has_metric(search: Search, base: Scenario, searched: SearchedRange) -> None:
+    """Refuse a search in which no run has the metric of the condition."""
+    if np.isfinite(search.metrics).any():
+        return
+    ends = f"from {searched.path.quote(searched.low)} to {searched.path.quote(searched.high)}"
+    if search.oscillating:
+        raise StudyError(
+            f"scenario '{base.name}': in every run {ends} the loop oscillates: leave its gains out, so that they "
+            "follow the device"
+        )
+    reason = f"; the first: {search.runs.reason}" if search.runs.reason else ""
+    raise StudyError(f"scenario '{base.name}': no run {ends} has a '{search.condition.metric}'{reason}")

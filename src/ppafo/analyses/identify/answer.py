@@ -122,9 +122,12 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
     return panels
 
 
-_FAR, _SHOWN = 2.0, 0.05
-"""Standard deviations from which a tolerance is said to be contradicted; least share of a variance that is shown."""
+_FAR = 2.0
+"""Standard deviations from which a tolerance is said to be contradicted."""
+_SHOWN = 0.05
+"""Least share of a variance that is shown."""
 _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
+"""Digits of a value: more than the least only where its interval is narrow."""
 
 
 @in_units(lambda identification: identification.before.shown)
@@ -165,10 +168,12 @@ def finding_of(identification: Identification) -> Finding[Identification]:
 
 
 def _toml_bytes(parameter_set: ParameterSet) -> bytes:
+    """Return the file of a parameter set."""
     return parameter_set_toml(parameter_set).encode()
 
 
 def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Part:
+    """Return a row for each estimate, in the units of the set before, and remarks below them."""
     rows = (estimate_row(estimate, before) for estimate in estimates)
     return Part(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
 
@@ -193,6 +198,7 @@ def _far_from(before: ParameterSet, estimates: Iterable[Estimate]) -> Iterator[s
 
 
 def _conflict(sentence: str) -> tuple[str, ...]:
+    """Return what a sentence on a conflict means for the numbers; nothing without one."""
     return (f"holds for this model only: {sentence}",) if sentence else ()
 
 
@@ -230,24 +236,32 @@ def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
     shown = sorted(
         (number for number in known if number.share >= _SHOWN or is_far[number.name]), key=lambda number: -number.share
     )
-    rows = []
-    for one in shown:
-        quantity = one.name.partition(" of ")[0]
-        numbers = (one.before, one.before_error, one.after, one.after_error)
-        (start, unit), (error, _), (after, _), (after_error, _) = (
-            _shown(number, quantity, one.unit, before) for number in numbers
-        )
-        zero, _ = _shown(0.0, quantity, one.unit, before)
-        stated, fitted = with_error(start, error - zero), with_error(after, after_error - zero)
-        text = f"tolerance: {one.name}: stated {stated} {unit}".rstrip(" -") + f", fitted {fitted} {unit}".rstrip(" -")
-        rows.append(
-            f"{text}; {percentage(one.share, 2)} of the variance of {one.widens}" if one.share >= _SHOWN else text
-        )
+    rows = [_tolerance_text(tolerance, before) for tolerance in shown]
     rest = len(known) - len(shown)
     if rest:
         do = "does" if rest == 1 else "do"
         rows.append(f"{count_of(rest, 'other tolerance')} {do} not affect the intervals")
     return rows
+
+
+def _tolerance_text(tolerance: Known, before: ParameterSet) -> str:
+    """Return a tolerance as stated and as fitted, each with its error, and what it contributes to an interval."""
+    quantity, unit = tolerance.name.partition(" of ")[0], tolerance.unit
+
+    def with_its_error(value: float, error: float) -> str:
+        """Return a value and its error [SI] as text with the unit in which they are shown."""
+        # A unit with an offset, such as degC, has none in a difference.
+        (level, shown_unit), (upper, _), (zero, _) = (
+            _shown(number, quantity, unit, before) for number in (value, error, 0.0)
+        )
+        return f"{with_error(level, upper - zero)} {shown_unit}".rstrip(" -")
+
+    stated = with_its_error(tolerance.before, tolerance.before_error)
+    fitted = with_its_error(tolerance.after, tolerance.after_error)
+    text = f"tolerance: {tolerance.name}: stated {stated}, fitted {fitted}"
+    if tolerance.share < _SHOWN:
+        return text
+    return f"{text}; {percentage(tolerance.share, 2)} of the variance of {tolerance.widens}"
 
 
 def _shown(number: float, path: str, unit: str, before: ParameterSet) -> tuple[float, str]:

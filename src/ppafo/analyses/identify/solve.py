@@ -22,14 +22,8 @@ from ppafo.identification.trajectory.section import Setting as FitSetting
 from ppafo.identification.trajectory.section import solve_section
 from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import list_sets, load_parameter_set
-from ppafo.parameters.overrides import check_valve, read_overrides
-from ppafo.parameters.parameter_set import (
-    ParameterSet,
-    atmospheric_pressure,
-    chosen_valve,
-    number_in_si,
-    with_overrides,
-)
+from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import read_recording

@@ -22,7 +22,7 @@ from ppafo.model.ports import friction_at_rest
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
 from ppafo.simulation.sampled import run_sampled
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import Scenario
 
 STEADY = 1.0e-9
 """Largest rate of a state [1/s], over the size of the state, that counts as none."""
@@ -130,7 +130,7 @@ def equilibrium(scenario: Scenario) -> Point:
             at = run.plant, most["angle"], most["pressure_1"], most["pressure_2"]
             torque = run.program.actuator.torque(*at)
             line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
-        other = " or hold the ankle" if isinstance(scenario.motion, FreeMotion) else ""
+        other = " or hold the ankle" if held is not None else ""
         raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")
     way = _way(run, steady, scenario.run.duration)
     if way:

@@ -10,7 +10,7 @@ from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial, PrescribedMotion
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial
 
 DURATION, INTERVAL = 1.0, 1.0e-3
 """Length of the run after a step of the command, and the time between two of its samples [s]."""
@@ -48,8 +48,7 @@ def can_step(model: LinearModel) -> bool:
 
     The command is one that the largest step, 0.3 of it, still leaves below full opening.
     """
-    motion = model.scenario.motion
-    is_locked = isinstance(motion, PrescribedMotion) and motion.profile.kind == "constant"
+    is_locked = model.scenario.motion.locked_angle is not None
     has_gas_alone = all(variable.name.startswith("pressure") for variable in model.states)
     if not (model.is_steady and is_locked and has_gas_alone):
         return False

@@ -11,9 +11,9 @@ from ppafo.errors import DataError, SimulationError
 from ppafo.identification.bench import BenchResult, free_decay, static_torque
 from ppafo.identification.source import Source
 from ppafo.parameters import load_device, load_parameter_set
-from ppafo.parameters.overrides import read_overrides
+from ppafo.parameters.overrides import read_overrides, with_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
-from ppafo.parameters.parameter_set import number_text, with_followers, with_overrides
+from ppafo.parameters.parameter_set import number_text, with_followers
 from ppafo.rig import record
 from ppafo.signals import Recording
 from ppafo.simulation.declaration import quantities

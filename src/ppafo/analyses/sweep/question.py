@@ -11,7 +11,7 @@ from ppafo.progress import Report
 
 if TYPE_CHECKING:
     from ppafo.analyses.sweep.results import StudyResults
-    from ppafo.analyses.sweep.statistic import Estimate
+    from ppafo.analyses.sweep.stopping import Estimate
     from ppafo.report.finding import Finding
     from ppafo.studies.study import Study
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.errors import DataError, StudyError, nearest_name
+from ppafo.report.kind import Kind, of_stored_metric
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.storage.places import Place
@@ -143,3 +144,8 @@ class StudyResults:
     def json_document(self) -> dict[str, Any]:
         """Return the summary, and where the rows are."""
         return {**self.summary, "folder": self.place.address}
+
+
+def metric_kind(results: StudyResults, metric: str) -> Kind:
+    """Return what a metric of a study is, from the unit that its folder has, as which it need not be there any more."""
+    return of_stored_metric(metric, results.document["metrics"][metric]["unit"])

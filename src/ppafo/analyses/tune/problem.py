@@ -34,6 +34,7 @@ from ppafo.studies.varying import VariedPath, in_its_unit, value_at, varied_path
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
+"""Draws over which each candidate may run at most."""
 _Value = Annotated[str | float | int, Field(description="text with unit; a plain number if there is no unit")]
 _Metric = Annotated[Text, Field(description="name of a metric, such as 'rms_error'")]
 

@@ -17,7 +17,6 @@ from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import TORQUE
-from ppafo.parameters.device import VANE
 from ppafo.report.kind import Interval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
@@ -70,7 +69,7 @@ def shortfall(scenario: Scenario) -> Floats:
     With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
     difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
     """
-    if scenario.device.actuator.kind != VANE or scenario.controlled != TORQUE:
+    if not scenario.device.has_torque_constant or scenario.controlled != TORQUE:
         return np.zeros(1)
     supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
     lowest, highest = profile_bounds(scenario.reference)
@@ -173,6 +172,7 @@ def have_come_together(costs: Floats) -> bool:
 MINIMUM_ERRORS = ("peak_error", "rms_error_hold")
 """Metrics that are never below what the supply lacks of the largest reference."""
 _NOISE_CONFIDENCE = 0.95
+"""Confidence of the interval of the share of sensor noise."""
 
 
 def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:

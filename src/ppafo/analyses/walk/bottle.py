@@ -9,7 +9,7 @@ import numpy as np
 from ppafo.report.finding import Part, facts
 from ppafo.report.kind import Kind
 from ppafo.storage.comma_separated import marked_csv_bytes
-from ppafo.walking.bottle import SupplyCourse, lasted, minutes_text, strides_text
+from ppafo.walking.bottle.course import SupplyCourse, lasted, minutes_text, strides_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult

@@ -8,8 +8,7 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil import wire
 from ppafo.model.controlled import TORQUE
-from ppafo.model.valves import vent_valve
-from ppafo.parameters.plant import valve_settings
+from ppafo.parameters.plant import venting_valve
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
 
@@ -31,6 +30,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
+    check_forces(scenario)
     if scenario.controlled != TORQUE:
         raise ScenarioError(
             f"{scenario.name}: reference.of = '{scenario.controlled}': a controller at the wire is sent a torque; "
@@ -44,11 +44,18 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
         controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)
-    valve = chosen.device.valve
-    if valve.kind == "proportional":
-        run = replace(run, program=replace(run.program, valve=vent_valve.choose(valve_settings(valve))))
+    # A controller at the wire may vent both chambers.
+    run = replace(run, program=replace(run.program, valve=venting_valve(chosen.device.valve)))
     module = load_program(batch_of(run).program)
     return Plant(chosen, run, module, backend_described(), period)
+
+
+def check_forces(scenario: Scenario) -> None:
+    """Refuse a scenario whose controller reads what the wire does not carry."""
+    if scenario.motion.motion_kind.reads_forces:
+        raise ScenarioError(
+            f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
+        )
 
 
 def check_baud(baud: int, rate: int) -> None:

@@ -192,6 +192,7 @@ def _is_own(contact: Contact, plate: Signal, shank: Signal) -> bool:
 
 
 _RATE = 200.0
+"""Samples a second at which two ends of a cycle are compared."""
 _SHORTEST = 0.5
 """Seconds of a stride."""
 

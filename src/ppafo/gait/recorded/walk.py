@@ -38,7 +38,9 @@ from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
 
 _MINIMUM_SAMPLES = 20
+"""Samples without which a low pass has no inside."""
 _ORDER = 2
+"""Order of the Butterworth low pass, which is passed twice."""
 _DOUBLE_PASS = (2.0**0.5 - 1.0) ** 0.25
 """A filter passed twice has its -3 dB lower by this; so it is designed higher (Winter, Biomechanics, section 2.4)."""
 
@@ -104,6 +106,7 @@ LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are not measured off a force plate, which is no gap."""
 
 _LONGEST_SHOWN = 12
+"""Names of columns that a message shows."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

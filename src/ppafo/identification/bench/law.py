@@ -63,16 +63,16 @@ class Readings:
 
 def recordings_of(sources: tuple[Source, ...], counts: Iterable[int] = ()) -> list[str]:
     """Return what a recording is called, with its file, for each of its readings, of which there are ``counts``."""
-    sizes = tuple(counts) or [len(one.recording) for one in sources]
+    sizes = tuple(counts) or [len(source.recording) for source in sources]
     pairs = enumerate(zip(sources, sizes, strict=True), start=1)
-    return [label for number, (one, size) in pairs for label in [f"recording {number} ({one.name})"] * size]
+    return [label for number, (source, size) in pairs for label in [f"recording {number} ({source.name})"] * size]
 
 
 def solve(
     law: Callable[[Values], Floats], readings: Readings, numbers: Sequence[Free], confidence: float
 ) -> tuple[Fit, Floats]:
     """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured."""
-    names, measured = [one.name for one in numbers], readings.measured
+    names, measured = [number.name for number in numbers], readings.measured
     keys = list(zip(readings.recordings, readings.sensors, *readings.groups, strict=True))
     # In the order of their first reading, so that the first block is the first recording.
     ranks = {key: rank for rank, key in enumerate(dict.fromkeys(keys))}
@@ -95,7 +95,7 @@ def solve(
     def residuals(points: Floats) -> Floats:
         return np.stack([(measured - law(at(point)))[order] for point in points.T], axis=1)
 
-    found = fit(
+    fitted = fit(
         residuals, numbers, blocks, confidence, memory=min(_MEMORY, int(counts.min()) // SAMPLES_PER_COEFFICIENT)
     )
-    return found, law(at(found.values))
+    return fitted, law(at(fitted.values))

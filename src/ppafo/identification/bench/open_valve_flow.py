@@ -32,8 +32,11 @@ from ppafo.signals.recording import Floats
 PROCEDURE = "open-valve-flow"
 CHANNELS = ("upstream_pressure", "downstream_pressure", "mass_flow")
 MINIMUM_SAMPLES = 5
+"""Readings at the open valve without which nothing tells the numbers apart."""
 _FULLY_OPEN = 0.99
+"""Size of the command [-] from which a valve is fully open."""
 _NEARLY_EQUAL = 0.9
+"""Ratio of the pressures [-] above which they are nearly equal."""
 _LEVELS = "choked flow", "subsonic flow", "flow at nearly equal pressures"
 """What a reading is, by its pressure ratio."""
 _SPAN, _SUBSONIC = 0.15, 0.6

@@ -55,12 +55,13 @@ class Reported:
 
 
 _AT_BOUND = 1.0e-6
+"""Distance to a bound, over the scale of a number, up to which it has ended there."""
 
 
 def result_of(
     procedure: str,
     sources: tuple[Source, ...],
-    found: Fit,
+    fitted: Fit,
     reported: Sequence[Reported],
     summary: str,
     panels: tuple[Panel, ...],
@@ -71,32 +72,41 @@ def result_of(
 
     ``remedy`` is what to do where some readings want other numbers than all together.
     """
-    estimates = []
-    for item in reported:
-        place = [*found.by_name].index(item.path)
-        value, low, high = (float(one[place]) for one in (found.values, found.low, found.high))
-        number = found.numbers[place]
-        size, half = abs(value) if item.size is None else item.size, 0.5 * (high - low)
-        bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
-        # Not 1e-17 where 0 is meant.
-        value = value if bound is None else bound
-        verdict: Verdict = "identified"
-        sentence = f"{item.text}; {widened_by(found, item.path)}."
-        if bound == 0.0 and item.size is not None and half < size:
-            sentence = f"{item.text}: none; {widened_by(found, item.path)}."
-            verdict = "identified" if found.conflict is None else "holds for this model only"
-        elif bound is not None:
-            verdict = "at its bound"
-            sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
-        # Then zero, or twice the value, is inside the interval as well.
-        elif half >= size:
-            verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."
-        elif found.conflict is not None:
-            verdict = "holds for this model only"
-        origin = tuple(source.trace for source in sources)
-        estimates.append(Estimate(item.path, value, item.unit, low, high, verdict, sentence, origin, found.confidence))
-    kind, told = kind_of(one.recording.kind for one in sources), (*remarks, *told_of_readings(sources))
-    return BenchResult(procedure, summary, tuple(estimates), panels, kind, conflict_in_words(found, remedy), told)
+    origin = tuple(source.trace for source in sources)
+    return BenchResult(
+        procedure=procedure,
+        summary=summary,
+        estimates=tuple(_estimate(fitted, number, origin) for number in reported),
+        panels=panels,
+        kind=kind_of(source.recording.kind for source in sources),
+        conflict=conflict_in_words(fitted, remedy),
+        remarks=(*remarks, *told_of_readings(sources)),
+    )
+
+
+def _estimate(fitted: Fit, reported: Reported, origin: tuple[str, ...]) -> Estimate:
+    """Return a number of a fit with its verdict and sentence; ``origin`` are the recordings that it comes from."""
+    index = [*fitted.by_name].index(reported.path)
+    value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))
+    number = fitted.numbers[index]
+    size, half_width = abs(value) if reported.size is None else reported.size, 0.5 * (high - low)
+    bound = next((end for end in (number.low, number.high) if abs(value - end) <= _AT_BOUND * number.scale), None)
+    # Not 1e-17 where 0 is meant.
+    value = value if bound is None else bound
+    verdict: Verdict = "identified"
+    sentence = f"{reported.text}; {widened_by(fitted, reported.path)}."
+    if bound == 0.0 and reported.size is not None and half_width < size:
+        sentence = f"{reported.text}: none; {widened_by(fitted, reported.path)}."
+        verdict = "identified" if fitted.conflict is None else "holds for this model only"
+    elif bound is not None:
+        verdict = "at its bound"
+        sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
+    # Then zero, or twice the value, is inside the interval as well.
+    elif half_width >= size:
+        verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."
+    elif fitted.conflict is not None:
+        verdict = "holds for this model only"
+    return Estimate(reported.path, value, reported.unit, low, high, verdict, sentence, origin, fitted.confidence)
 
 
 _SIZE = (4.1, 3.3)

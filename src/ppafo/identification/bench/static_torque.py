@@ -43,6 +43,7 @@ PROCEDURE = "static-torque"
 _TORQUE, _FORCE = "torque", "force"
 _MOVING = ("position", "angle")
 MINIMUM_SAMPLES = 6
+"""Readings without which slope, friction, its growth and the zero are not told apart."""
 _MINIMUM_LEVELS = 3
 """Different pressures without which nothing shows whether the torque is a straight line over them."""
 _MORE_THAN_FRICTION = 0.3

@@ -30,6 +30,7 @@ PROCEDURE = "valve-map"
 CHANNELS = ("command", "mass_flow", "upstream_pressure", "downstream_pressure")
 PRESSURES = ("upstream_pressure", "downstream_pressure")
 MINIMUM_SAMPLES = 12
+"""Readings without which the numbers of a map are not told apart."""
 _MINIMUM_RANGE = 0.5
 """Range of the command [-] without which dead band and gain are not told apart."""
 _SHUT, _HALF_OPEN = 0.05, 0.5

@@ -13,7 +13,8 @@ fast D falls.
 """
 
 import math
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -204,6 +205,89 @@ def pressures_of_fall(
     return end + left, end
 
 
+@dataclass(frozen=True, slots=True)
+class Decay:
+    """The closed chambers of one recording, with the names of the numbers that are sought of it alone."""
+
+    chambers: ClosedChambers
+    number: int
+
+    @property
+    def sensors(self) -> tuple[str, str]:
+        """Channels of the fuller chamber and of the other."""
+        fuller = self.chambers.fuller
+        return f"pressure_{fuller}", f"pressure_{3 - fuller}"
+
+    @property
+    def fitted(self) -> list[tuple[str, Floats]]:
+        """The pressures [Pa] that are fitted, with their channels."""
+        return list(zip(self.sensors, self.chambers.fitted, strict=False))
+
+    @property
+    def difference(self) -> Floats:
+        """Pressure difference [Pa]."""
+        return self.chambers.first - self.chambers.second
+
+    def start_of(self, sensor: str) -> str:
+        """Name of the pressure of a chamber at the start [Pa]."""
+        return f"start of {sensor}, decay {self.number}"
+
+    def relaxation_of(self, sensor: str) -> str:
+        """Name of the share by which a pressure is off just after filling [-]."""
+        return f"relaxation of {sensor}, decay {self.number}"
+
+    def numbers(self) -> Iterator[Free]:
+        """Yield what is sought: pressures at the start, that of a room to its noise, and what is off just then."""
+        chambers = self.chambers
+        for sensor, values in zip(self.sensors, (chambers.first, chambers.second), strict=True):
+            size = max(abs(chambers.changes[0]), float(np.std(np.diff(values))), 1.0)
+            found = sought(self.start_of(sensor), float(values[:EDGE].mean()), 1.0, scale=size)
+            if chambers.is_a_room and sensor == self.sensors[1]:
+                found = replace(found, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
+            yield found
+        for sensor, _ in self.fitted:
+            yield from within(self.relaxation_of(sensor), _MOST_RELAXED)
+
+    def halves(self) -> list[str]:
+        """Return for each sample of a pressure whether the difference has fallen by less than half or by more."""
+        difference = self.difference
+        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
+        return ["the early fall"] * half + ["the late fall"] * (difference.size - half)
+
+
+@dataclass(frozen=True, slots=True)
+class DecayLaw:
+    """The pressures of all decays as one leak makes them, out of a chamber of a volume [m^3] or of 1 m^3."""
+
+    opening: Opening
+    paths: Paths
+    emptied: float
+    decays: tuple[Decay, ...]
+
+    @property
+    def longest(self) -> float:
+        """Time of the longest decay [s]."""
+        return max(float(decay.chambers.time[-1]) for decay in self.decays)
+
+    def __call__(self, at: Values) -> Floats:
+        """Return the fitted pressures [Pa], one after the other."""
+        gas = self.opening.gas
+        # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
+        warm = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
+        rate = warm * (1.0 + at[GAS_LAW]) / (self.emptied * (1.0 + at[_VOLUME]))
+        relaxed = self.longest / _RELAXED * math.exp(at[_RELAXATION])
+        return np.concatenate([part for decay in self.decays for part in self._pressures(decay, at, rate, relaxed)])
+
+    def _pressures(self, decay: Decay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
+        chambers = decay.chambers
+        first, second = (at[decay.start_of(sensor)] for sensor in decay.sensors)
+        ratio = 0.0 if chambers.is_a_room else at[_RATIO]
+        falls = pressures_of_fall(self.opening, self.paths.sizes(at), first, second, ratio, rate, chambers.time)
+        faded = np.exp(-chambers.time / relaxed)
+        for (sensor, _), pressure in zip(decay.fitted, falls, strict=False):
+            yield pressure * (1.0 + at[decay.relaxation_of(sensor)] * faded) + at[f"zero of {sensor}"]
+
+
 def _decaying_leak(
     sources: tuple[Source, ...],
     closed: tuple[ClosedChambers, ...],
@@ -214,97 +298,79 @@ def _decaying_leak(
     tolerances: Tolerances,
     confidence: float,
 ) -> BenchResult:
-    gas, fuller = opening.gas, closed[0].fuller
-    volumes = volumes if fuller == 1 else volumes[::-1]
-    if volumes[0] is None:
-        what = size.text.partition(" with")[0]
-        text = f"{what} over the volume of chamber {fuller}, which is not known"
-        is_area = size.unit == "m^2"
-        path = "vane_leak.area_over_volume" if is_area else f"vane_leak.{size.path.split('.')[-1]}_over_volume"
-        size = Reported(path, "1/m" if is_area else f"{size.unit[:-1]} m^3)", text)
-        opening = replace(opening, known=1.0)
-    emptied, constant = volumes[0] or 1.0, gas.specific_gas_constant
-    paths, reported, start, alone = _sought(size, volumes[0] is not None, closed, opening, emptied)
-    names = [f"pressure_{item}" for item in (fuller, 3 - fuller)]
-    longest = max(float(item.time[-1]) for item in closed)
-
-    def law(at: Values) -> Floats:
-        # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
-        warm = constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE])) * (1.0 + at[GAS_LAW])
-        rate, parts = warm / (emptied * (1.0 + at[_VOLUME])), []
-        lasting = longest / _RELAXED * math.exp(at[_RELAXATION])
-        for number, item in enumerate(closed, start=1):
-            first, second = (at[f"start of {name}, decay {number}"] for name in names)
-            ratio = 0.0 if item.is_a_room else at[_RATIO]
-            falls = pressures_of_fall(opening, paths.sizes(at), first, second, ratio, rate, item.time)
-            faded = np.exp(-item.time / lasting)
-            for name, true, _ in zip(names, falls, item.fitted, strict=False):
-                parts.append(true * (1.0 + at[f"relaxation of {name}, decay {number}"] * faded) + at[f"zero of {name}"])
-        return np.concatenate(parts)
-
-    shut = [item.changes for item in closed if not item.is_a_room]
-    ratio: tuple[Free, ...] = ()
-    if shut and volumes[0] and volumes[1]:
-        # Two volumes, each known to the deviation.
-        known = volumes[0] / volumes[1]
-        ratio = tolerance(_RATIO, math.sqrt(2.0) * volume_deviation * known, known)
-    elif shut:
-        ratio = (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in shut])), 1.0e-3), 1.0e-6),)
+    fuller = closed[0].fuller
+    volume, other_volume = volumes if fuller == 1 else volumes[::-1]
+    if volume is None:
+        size, opening = _over_volume(size, fuller), replace(opening, known=1.0)
+    paths, reported, start, alone = _sought(size, volume is not None, closed, opening, volume or 1.0)
+    decays = tuple(Decay(chambers, number) for number, chambers in enumerate(closed, start=1))
+    law = DecayLaw(opening, paths, volume or 1.0, decays)
     numbers = (
         *paths.sought(start, alone),
-        *ratio,
-        *(one for number, item in enumerate(closed, start=1) for one in _of_decay(names, number, item)),
+        *_ratio(closed, volume, other_volume, volume_deviation),
+        *(number for decay in decays for number in decay.numbers()),
         # Of the logarithm of a time, for only its order of magnitude is known.
         Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
-        *gas_tolerances(gas, tolerances),
-        *tolerance(_VOLUME, volume_deviation if volumes[0] else 0.0),
-        *(one for name in names for one in within(f"zero of {name}", tolerances.zero_of_pressure)),
+        *gas_tolerances(opening.gas, tolerances),
+        *tolerance(_VOLUME, volume_deviation if volume else 0.0),
+        *(zero for sensor in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
     )
-    measured = np.concatenate([one for item in closed for one in item.fitted])
-    sensors, halves = list[str](), list[str]()
-    for item in closed:
-        difference = item.first - item.second
-        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
-        for name, values in zip(names, item.fitted, strict=False):
-            sensors += [name] * values.size
-            halves += ["the early fall"] * half + ["the late fall"] * (values.size - half)
-    labels = recordings_of(sources, [item.time.size * len(item.fitted) for item in closed])
-    found, model = solve(law, Readings(measured, sensors, labels, (halves,)), numbers, confidence)
-    times = [item.time for item in closed for _ in item.fitted]
+    readings = _readings(sources, decays)
+    found, model = solve(law, readings, numbers, confidence)
+    times = [decay.chambers.time for decay in decays for _ in decay.fitted]
     time, parts = np.concatenate(times), np.split(model, np.cumsum([one.size for one in times])[:-1])
-    marks = [readings_mark("measured", time, measured)]
-    for number, part in enumerate(zip(times, parts, strict=True)):
-        marks.append(curve_mark("" if number else opening.law, *part))
-    room = all(item.is_a_room for item in closed)
-    remark = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if room else ()
-    differences = [item.first - item.second for item in closed]
-    fall = max(1.0 - float(one[-EDGE:].mean() / one[:EDGE].mean()) for one in differences)
+    curves = zip(times, parts, strict=True)
+    marks = [
+        readings_mark("measured", time, readings.measured),
+        *(curve_mark("" if number else opening.law, *curve) for number, curve in enumerate(curves)),
+    ]
+    is_room = all(chambers.is_a_room for chambers in closed)
+    room = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if is_room else ()
+    ends = ((decay.difference[:EDGE].mean(), decay.difference[-EDGE:].mean()) for decay in decays)
+    fall = max(1.0 - float(last / first) for first, last in ends)
     return result_of(
         PROCEDURE,
         sources,
         found,
         reported,
-        f"{count_of(len(closed), 'decay')} of up to {longest:.3g} s; the pressure difference falls by {fall:.1%}",
-        with_residuals("Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, measured - model),
+        f"{count_of(len(closed), 'decay')} of up to {law.longest:.3g} s; the pressure difference falls by {fall:.1%}",
+        with_residuals(
+            "Closed chambers", TIME, Kind("Pressure", "Pa_a", "pressure"), marks, time, readings.measured - model
+        ),
         _REMEDY.format(NEXT_LAW[opening.law]),
-        remark,
+        room,
     )
 
 
-def _of_decay(names: list[str], number: int, item: ClosedChambers) -> list[Free]:
-    """Return the pressures [Pa] at the start of a decay, sought; of a room it is what was read, to its noise.
+def _over_volume(size: Reported, fuller: int) -> Reported:
+    """Return what is reported of a leak out of a chamber whose volume is not known."""
+    text = f"{size.text.partition(' with')[0]} over the volume of chamber {fuller}, which is not known"
+    if size.unit == "m^2":
+        return Reported("vane_leak.area_over_volume", "1/m", text)
+    return Reported(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
 
-    With them what each pressure that is fitted may be off at first [-].
-    """
-    found = []
-    for name, values in zip(names, (item.first, item.second), strict=True):
-        size = max(abs(item.changes[0]), float(np.std(np.diff(values))), 1.0)
-        found.append(sought(f"start of {name}, decay {number}", float(values[:EDGE].mean()), 1.0, scale=size))
-    if item.is_a_room:
-        found[1] = replace(found[1], start=float(item.second.mean()), deviation=max(float(item.second.std()), 1.0))
-    for name, _ in zip(names, item.fitted, strict=False):
-        found += within(f"relaxation of {name}, decay {number}", _MOST_RELAXED)
-    return found
+
+def _ratio(
+    closed: tuple[ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
+) -> tuple[Free, ...]:
+    """Return the ratio of the volumes [m^3], each known to the relative deviation or sought; none beside a room."""
+    changes = [chambers.changes for chambers in closed if not chambers.is_a_room]
+    if not changes:
+        return ()
+    if volume and other:
+        return tolerance(_RATIO, math.sqrt(2.0) * deviation * (volume / other), volume / other)
+    return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3), 1.0e-6),)
+
+
+def _readings(sources: tuple[Source, ...], decays: tuple[Decay, ...]) -> Readings:
+    """Return the fitted pressures with their sensors and recordings, early and late falls apart."""
+    series = [(sensor, values, decay) for decay in decays for sensor, values in decay.fitted]
+    return Readings(
+        np.concatenate([values for _, values, _ in series]),
+        [sensor for sensor, values, _ in series for _ in range(values.size)],
+        recordings_of(sources, [decay.difference.size * len(decay.fitted) for decay in decays]),
+        ([half for _, _, decay in series for half in decay.halves()],),
+    )
 
 
 def _sought(

@@ -9,8 +9,9 @@ import numpy as np
 from ppafo.errors import IdentificationError, refused_as
 from ppafo.identification.noise import Noise, whiten
 from ppafo.identification.residuals import Work
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS
 from ppafo.identification.trajectory.fitting import TrajectoryFit
-from ppafo.identification.trajectory.problem import FITTED_CHANNELS, reach_of
+from ppafo.identification.trajectory.numbers import reach_of
 from ppafo.identification.trajectory.runs import Measured, columns_in, numbers_in, prepare_samples, signals_at
 from ppafo.progress import report_nothing
 from ppafo.signals.recording import Floats

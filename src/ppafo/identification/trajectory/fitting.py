@@ -12,17 +12,9 @@ from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
 from ppafo.identification.residuals import Block
-from ppafo.identification.trajectory.problem import (
-    ZERO_OF,
-    Experiment,
-    Number,
-    TrajectoryProblem,
-    broken_rule,
-    full_path,
-    numbers_of,
-    reach_of,
-    with_numbers,
-)
+from ppafo.identification.trajectory.experiment import Experiment
+from ppafo.identification.trajectory.numbers import ZERO_OF, Number, broken_rule, full_path, reach_of, with_numbers
+from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
     Floats,
     Measured,

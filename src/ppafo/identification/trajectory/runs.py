@@ -24,15 +24,8 @@ from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
 from ppafo.identification.residuals import Block
-from ppafo.identification.trajectory.problem import (
-    GAIN_OF,
-    TIME_OFFSET,
-    ZERO_OF,
-    Experiment,
-    Number,
-    scenario_of,
-    with_numbers,
-)
+from ppafo.identification.trajectory.experiment import Experiment, scenario_of
+from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, Number, with_numbers
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
@@ -48,7 +41,9 @@ Indices = NDArray[np.intp]
 FIT_TOLERANCE = 0.02
 """Error that a run of a fit is allowed over any other run's; columns of differences keep to 1e-3 with it."""
 _FINER = 0.25
+"""Tolerance of the second run, by whose difference the error of the first is told."""
 _FITS = 1.0e-6
+"""Fraction of a record, and time [s], by which a sample may be off: rounding of a clock."""
 
 _ZERO_OF_ANGLE = math.radians(1.0)
 """Angle [rad] from a stop within which a sensor shows the stop."""

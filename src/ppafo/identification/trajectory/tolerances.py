@@ -5,23 +5,21 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.tolerances import Tolerances, deviation_of_limit
-from ppafo.identification.trajectory.problem import (
-    FITTED_CHANNELS,
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, Experiment, scenario_of
+from ppafo.identification.trajectory.numbers import (
     GAIN_OF,
     ZERO_OF,
-    Experiment,
     FreeParameter,
     declared_numbers,
     full_path,
     number_at,
-    scenario_of,
 )
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 _WIDEST = 12.0
 """Standard deviations of its prior that a tolerance may be off at most in the search."""
@@ -97,7 +95,7 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
     the logarithm of this velocity, so that is moved.
     """
     limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
-    moves = any(isinstance(one.scenario.motion, FreeMotion) and ANGLE not in one.inputs for one in experiments)
+    moves = any(vane_motion(one.scenario).profile is None and ANGLE not in one.inputs for one in experiments)
     friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
     if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
         yield FreeParameter(

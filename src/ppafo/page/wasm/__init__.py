@@ -94,8 +94,8 @@ from ppafo.exports.c_library.files import (
 from ppafo.parameters import ParameterSet, load_parameter_set
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
-from ppafo.parameters.overrides import one_path, read_overrides
-from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si, with_overrides
+from ppafo.parameters.overrides import one_path, read_overrides, with_overrides
+from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
 from ppafo.report.display_units import display_unit, quantity_of_unit
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
-from ppafo.parameters.device import VANE
 from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import limits, quantity_text
@@ -176,11 +176,13 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def _misshapen(scenario: Scenario) -> tuple[Problem, ...]:
-    """An actuator that is no vane, whose numbers do not fit together."""
+    """An actuator whose numbers do not fit together beyond what their limits say."""
     actuator = scenario.device.actuator
+    if ACTUATORS[actuator.kind].problem is None and actuator.table is None:
+        return ()
     stops = actuator.angle_min, actuator.angle_max, actuator.dead_volume_1, actuator.dead_volume_2
     varied: list[Any] = [value for value in (*stops, *actuator.settings.values()) if isinstance(value, np.ndarray)]
-    if actuator.kind == VANE or not varied:
+    if not varied:
         return ()
 
     def words(run: int) -> str:
@@ -208,8 +210,8 @@ def _beyond_the_table(scenario: Scenario) -> tuple[Problem, ...]:
 
 
 def _without_growth(scenario: Scenario) -> tuple[Problem, ...]:
-    """An actuator that is no vane, whose chamber 1 does not grow with the angle."""
-    return () if scenario.device.actuator.kind == VANE else (growth_and_problem(scenario.device)[1],)
+    """An actuator whose chamber 1 does not grow with the angle."""
+    return (growth_and_problem(scenario.device)[1],)
 
 
 def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]:

@@ -61,17 +61,15 @@ class Outcome:
 
     def run_all(self, batches: Sequence[tuple[Members, Batch]], threads: int | None) -> None:
         """Run batches one after the other, whose runs have these places in the ensemble."""
-        tasks = []
-        for members, batch in batches:
-            tasks.append((members, _meter_batch(batch, self.request)))
+        tasks = [_meter_batch(batch, members, self.request) for members, batch in batches]
         # Several programs are compiled side by side before the first batch runs.
-        load_programs(task.batch.program for _, task in tasks)
-        for members, task in tasks:
-            self._run(task, members, threads)
+        load_programs(task.batch.program for task in tasks)
+        for task in tasks:
+            self._run(task, threads)
 
-    def _run(self, task: "_MeteredBatch", members: Members, threads: int | None) -> None:
-        """Run a batch whose runs have these places in the ensemble."""
-        batch = task.batch
+    def _run(self, task: "_MeteredBatch", threads: int | None) -> None:
+        """Run a batch and write what its runs come to at their places in the ensemble."""
+        batch, members = task.batch, task.members
         states = np.empty_like(batch.states)
         # A run that ends at its last sample has there the states with which it ends.
         ends = np.empty_like(states) if task.late_totals else states
@@ -93,14 +91,15 @@ class Outcome:
                 one = slice(run, run + 1)
                 alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
                 take(one, run_sampled(alone, self.request.custom))
-        self._judge(task, members, states)
+        self._judge(task, states)
         readings = task.readings(ends, slice(None), None)
         for name in task.metrics:
             values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
 
-    def _judge(self, task: "_MeteredBatch", members: Members, states: Floats) -> None:
+    def _judge(self, task: "_MeteredBatch", states: Floats) -> None:
         """Which runs were completed, as in a single run: possible all the time, and finite at the end."""
+        members = task.members
         result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time
         self.too_many_parts[members] = result.too_many_parts != 0.0
@@ -118,7 +117,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True)
 class _MeteredBatch:
-    """A batch with its meters, the metrics that it can have, and the interval of its samples.
+    """A batch with its meters, its runs' places in the ensemble, its metrics, and the interval of its samples.
 
     The first ``physical`` rows of its states are no meters.
 
@@ -126,6 +125,7 @@ class _MeteredBatch:
     """
 
     batch: Batch
+    members: Members
     physical: int
     metrics: Mapping[str, MetricKind]
     interval: Floats
@@ -183,7 +183,7 @@ def offered(scenario: Scenario) -> dict[str, MetricKind]:
     }
 
 
-def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
+def _meter_batch(plain: Batch, members: Members, request: Request) -> _MeteredBatch:
     program = plain.program
     available = {name: kind for name, kind in request.metrics.items() if has_channels(program, kind)}
     # In one order, so that the same metrics are one program in whatever order they are requested.
@@ -204,7 +204,7 @@ def _meter_batch(plain: Batch, request: Request) -> _MeteredBatch:
     trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
     band_stride = stride if every_sample else 1
-    return _MeteredBatch(batch, len(plain.states), available, interval, plain.clock.samples, band_stride, late)
+    return _MeteredBatch(batch, members, len(plain.states), available, interval, plain.clock.samples, band_stride, late)
 
 
 def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
-from ppafo.walking.bottle import SupplyCourse
+from ppafo.walking.bottle.course import SupplyCourse
 from ppafo.walking.figures.axes import time_axis
 from ppafo.walking.result import WalkResult
 

@@ -36,6 +36,7 @@ DRAG_LIMIT = -0.01
 
 _STRIP_SIZE = (10.4, 3.75)
 _FRAMES = 10
+"""Legs of the picture of one stride."""
 _SLOT = 0.62
 """Width of the ground under one frame [m]."""
 
@@ -50,8 +51,11 @@ _NARROW, _NARROWEST = 9.0, 2.5
 _ANIMATION_SIZE, _RESOLUTION = (7.2, 4.6), 90
 _STRIDES, _PER_STRIDE = 2, 30
 _COLOURS = 48
+"""Colours of the animation's palette."""
 _NEARLY_WHITE = 248
+"""Level from 0 to 255 above which all three make white, so that the background has one colour."""
 _SLOWED = 2.0
+"""Time of the animation over that of the walk."""
 _VIEW = (-0.62, 0.62, -0.12, 0.78)
 _TICK = 0.35
 """Distance of the marks on the ground [m]."""

@@ -21,7 +21,9 @@ _ROWS = (
 )
 """Outcomes, and pairs of a trait and an outcome."""
 _BINS = 40
+"""Bins of a histogram."""
 _MAXIMUM_POINTS = 2000
+"""Wearers that are drawn as points at most; of more an even selection."""
 _OWN = {"linestyle": "", "marker": "o", "markersize": 6, "clip_on": False, "zorder": 5}
 
 

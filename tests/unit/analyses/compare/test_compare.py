@@ -118,6 +118,7 @@ def test_all_configurations_see_the_same_draws() -> None:
     assert np.ptp(one["rms_error"]) > 0.0
     assert np.array_equal(one["rms_error"], same["rms_error"])
     assert all(item.equal == 1.0 for item in comparison.tasks[0].pairs["same"])
+    assert comparison.tasks[0].best["gas_per_work"] == {}, "a locked ankle does no work, so none is the best in it"
 
 
 def test_tasks_change_every_configuration() -> None:

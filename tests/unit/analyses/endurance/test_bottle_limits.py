@@ -7,7 +7,7 @@ import pytest
 from ppafo.analyses.endurance.discharge import Discharge, discharge
 from ppafo.analyses.endurance.draw import draw_of_numbers
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
-from ppafo.walking.bottle import Schedule
+from ppafo.walking.bottle.coupling import Schedule
 
 INSULATED = ("bottle.content_heat_transfer=0 W/K",)
 HELD_WARM = ("bottle.content_heat_transfer=100000 W/K", "bottle.room_heat_transfer=100000 W/K")

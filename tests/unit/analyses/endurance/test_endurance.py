@@ -12,7 +12,7 @@ from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.errors import DataError, ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
 from ppafo.signals import Channel, Recording
-from ppafo.walking.bottle import Schedule
+from ppafo.walking.bottle.coupling import Schedule
 
 WITHOUT_REST = Schedule(600.0, 0.0, 86400.0)
 

@@ -21,7 +21,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.numbers import with_numbers
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.walking import WalkResult, load_walk, walk
-from ppafo.walking.bottle import SupplyBalance
+from ppafo.walking.bottle.course import SupplyBalance
 from ppafo.walking.loading import on_bottle
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.result import WALK_FORMAT

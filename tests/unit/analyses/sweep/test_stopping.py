@@ -7,18 +7,9 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
-from ppafo.analyses.sweep.statistic import (
-    Estimate,
-    Statistic,
-    StoppingRule,
-    draw_until,
-    estimate,
-    mean_of,
-    parse_statistic,
-    probability_of,
-    quantile_of,
-    stopping_rule,
-)
+from ppafo.analyses.sweep.statistic import draw_until, estimate
+from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, parse_statistic, probability_of, quantile_of
+from ppafo.analyses.sweep.stopping import Estimate, StoppingRule, stopping_rule
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween, replicates_interval
 from ppafo.studies.draws import REPLICATES, Uncertainty

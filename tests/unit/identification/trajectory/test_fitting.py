@@ -11,7 +11,8 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryFit, TrajectoryProblem, fit
-from ppafo.identification.trajectory.problem import number_at, numbers_of, with_numbers
+from ppafo.identification.trajectory.numbers import number_at, with_numbers
+from ppafo.identification.trajectory.problem import numbers_of
 from ppafo.identification.trajectory.runs import FIT_TOLERANCE, prepare, run_with, signals_of
 from ppafo.running import simulate
 from ppafo.signals.recording import Recording

@@ -147,6 +147,7 @@ class Design:
 
 _MARKERS = ("o", "^", "s", "D", "v", "P")
 _LOGARITHMIC_FROM = 10.0
+"""Largest value over the smallest from which an axis is logarithmic."""
 _VIEWS = (
     ("A   Error against gas per task", "error", "gas"),
     ("B   Error against mass", "error", "mass"),

@@ -23,6 +23,7 @@ from ppafo.signals.recording import Floats
 
 Choices = NDArray[np.int64]
 MAXIMUM_SHOWN = 12
+"""Points of a front that are shown one by one at most."""
 _CHUNK = 512
 """Points compared with all others at once: the matrix of who dominates whom then stays in the cache."""
 

@@ -36,6 +36,7 @@ ERROR, GAS = "rms_error", "gas_supplied"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
 _SEED = 1
+"""Seed of the sensor noise: every pressure that is tried has the same."""
 GRID = 17
 """Pressures of a grid."""
 FINENESS = 0.1 * PASCALS_PER_PSI

@@ -18,7 +18,7 @@ from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
-from ppafo.walking.bottle import Schedule
+from ppafo.walking.bottle.coupling import Schedule
 
 
 def size_for_profile(problem: SizingProblem, threads: int | None = None, report: Report = report_nothing) -> Sizing:

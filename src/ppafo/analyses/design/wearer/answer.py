@@ -19,7 +19,7 @@ from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.simulation.oscillation import gains_of
-from ppafo.walking.bottle import minutes_text
+from ppafo.walking.bottle.course import minutes_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of

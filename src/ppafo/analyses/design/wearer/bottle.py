@@ -9,7 +9,7 @@ from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
 from ppafo.errors import ScenarioError
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report
-from ppafo.walking.bottle import WALKED
+from ppafo.walking.bottle.course import WALKED
 from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk

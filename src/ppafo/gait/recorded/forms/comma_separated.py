@@ -25,6 +25,7 @@ _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
 
 _LONGEST_SHOWN = 40
+"""Letters of a name that a message shows."""
 
 
 def _recognises(path: str | Path) -> bool:

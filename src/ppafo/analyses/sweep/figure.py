@@ -1,0 +1,278 @@
+"""The figure of a study: a panel a metric, over what varied, and bands of channels over time."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ppafo.analyses.sweep.results import StudyResults, metric_kind
+from ppafo.report.finding import Part
+from ppafo.report.kind import TIME, Kind, of_channel, of_path
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.setting_names import label_of
+from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
+from ppafo.signals.recording import CHANNELS, Floats
+from ppafo.studies.sampling import NOISE
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
+
+FIGURE = "figure"
+COLOURS = (BLUE, VERMILION, GREEN, ORANGE, GREY)
+MOST_CONFIGURATIONS = len(COLOURS)
+"""Configurations that are drawn: as many as colours that can be told apart."""
+MOST_METRICS = 9
+"""Metrics that are drawn."""
+MAXIMUM_DRAWN = 4_000_000
+"""Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
+_COLUMNS = 3
+"""Panels side by side."""
+_PANEL, _COMPARED_PANEL = (3.5, 2.7), (2.6, 2.3)
+"""Width and height of a panel [inches], and of one of a row that compares configurations."""
+_HISTOGRAM_BINS = 60
+"""Bins of a histogram at most."""
+_MAXIMUM_POINTS = 3000
+"""Runs of which a curve or the points of a panel are made."""
+_MEDIAN = 0.5
+_OPACITIES = (0.18, 0.32, 0.45)
+"""Of the bands of one channel, from the outermost to the innermost."""
+_GRIDDED = ("grid", "list")
+"""Kinds of ``[[vary]]`` that are crossed with each other."""
+_NAMED = 3
+"""Varied values that a title names."""
+_CAPTION = (
+    "Distributions of the metrics, their dependence on the varied values, and quantiles over time where requested."
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Content:
+    """What a figure shows: metrics, channels with bands, configurations, and the paths that varied.
+
+    ``varied`` are those whose size says something, without a seed; ``grid`` are those of a grid or a list.
+    """
+
+    metrics: Sequence[str]
+    bands: Sequence[str]
+    configurations: Sequence[str]
+    varied: Sequence[str]
+    grid: Sequence[str]
+
+    @property
+    def is_mapped(self) -> bool:
+        """True where each metric of a configuration is a panel, over two paths: a map of a grid, or points."""
+        return len(self.grid) == 2 or len(self.varied) == 2
+
+    @property
+    def is_compared(self) -> bool:
+        """True for panels over two paths of several configurations: a row for each metric."""
+        return self.is_mapped and len(self.configurations) > 1
+
+    @property
+    def across(self) -> int:
+        """Number of panels side by side."""
+        if self.is_compared:
+            return len(self.configurations)
+        count = len(self.metrics) * (len(self.configurations) if self.is_mapped else 1) + len(self.bands)
+        return 2 if count == 4 else min(_COLUMNS, max(1, count))
+
+
+def _content_of(results: StudyResults) -> _Content:
+    """Return what the figure of a study shows."""
+    study, all_metrics = results.document["study"], list(results.document["metrics"])
+    # A metric that no run has would be a hole in the figure, unless no metric has a value.
+    with_values = [
+        metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
+    ]
+    return _Content(
+        metrics=(with_values or all_metrics)[:MOST_METRICS],
+        bands=list(study["outputs"].get("bands", ())),
+        # As many as colours that can be told apart.
+        configurations=results.configurations[:MOST_CONFIGURATIONS],
+        varied=[path for path in results.varied if path != NOISE],
+        grid=[number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED],
+    )
+
+
+def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:
+    """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
+    content = _content_of(results)
+    title = f"{results.name}, {results.summary['completed']:,} runs"
+    if not content.is_mapped and len(content.varied) > 1:
+        title += f" over {len(content.varied)} values: {_listed(content.varied)}"
+    return Part(
+        said=said,
+        remarks=remarks,
+        panels=partial(_panels, results, content),
+        name=FIGURE,
+        caption=_CAPTION,
+        across=content.across,
+        size=_COMPARED_PANEL if content.is_compared else _PANEL,
+        title=title,
+        is_detail=True,
+    )
+
+
+def _listed(paths: Sequence[str]) -> str:
+    """Return the labels of paths within a sentence: without a capital, unless one begins with a name in capitals."""
+    labels = [label_of(path) for path in paths[:_NAMED]]
+    labels = [label if label[:2].isupper() else label[:1].lower() + label[1:] for label in labels]
+    more = f" and {len(paths) - _NAMED} more" if len(paths) > _NAMED else ""
+    return f"{', '.join(labels)}{more}"
+
+
+def _panels(results: StudyResults, content: _Content) -> list[Panel]:
+    """Return a panel for each metric, of each configuration where it is a map, and one for each band."""
+    names = content.configurations
+    if content.is_mapped:
+        over_two = (
+            partial(_map, results, content.grid)
+            if len(content.grid) == 2
+            else partial(_points, results, content.varied)
+        )
+        panels = [over_two(metric, name, content.is_compared) for metric in content.metrics for name in names]
+    elif len(content.varied) == 1:
+        panels = [_over(results, content.varied[0], metric, names) for metric in content.metrics]
+    else:
+        panels = [_histogram(results, metric) for metric in content.metrics]
+    panels += [_band(results, channel, names) for channel in content.bands]
+    # The first panel with curves names the configurations for all.
+    with_names = next((panel for panel in panels if len(names) > 1 and any(mark.label for mark in panel.marks)), None)
+    return [replace(panel, legend="inside" if panel is with_names else "") for panel in panels]
+
+
+def _kind(results: StudyResults, path: str) -> Kind:
+    """Return what the number at a varied path is."""
+    return of_path(path, results.document["varied"][path]["unit"].removeprefix("-"))
+
+
+def _histogram(results: StudyResults, metric: str) -> Panel:
+    """Return how often each value came, for every configuration."""
+    parts = {name: values[np.isfinite(values)] for name, values in results.thin(metric, MAXIMUM_DRAWN).items()}
+    filled = [values for values in parts.values() if values.size]
+    edges = np.zeros(2)
+    if filled:
+        low, high = min(float(part.min()) for part in filled), max(float(part.max()) for part in filled)
+        is_counted = high - low < _HISTOGRAM_BINS and all(bool(np.all(part == np.round(part))) for part in filled)
+        bins = min(_HISTOGRAM_BINS, max(8, round(sum(part.size for part in filled) ** 0.5)))
+        # A bin for each whole number where values are counts of few kinds: others would be empty now and then.
+        edges = np.arange(low - 0.5, high + 1.0) if is_counted else np.linspace(low, high or low + 1.0, 1 + bins)
+    marks = [
+        Mark("bars", edges, np.histogram(own, edges)[0], label=name, colour=colour)
+        for (name, own), colour in zip(parts.items(), COLOURS, strict=False)
+        if filled
+    ]
+    return Panel(metric_kind(results, metric), Kind(), marks, then=lambda axes: axes.set_yticks([]))
+
+
+def _over(results: StudyResults, path: str, metric: str, names: Sequence[str]) -> Panel:
+    """Return a metric over the one path that varies."""
+    across, values = results.thin(path, MAXIMUM_DRAWN), results.thin(metric, MAXIMUM_DRAWN)
+    marks = []
+    for name, colour in zip(names, COLOURS, strict=False):
+        # Draws come in any order, a line goes from left to right.
+        order = np.argsort(across[name], kind="stable")
+        order = order[:: max(1, order.size // _MAXIMUM_POINTS)]
+        marks.append(
+            Mark("line", across[name][order], values[name][order], label=name, colour=colour, style={"marker": "."})
+        )
+    return Panel(_kind(results, path), metric_kind(results, metric), marks)
+
+
+def _map(results: StudyResults, grid: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
+    """Return the mean of a metric over the two paths, for one configuration; white where no run completed."""
+    across, upward = (results.thin(path, MAXIMUM_DRAWN)[name] for path in grid)
+    columns, column = np.unique(across, return_inverse=True)
+    rows, row = np.unique(upward, return_inverse=True)
+    # A point of the grid may have several draws, some of which failed: the mean of the others.
+    values = results.thin(metric, MAXIMUM_DRAWN)[name]
+    cell, known = row * columns.size + column, np.isfinite(values)
+    count = np.bincount(cell[known], minlength=rows.size * columns.size)
+    total = np.bincount(cell[known], weights=values[known], minlength=rows.size * columns.size)
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan).reshape(rows.size, columns.size)
+    kind = metric_kind(results, metric)
+    declared = {number["path"]: number for number in results.document["study"]["vary"]}
+    axis_x = _MapAxis(_kind(results, grid[0]), columns, declared[grid[0]])
+    axis_y = _MapAxis(_kind(results, grid[1]), rows, declared[grid[1]])
+
+    def mark_axes(axes: "Axes") -> None:
+        """Set ticks at the values of a list, and logarithmic scales."""
+        axes.grid(visible=False)
+        axis_x.mark(axes.xaxis, axes.set_xscale)
+        axis_y.mark(axes.yaxis, axes.set_yscale)
+
+    marks = (Mark("map", axis_x.places, axis_y.places, kind.values(mean)),)
+    title = name if is_compared else ""
+    return Panel(axis_x.shown_kind, axis_y.shown_kind, marks, title, scale=kind, then=mark_axes)
+
+
+@dataclass(frozen=True, slots=True)
+class _MapAxis:
+    """An axis of a map: what its numbers are, the values [SI] that they take, and how the study file varies them.
+
+    Values of a list are side by side, in cells of the same size.
+    """
+
+    kind: Kind
+    levels: Floats
+    declared: Mapping[str, Any]
+
+    @property
+    def is_listed(self) -> bool:
+        """True where the values are a list."""
+        return bool(self.declared["kind"] == "list")
+
+    @property
+    def shown_kind(self) -> Kind:
+        """What the places on the axis are: words alone for a list."""
+        return Kind(self.kind.axis) if self.is_listed else self.kind
+
+    @property
+    def places(self) -> Floats:
+        """Where the cells of the values are."""
+        return np.arange(float(self.levels.size)) if self.is_listed else self.levels
+
+    def mark(self, axis: "Axis", set_scale: "Callable[[str], None]") -> None:
+        """Set the ticks of an axis of a figure, and its scale."""
+        from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+        if self.is_listed:
+            axis.set_ticks(self.places, [f"{value:g}" for value in self.kind.values(self.levels)])
+        elif self.declared.get("spacing") == "logarithmic":
+            set_scale("log")
+            # Plain numbers at 1, 2 and 5 of every decade.
+            axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+            axis.set_minor_formatter(NullFormatter())
+
+
+def _points(results: StudyResults, paths: Sequence[str], metric: str, name: str, is_compared: bool) -> Panel:
+    """Return a metric as the colour of points over the two values that were drawn, for one configuration."""
+    most, kind = _MAXIMUM_POINTS * len(results.configurations), metric_kind(results, metric)
+    x, y, values = (results.thin(path, most)[name] for path in (*paths, metric))
+    marks = (Mark("points", x, y, kind.values(values)),)
+    across, upward = (_kind(results, path) for path in paths)
+    return Panel(across, upward, marks, name if is_compared else "", scale=kind)
+
+
+def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
+    """Return the bands of a channel for every configuration: the outermost pair of quantiles light, the next darker."""
+    table = results.bands()
+    # The quantiles that the study asked for are the columns of its file.
+    fractions = sorted(float(name[1:]) for name in table if name.startswith("q"))
+    pairs = [(low, high) for low, high in zip(fractions, reversed(fractions), strict=True) if low < high]
+    marks = []
+    for name, colour in zip(names, COLOURS, strict=False):
+        own = (table["configuration"] == name) & (table["channel"] == channel)
+        for pair, opacity in zip(pairs, _OPACITIES, strict=False):
+            ends = np.stack([table[f"q{fraction:g}"][own] for fraction in pair])
+            marks.append(Mark("band", table["time"][own], ends, colour=colour, style={"alpha": opacity}))
+        if _MEDIAN in fractions:
+            marks.append(Mark("line", table["time"][own], table["q0.5"][own], label=name, colour=colour))
+    kind = of_channel(channel, CHANNELS[channel].unit)
+    percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
+    title = f"{kind.words}: {percentages} % of runs below"
+    return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=9))

@@ -1,0 +1,152 @@
+"""An estimated statistic in words, its looks as a table, their trace and the histogram of the values."""
+
+import math
+from functools import partial
+
+import numpy as np
+
+from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic
+from ppafo.analyses.sweep.stopping import Estimate, Look, StoppingRule
+from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.kind import Interval, Kind, of_metric
+from ppafo.report.panels import Mark, Panel
+from ppafo.report.style import GREY, VERMILION
+from ppafo.studies.distributions import Floats, fraction_text
+
+_RULE_OF_THREE = 3.0
+"""Over the draws: probability of an event that 95 of 100 such sets of draws show."""
+_ENDS = ("estimate", "low", "high")
+"""Heads of an estimate and the ends of its interval."""
+_MAXIMUM_BINS = 80
+"""Bins of the histogram of the values at most."""
+_CAPTION = "Left: estimate and interval at each look; grey: the target width. Right: the values of all draws."
+
+
+def kind_of(metric: str, statistic: Statistic) -> Kind:
+    """Return what the numbers of a statistic are: a probability, or values of the metric."""
+    return Kind("Probability", form=".5g") if statistic.unit == "-" else of_metric(metric, ".5g")
+
+
+def remarks_on(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise: Interval | None) -> list[str]:
+    """Return what the number must not be read without: draws that decide alone, and noise."""
+    said = []
+    are_equal = values.size > 0 and float(np.ptp(values)) == 0.0
+    known = last.draws - last.missing
+    if not last.is_carried and are_equal:
+        said.append(
+            f"do not trust this interval: all {known:,} values are equal, which do not show how far a rare one lies; "
+            f"draw at least {FEWEST_SEEN:,}"
+        )
+    elif not last.is_carried:
+        said.append(
+            f"do not trust this interval: the mean has an effective sample size of {last.effective_size:.3g} of "
+            f"{known:,} draws, so that the true value lies outside more often than stated; request a quantile or a "
+            "probability"
+        )
+    if statistic.is_of_replicates and known:
+        share, span = _RULE_OF_THREE / known, float(np.ptp(values))
+        moved = (
+            f"if it lay beyond the others by their range, {kind.change(span)}, the mean would move by up to "
+            f"{kind.change(share * span)}, and more the further it lies"
+        )
+        if are_equal:
+            moved = f"it would move the mean by up to {share:.2g} times its distance"
+        said.append(
+            f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): "
+            f"{moved}"
+        )
+    if noise is not None:
+        said.append(f"sensor noise causes {fraction_text(noise)} of the variance over the draws")
+    return said
+
+
+def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) -> Finding[Estimate]:
+    """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
+    kind, of_values, looks = kind_of(estimated.metric, statistic), of_metric(estimated.metric), estimated.looks
+    unit = kind.shown_unit if kind.quantity else ""
+    ending = ""
+    if not rule.is_narrow(estimated.interval):
+        ending = f"; the target width was not reached with the maximum of {rule.maximum:,} draws"
+    verdict = (
+        f"{estimated.statistic} of {estimated.metric}: {kind.interval(estimated.interval)} {unit}".rstrip()
+        + f" after {estimated.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
+    )
+    width = f"{100.0 * rule.width:g} % of the value" if rule.is_relative else kind.change(rule.width)
+    policy = (
+        f"target width: {width}; at most {len(rule.sizes)} looks at doubling numbers of draws, each with "
+        f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
+        f"{looks[-1].missing:,} draws have no value and are left out"
+    )
+    rows = [_row_of(look, kind, rule) for look in looks]
+    further = [
+        (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
+        for name, mean in estimated.also.items()
+    ]
+    also = Part(
+        "Further metrics",
+        columns_of(("mean over the same draws", "with a value", *_ENDS), further),
+        said=[f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."],
+    )
+    title = f"{estimated.statistic} of {estimated.metric}"
+    return Finding(
+        name="statistic",
+        command="sweep",
+        kicker="Statistic of a study",
+        title=title[:1].upper() + title[1:],
+        said=(verdict, *estimated.remarks),
+        parts=(
+            *([also] if further else []),
+            Part(
+                "Trace",
+                columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
+                said=[policy],
+                panels=partial(_panels, estimated, kind, rule, statistic, of_values),
+                name="trace",
+                caption=_CAPTION,
+                across=2,
+                size=(4.1, 3.3),
+            ),
+        ),
+        found=estimated,
+        passed=estimated.is_met,
+    )
+
+
+def _row_of(look: Look, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
+    """Return a look as texts: draws, those without a value, estimate and interval, its width, and what it lacks."""
+    interval = look.interval
+    met = ["narrow enough"] if rule.is_narrow(interval) else []
+    if not look.is_carried:
+        met.append("its effective sample size is small")
+    ends = (kind.number(value) for value in (interval.value, interval.low, interval.high))
+    width = kind.change(interval.width) if math.isfinite(interval.width) else f"{interval.width:.3g}"
+    return (f"{look.draws:,}", f"{look.missing:,}", *ends, width, ", but ".join(met))
+
+
+def _panels(estimated: Estimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind) -> list[Panel]:
+    """Return the looks one after the other, and the values of all draws."""
+    return [_trace(estimated, kind, rule), _histogram(estimated, statistic, of_values)]
+
+
+def _trace(estimated: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
+    """Return estimate and interval at each look, and the target width."""
+    draws = np.array([look.draws for look in estimated.looks])
+    values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in estimated.looks]).T
+    known, last = np.isfinite(values).all(axis=0), float(values[0, -1])
+    reach = 0.5 * rule.width * (abs(last) if rule.is_relative else 1.0)
+    label = f"{estimated.statistic[:1].upper()}{estimated.statistic[1:]}"
+    marks = (
+        Mark("upright", draws[known], values[1:, known], style={"linewidth": 3, "alpha": 0.45}),
+        Mark("line", draws, values[0], style={"marker": "o", "markersize": 5, "linewidth": 1.0}),
+        Mark("strip", (), (last - reach, last + reach), colour=GREY, style={"alpha": 0.18}),
+    )
+    return Panel(Kind("Draws"), kind, marks, label, then=lambda axes: axes.set_xscale("log", base=2))
+
+
+def _histogram(estimated: Estimate, statistic: Statistic, kind: Kind) -> Panel:
+    """Return the values of all draws, and the estimate or the value that a probability is about."""
+    bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(estimated.values.size))))
+    counts, edges = np.histogram(estimated.values, bins)
+    at = estimated.interval.value if statistic.threshold is None else statistic.threshold
+    marks = (Mark("bars", edges, counts), Mark("at", at, colour=VERMILION, style={"linewidth": 1.4}))
+    return Panel(kind, Kind("Draws"), marks, f"{estimated.values.size:,} values")

@@ -1,0 +1,154 @@
+"""Strides of a recording that are taken, and those that are left out: of unusual time, with drop-outs, or odd.
+
+Left out is what no leg does: columns that stay constant while the wearer walks, drop-outs that were filled with the
+last value, and strides whose curve is unlike all others.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ppafo.errors import DataError, PpafoError, noted_in
+from ppafo.gait.recorded.curves import CurveStatistics
+from ppafo.gait.recorded.footfalls import Stride
+from ppafo.gait.recorded.table import MotionTable
+from ppafo.gait.recorded.walk import LOADS, Signal
+from ppafo.signals.recording import Floats
+
+LARGEST_STRIDE_CHANGE = 0.25
+"""Fraction of the median stride time; a stride that differs by more has a missed event, or is not steady walking."""
+LONGEST_HELD = 0.1
+"""Seconds that a column may keep one value within the strides."""
+
+_ABOUT_STANCE = 0.05
+"""Of the stride, at either end of the stance, in which a load may rest too."""
+_COARSE = 0.001
+"""Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
+_STEPS_OF_REST = 3.0
+"""Smallest steps by which such a sensor may enter and leave a value at which the leg rests."""
+ODD_SHAPE, ODD_PHASE, ODD_AGAINST_OTHERS = 0.25, 0.4, 4.0
+"""A stride is odd whose curve is off the median one by these fractions of its range, RMS over the stride or at any one
+phase, and by as many times the median distance of all strides. Impaired walking varies more, but then in every stride.
+"""
+_FEWEST_TO_COMPARE = 3
+"""Strides of which one can be unlike the others."""
+_MOST_ODD = 0.4
+"""Fraction of the strides; where more are odd, none is the exception."""
+
+
+@dataclass(frozen=True, slots=True)
+class Strides:
+    """Strides taken, strides left out, each with the reason, and the least number to take."""
+
+    taken: tuple[Stride, ...]
+    left_out: tuple[tuple[Stride, str], ...]
+    least: int
+
+    def without(self, odd: Sequence[Stride], why: str, else_refused: str = "") -> "Strides":
+        """Return these without some; where too few remain all stay, or DataError with the words for that case."""
+        kept = tuple(stride for stride in self.taken if stride not in odd)
+        if len(kept) >= self.least:
+            return Strides(kept, (*self.left_out, *((stride, why) for stride in odd)), self.least)
+        if else_refused:
+            raise DataError(else_refused)
+        return self
+
+
+def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
+    """Return strides without those whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
+    if not strides:
+        return Strides((), (), least)
+    # The median: one stop among ten strides would move a mean.
+    median = float(np.median([stride.time for stride in strides]))
+    kept = [stride for stride in strides if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
+    why = "{:.3g} s long, the others are about " + f"{np.mean([stride.time for stride in kept]):.3g} s"
+    return Strides(
+        tuple(kept), tuple((stride, why.format(stride.time)) for stride in strides if stride not in kept), least
+    )
+
+
+def without_drop_outs(
+    walk: Mapping[str, Signal],
+    tables: Sequence[MotionTable],
+    covered: Mapping[str, Sequence[Stride]],
+    strides: Strides,
+    wrong: list[PpafoError],
+) -> Strides:
+    """Leave out strides in which a column keeps one value for more than 0.1 s; a load may in swing.
+
+    Loads are looked at in the strides that they cover. A column that never moves is no drop-out, and a stretch that a
+    coarse sensor enters and leaves by its smallest step is none either. Where too few strides would be left all stay,
+    and that is added to ``wrong``.
+    """
+    by_file = {table.file: table for table in tables}
+    for name, signal in walk.items():
+        table = by_file[signal.file]
+        # Between the times of a span a column of this curve moves all the time.
+        spans = [(stride.start, stride.end) for stride in strides.taken]
+        if name in LOADS:
+            loaded = [(stride, _ABOUT_STANCE * stride.time) for stride in covered[name]]
+            spans = [(stride.start + slack, stride.toe_off - slack) for stride, slack in loaded]
+        columns = [(column, table.columns[column]) for column in signal.columns]
+        if name in LOADS and len(columns) > 1:
+            # Plates that are summed rest in turn, so their sum is looked at.
+            columns = [(" + ".join(signal.columns), np.sum([np.abs(values) for _, values in columns], axis=0))]
+        for column, values in columns:
+            for start, end in constant_stretches(table.time, values, spans):
+                what = f"column {column!r} of {name} keeps one value from {start:.4g} to {end:.4g} s"
+                with noted_in(wrong):
+                    strides = strides.without(
+                        [stride for stride in strides.taken if stride.start < end and start < stride.end],
+                        f"{what}: a drop-out was filled with it",
+                        f"{table.file}: {what} while the wearer walks: a drop-out was filled with it; cut the file "
+                        "there and give the longer part",
+                    )
+    return strides
+
+
+def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Return start and end [s] of all stretches with one value that cover more than 0.1 s of the spans."""
+    moves = np.flatnonzero(np.diff(values) != 0.0)
+    if moves.size == 0:
+        return []
+    starts, ends = np.concatenate([[0], moves + 1]), np.concatenate([moves, [values.size - 1]])
+    long = time[ends] - time[starts] > LONGEST_HELD
+    stretches = []
+    for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
+        start, end = float(time[first]), float(time[last])
+        inside = sum(max(0.0, min(end, high) - max(start, low)) for low, high in spans)
+        if inside > LONGEST_HELD and not _by_coarse_steps(values, first, last):
+            stretches.append((start, end))
+    return stretches
+
+
+def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
+    """Return whether the value changes by a few of a coarse sensor's smallest steps on both sides of a stretch."""
+    steps = np.abs(np.diff(values))
+    # Rounding makes equal steps of a sensor differ in the last digits.
+    smallest = 1.001 * float(np.min(steps[steps > 0.0]))
+    beside = [float(steps[place]) for place in (first - 1, last) if 0 <= place < steps.size]
+    return (
+        smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values)) and max(beside) <= _STEPS_OF_REST * smallest
+    )
+
+
+def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) -> Strides:
+    """Leave out strides whose curve is unlike all others: a stumble, a turn, markers that were exchanged."""
+    for name, curve in curves.items():
+        if len(curve.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":
+            continue
+        middle = np.median(curve.curves, axis=0)
+        # From the median curve, which one odd stride does not move.
+        away = np.abs(curve.curves - middle)
+        is_odd = np.zeros(len(curve.strides), dtype=bool)
+        for share, distances in ((ODD_SHAPE, np.sqrt(np.mean(away**2, axis=1))), (ODD_PHASE, np.max(away, axis=1))):
+            # Both a fraction of the range and a multiple of the usual distance: impaired strides differ, but all of
+            # them.
+            is_odd |= distances > max(share * np.ptp(middle), ODD_AGAINST_OTHERS * np.median(distances))
+        odd = [stride for stride, is_it in zip(curve.strides, is_odd.tolist(), strict=True) if is_it]
+        if len(odd) <= _MOST_ODD * len(curve.strides):
+            strides = strides.without(
+                [stride for stride in odd if stride in strides.taken], f"{name} is unlike all others"
+            )
+    return strides

@@ -1,0 +1,114 @@
+"""The layout of the section [trajectory] of a problem file; texts have units, scenarios and recordings go by name."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
+
+from ppafo.documents.models import NAME, StrictTable, Text, Texts
+from ppafo.errors import IdentificationError
+from ppafo.identification.keys import Columns, Confidence
+from ppafo.identification.trajectory.experiment import ALL_INPUTS
+
+_Label = Annotated[str, Field(pattern=NAME, max_length=60, description="its name, also in the names of files")]
+_Noise = dict[str, Text]
+
+
+class PriorSection(StrictTable):
+    """What is known beforehand: a normal distribution."""
+
+    mean: Annotated[Text, Field(description="most likely value, with its unit")]
+    relative: Annotated[float, Field(gt=0.0, description="standard deviation over the mean")]
+
+
+class ParameterSection(StrictTable):
+    """Entry of a problem file for a number that is to be fitted."""
+
+    path: Text = Field(description="dotted path, such as friction.viscous_damping or initial.pressure_1")
+    start: Text | None = Field(
+        None, description="start of the search; default: from the bench procedures, else the set"
+    )
+    low: Text | None = Field(None, description="lower bound")
+    high: Text | None = Field(None, description="upper bound")
+    prior: PriorSection | Literal["bench"] | None = Field(
+        None, description="what is known beforehand; 'bench': the interval of a bench procedure of this file"
+    )
+    recordings: Texts = Field((), description="experiments in which it acts, by label; default: all")
+
+
+class ExperimentSection(StrictTable):
+    """A recording and the scenario that is to explain it.
+
+    A scenario has the device of the problem. Without one the run follows what the recording has of command, supply and
+    external torque, and begins as the recording does.
+    """
+
+    label: _Label
+    recording: Text = Field(description="file, relative to this one")
+    columns: Columns = None
+    scenario: Text | None = Field(None, description="name or relative file of a scenario; default: the recorded inputs")
+    overrides: Texts = Field((), description="changes to the scenario, or to the device without one")
+    start: Text | None = Field(
+        None, description="time of the recording at which the run begins; 0 s, or the first sample"
+    )
+    step: Text | None = Field(None, description="longest step of time in the run, such as '0.1 ms'")
+    channels: Texts | None = Field(
+        None, description="compared; default: angle and pressures, unless locked or followed"
+    )
+    noise: _Noise = Field({}, description="least standard deviation by channel, '0.1 deg', '500 Pa_d'; default: none")
+    inputs: Texts | None = Field(None, description=f"recorded channels that the run follows: {', '.join(ALL_INPUTS)}")
+    locked: Text | None = Field(
+        None, description="angle at which the vane is locked, such as '75 deg'; without a scenario"
+    )
+    volume: Text | None = Field(None, description="fixed volume in place of the vane, '60 cm^3'; without a scenario")
+    initial_state: Literal["scenario", "recording", "fitted"] | None = Field(
+        None,
+        description="state at the start; 'recording' and 'fitted' are one; default: the scenario, else the recording",
+    )
+    time_offset: Text | None = Field(None, description="limit of a fitted delay of the samples behind the run, '20 ms'")
+
+
+class CandidateSection(StrictTable):
+    """Entry of a problem file for an experiment that could be done next."""
+
+    label: _Label
+    scenario: Text = Field(description="name of a scenario, or a file relative to this one")
+    overrides: Texts = Field((), description="changes to the scenario")
+    noise: _Noise = Field({}, description="by channel; default: what the fit finds")
+    interval: Text = Field("1 ms", description="time between two samples")
+
+
+class TrajectorySection(StrictTable):
+    """Section of a problem file for a fit of trajectories."""
+
+    parameters: tuple[ParameterSection, ...] = Field(strict=False, min_length=1, description="free parameters")
+    experiments: tuple[ExperimentSection, ...] = Field(strict=False, min_length=1, description="recordings to explain")
+    confidence: Confidence = 0.95
+    candidates: tuple[CandidateSection, ...] = Field(
+        (), strict=False, description="experiments to rank by the information that they would bring"
+    )
+
+
+_REMOVED = {
+    "loss": "the first pass is robust by itself; omit it",
+    "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
+    "seed": "nothing is drawn; omit it",
+    "directions": "recordings that want other numbers are found by themselves; omit it",
+    "profiles": "intervals are the table's; omit it",
+    "scale": "the search scales numbers by itself; omit it",
+    "held": "is now locked; write locked = '75 deg'",
+}
+
+
+def refuse_removed(document: Mapping[str, Any], file: str) -> None:
+    """Refuse keys that earlier versions had, with what to write instead; IdentificationError."""
+    section, bench = document.get("trajectory"), document.get("bench")
+    if isinstance(bench, dict) and "can" in bench:
+        raise IdentificationError(
+            f"{file}: bench.can: experiments are not proposed; write [[trajectory.candidates]], which are ranked"
+        )
+    lists = [section.get(name) for name in ("parameters", "experiments")] if isinstance(section, dict) else []
+    tables = [section, *(table for tables in lists if isinstance(tables, list) for table in tables)]
+    for key, instead in _REMOVED.items():
+        if any(isinstance(table, dict) and key in table for table in tables):
+            raise IdentificationError(f"{file}: trajectory: {key}: {instead}")

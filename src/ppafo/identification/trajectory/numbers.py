@@ -1,0 +1,239 @@
+"""The numbers that a trajectory fit moves: which a scenario and a recording have, and their start, bounds and prior."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from ppafo.errors import IdentificationError, nearest_name
+from ppafo.identification.residuals import Free
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, Experiment, refuse_first, scenario_of
+from ppafo.model.catalog import find_effects
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import Device
+from ppafo.simulation import numbers
+from ppafo.simulation.declaration import FREE, INITIAL, LEG, shank_settings
+from ppafo.simulation.numbers import other_form
+from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.inputs import supply_paths
+from ppafo.simulation.scenario import Scenario, vane_motion
+
+TIME_OFFSET = "recording.time_offset"
+"""Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""
+
+ZERO_OF, GAIN_OF = "recording.zero_of_", "recording.gain_of_"
+"""Paths, with a channel behind them, of what a sensor adds to its samples and of its gain less 1."""
+
+RECORDING = (
+    Quantity("time_offset", "s", "time by which the samples are later than the run, a late trigger", 0.0, -1.0, 1.0),
+    *(
+        Quantity(f"zero_of_{name}", unit, f"what the sensor of {name} adds to its samples", 0.0, -size, size)
+        for name, unit, size in (
+            ("angle", "rad", 1.0),
+            *((name, "Pa_d", 1.0e6) for name in ("pressure_1", "pressure_2", SUPPLY, DORSIFLEXION_SUPPLY)),
+        )
+    ),
+    *(
+        Quantity(f"gain_of_{name}", "1", f"gain of the sensor of {name} less 1", 0.0, -0.5, 0.5)
+        for name in FITTED_CHANNELS
+    ),
+)
+_OF_RECORDING = frozenset(f"recording.{quantity.name}" for quantity in RECORDING)
+
+
+def full_path(path: str, scenario: Scenario) -> str:
+    """Return the path as a parameter set has it: ``valve.area`` becomes ``valves.NAME.area`` of the chosen valve."""
+    section, _, name = path.partition(".")
+    return f"valves.{scenario.device.valve_name}.{name}" if section == "valve" else path
+
+
+def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:
+    """Return every number that can be fitted in this scenario, with its declaration, by path."""
+    device = scenario.device
+    # An orifice has two forms, and the device one of them.
+    other = {f"{section}.{name}" for section in ("actuator.leak", "valve") for name in other_form(device, section)}
+    declared = {
+        full_path(path, scenario): quantity
+        for path, quantity in numbers.device_numbers(device).items()
+        if path not in other
+    }
+    leg = vane_motion(scenario).leg
+    if vane_motion(scenario).profile is None:
+        declared |= {f"motion.{quantity.name}": quantity for quantity in (FREE if leg is None else LEG)}
+        shank = () if leg is None else shank_settings(leg.shank.kind)
+        declared |= {f"motion.shank.{quantity.name}": quantity for quantity in shank}
+    declared |= {f"initial.{quantity.name}": quantity for quantity in INITIAL}
+    return declared | {f"recording.{quantity.name}": quantity for quantity in RECORDING}
+
+
+def declaration_of(path: str, scenario: Scenario) -> Quantity:
+    """Return the declaration of the number at a path; IdentificationError with the nearest name for an unknown one."""
+    find_effects([path])
+    known = declared_numbers(scenario)
+    full = full_path(path, scenario)
+    if full not in known:
+        hint = nearest_name(full, known)
+        raise IdentificationError(f"{scenario.name}: no number '{path}' can be fitted{hint}; known: {', '.join(known)}")
+    return known[full]
+
+
+def number_at(scenario: Scenario, path: str) -> float:
+    """Return the number at a path in SI units; numbers of a recording are 0 before they are fitted."""
+    declaration_of(path, scenario)
+    return 0.0 if path in _OF_RECORDING else numbers.number_at(scenario, path)
+
+
+def with_numbers(scenario: Scenario, changed: Mapping[str, float]) -> Scenario:
+    """Return the scenario with numbers [SI] replaced, by paths of ``declared_numbers``, but not of recordings."""
+    # Those of a recording change what is compared, not the run.
+    return numbers.with_numbers(
+        scenario, {path: number for path, number in changed.items() if path not in _OF_RECORDING}
+    )
+
+
+def broken_rule(device: Device) -> str:
+    """Return which rule of a device a set of numbers breaks, as a parameter set would say it; empty for none."""
+    if device.friction.dynamic_torque > device.friction.static_torque:
+        return "friction.dynamic_torque came out above friction.static_torque"
+    if device.actuator.angle_min >= device.actuator.angle_max:
+        return "actuator.angle_min came out above actuator.angle_max"
+    return ""
+
+
+LONGEST_TIME_OFFSET = 0.02
+"""Bound [s] of a fitted time offset where none are given: a trigger or a sensor, not another experiment."""
+
+_FURTHEST = 100.0
+"""Factor from its start by which a number is moved at most where no bounds are given."""
+
+_SCALE = 100.0
+"""Typical size of a number with a prior over its standard deviation; differences are a thousandth of it at most."""
+
+_STATE = frozenset({"motion", "initial"})
+"""Sections that say how a run begins, which the recording may say better."""
+
+_SUPPLIES = {"supply.pressure": "plant.supply_pressure", "supply.dorsiflexion_pressure": "plant.dorsiflexion_pressure"}
+
+
+@dataclass(frozen=True, slots=True)
+class FreeParameter:
+    """A number that the fit moves, by its path such as ``friction.viscous_damping`` or ``initial.pressure_1``; SI.
+
+    ``start`` None begins at the value of the scenario. ``deviation`` is the standard deviation of its prior about
+    ``mean``, which is the start where it is None; infinite for none. Bounds left out are the declared ones, at most a
+    factor of 100 from the start. ``recordings`` limits the number to some experiments, by label: an initial pressure
+    belongs to one. One that ``is_tolerance`` is known within a tolerance, and no value of the device that is sought.
+    One that ``is_logarithm`` is moved as its natural logarithm; ``deviation`` is of that.
+    """
+
+    path: str
+    start: float | None = None
+    low: float | None = None
+    high: float | None = None
+    deviation: float = math.inf
+    recordings: tuple[str, ...] = ()
+    is_tolerance: bool = False
+    is_logarithm: bool = False
+
+    @property
+    def name(self) -> str:
+        """The path, with the experiments where it is limited to some."""
+        return f"{self.path} of {', '.join(self.recordings)}" if self.recordings else self.path
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number with everything settled: full path, SI unit, and what the estimator moves."""
+
+    path: str
+    unit: str
+    free: Free
+    recordings: tuple[str, ...]
+    is_tolerance: bool
+    is_logarithm: bool
+
+    def acts_in(self, label: str) -> bool:
+        """Return whether the number acts in the experiment with this label."""
+        return not self.recordings or label in self.recordings
+
+
+def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Number:
+    """Return a parameter with all of it settled; ``experiments`` are those it acts in.
+
+    IdentificationError for a contradiction.
+    """
+    scenarios = [experiment.scenario for experiment in experiments]
+    paths = {full_path(parameter.path, scenario) for scenario in scenarios}
+    if len(paths) > 1:
+        raise IdentificationError(
+            f"{parameter.path} means {' and '.join(sorted(paths))} in these experiments; name one, and its recordings"
+        )
+    path = paths.pop()
+    quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]
+    for experiment in experiments:
+        _check_has_effect(parameter, path, experiment)
+    start = _start_in(path, experiments[0]) if parameter.start is None else parameter.start
+    low, high = _bounds(parameter, path, start, quantity)
+    _check_bounds(parameter, start, low, high, quantity)
+    if parameter.is_logarithm:
+        start, low, high = math.log(start), math.log(low), math.log(high)
+    # Differences are a thousandth of the scale at most, which for a prior is a tenth of its deviation.
+    scale = abs(start) or 0.5 * (high - low)
+    if math.isfinite(parameter.deviation):
+        scale = _SCALE * parameter.deviation
+    free = Free(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
+    unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
+    return Number(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
+
+
+def _check_has_effect(parameter: FreeParameter, path: str, experiment: Experiment) -> None:
+    """Raise IdentificationError for a number whose recording the run of an experiment follows in its place."""
+    followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
+    if DORSIFLEXION_SUPPLY in experiment.inputs:
+        followed["plant.dorsiflexion_pressure"] = DORSIFLEXION_SUPPLY
+    channel = EXTERNAL_TORQUE if path == "motion.external_torque" else followed.get(_SUPPLIES.get(path, ""))
+    if channel in experiment.inputs:
+        raise IdentificationError(
+            f"{parameter.name}: the run of experiment '{experiment.label}' follows the recorded '{channel}', so "
+            "this number has no effect in it; omit one of the two"
+        )
+
+
+def _start_in(path: str, experiment: Experiment) -> float:
+    """Return the number [SI] from which a search starts that says none itself."""
+    # Of how a run begins the recording may say more than the scenario.
+    is_state = path.partition(".")[0] in _STATE
+    return number_at(scenario_of(experiment) if is_state else experiment.scenario, path)
+
+
+def _bounds(parameter: FreeParameter, path: str, start: float, quantity: Quantity) -> tuple[float, float]:
+    """Return the lowest and the highest value [SI] of the search; those of the parameter go before the usual ones."""
+    if path == TIME_OFFSET:
+        low, high = -LONGEST_TIME_OFFSET, LONGEST_TIME_OFFSET
+    else:
+        # A number above 0 is bounded by factors: with 0 as its lower bound a valve or an effect would be another model.
+        low = max(quantity.minimum, start / _FURTHEST) if start > 0.0 <= quantity.minimum else quantity.minimum
+        high = min(quantity.maximum, start * _FURTHEST) if start > 0.0 else quantity.maximum
+    return (low if parameter.low is None else parameter.low), (high if parameter.high is None else parameter.high)
+
+
+def _check_bounds(parameter: FreeParameter, start: float, low: float, high: float, quantity: Quantity) -> None:
+    """Raise IdentificationError for start, bounds and prior that contradict each other or what is declared."""
+    bounds = f"{low:.6g} and {high:.6g}"
+    has_size = math.isfinite(high - low) or math.isfinite(parameter.deviation)
+    is_allowed = quantity.minimum <= low and high <= quantity.maximum
+    allowed = f"{quantity.minimum:.6g} to {quantity.maximum:.6g} {quantity.unit}".rstrip()
+    refuse_first(
+        parameter.name,
+        (not math.isfinite(start) or math.isnan(low) or math.isnan(high), "start and bounds must be finite numbers"),
+        (not low < high, f"low, {low:.6g}, must be below high, {high:.6g}"),
+        (not low <= start <= high, f"start {start:.6g} must lie between the bounds {bounds}"),
+        (start == 0.0 and not has_size, "a start at 0 needs bounds, because they define what a small step is"),
+        (not parameter.deviation > 0.0, "the standard deviation of a prior must be above 0"),
+        (not is_allowed, f"the bounds {bounds} exceed what is allowed, {allowed}"),
+    )
+
+
+def reach_of(chosen: Sequence[Number]) -> float:
+    """Return the largest time offset [s] among the bounds of numbers; 0 where none is fitted."""
+    bounds = [bound for number in chosen if number.path == TIME_OFFSET for bound in (number.free.low, number.free.high)]
+    return max(map(abs, bounds), default=0.0)

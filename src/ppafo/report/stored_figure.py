@@ -1,0 +1,132 @@
+"""The figures of saved results and walks, with what their documents state: joint, atmosphere, units, why a run ended.
+
+A document may have been written by anybody: what is of another form is named by its key.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.errors import DataError, UnitError, one_line
+from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.report.recording_figure import recording_figure
+from ppafo.signals import Recording
+from ppafo.storage import StoredResult
+from ppafo.storage.result_folder import RUN_FILE
+from ppafo.units import conversion
+from ppafo.units.shown import shown_in
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_LARGEST = 1e9
+"""No atmosphere [Pa absolute] and no time [s] is as large."""
+_LONGEST_SHOWN = 60
+"""Characters of a key, a value or a word that a message or figure repeats."""
+_LONGEST_REMARK = 500
+"""Characters of what a document says of the end of a run."""
+_END_OF_WALK = 5.0
+"""Seconds at the end of a walk that are drawn, some strides: a minute of them is a black bar."""
+
+
+def draw_stored_result(stored: StoredResult) -> "Figure":
+    """Return the figure of a saved result: the same that ``Result.plot`` gave.
+
+    DataError names the key of ``run.json`` that is of another form.
+    """
+    file, document = stored.folder / RUN_FILE, stored.document
+    name = _under(file, document, "scenario").get("name", "")
+    if not isinstance(name, str):
+        raise _other_form(file, "scenario.name", name, "a text")
+    atmosphere = stated_atmosphere(file, document, "scenario", "device")
+    valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
+    joint = stated_joint(file, document, "scenario", "device")
+    with shown_in(stated_units(file, document)):
+        return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve, joint)
+
+
+def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
+    """Return the figure of the last seconds of a saved walk, with the failure that ended it, if any.
+
+    ``document`` is what ``file`` holds, empty where there is none; DataError names the key that is of another form.
+    """
+    end = float(recording.time[-1])
+    # A short walk is drawn whole, and then nothing is left out that had to be said.
+    part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""
+    remark = "; ".join(text for text in (_ending(file, document), part) if text)
+    atmosphere = stated_atmosphere(file, document, "configuration", "device")
+    shown = recording.between(end - _END_OF_WALK, end)
+    valve = str(_under(file, document, "configuration", "device", "valve").get("kind", ""))
+    with shown_in(stated_units(file, document)):
+        return recording_figure(shown, recording.label, remark, atmosphere, valve)
+
+
+def stated_units(file: Path, document: Mapping[str, Any], *keys: str) -> dict[str, str]:
+    """Return the units in which a file's document says, at some keys, that numbers are shown, by unit in SI; else none.
+
+    DataError names one that is no unit of that kind.
+    """
+    stated = _under(file, document, *keys, "shown")
+    for si_unit, unit in stated.items():
+        try:
+            conversion(str(unit), si_unit)
+        except UnitError as error:
+            raise _other_form(file, f"shown.{one_line(si_unit)[:_LONGEST_SHOWN]}", unit, "a unit for it") from error
+    return {si_unit: str(unit) for si_unit, unit in stated.items()}
+
+
+def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
+    """Return the atmosphere [Pa absolute] of the device at some keys of a file's document, else the standard one.
+
+    DataError names the key that is of another form.
+    """
+    atmosphere = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
+    return STANDARD_ATMOSPHERE if atmosphere is None else atmosphere
+
+
+def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint:
+    """Return what the device at some keys of a file's document turns, in words; the ankle where it does not say.
+
+    DataError names the key that is of another form.
+    """
+    words = _under(file, document, *device, "joint")
+    joint = {name: words.get(name, getattr(ANKLE, name)) for name in ("name", "positive", "negative")}
+    for name, word in joint.items():
+        if not isinstance(word, str):
+            raise _other_form(file, ".".join((*device, "joint", name)), word, "a text")
+    return Joint(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
+
+
+def _ending(file: Path, document: Mapping[str, Any]) -> str:
+    """Return why a run stopped before its end, empty where it did not."""
+    status = _under(file, document, "status")
+    message = one_line(status.get("message", ""))[:_LONGEST_REMARK]
+    return "" if status.get("kind", "completed") == "completed" else message
+
+
+def _positive(file: Path, document: Mapping[str, Any], wanted: str, *keys: str) -> float | None:
+    """Return the number above 0 at some keys of a file's document, None where it has none; ``wanted`` is what it is."""
+    table = _under(file, document, *keys[:-1])
+    if keys[-1] not in table:
+        return None
+    value = table[keys[-1]]
+    # JSON has true and false, which Python takes for 1 and 0.
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < _LARGEST:
+        raise _other_form(file, ".".join(keys), value, wanted)
+    return float(value)
+
+
+def _under(file: Path, document: Mapping[str, Any], *keys: str) -> Mapping[str, Any]:
+    """Return a table of a document, an empty one where there is none."""
+    for depth, key in enumerate(keys, start=1):
+        below = document.get(key, {})
+        if not isinstance(below, Mapping):
+            raise _other_form(file, ".".join(keys[:depth]), below, "a table")
+        document = below
+    return document
+
+
+def _other_form(file: Path, path: str, given: object, wanted: str) -> DataError:
+    """Return the error of a value at a dotted path of a file that is not what is ``wanted`` there."""
+    return DataError(f"{file}: {path} = {one_line(repr(given))[:_LONGEST_SHOWN]} must be {wanted}")

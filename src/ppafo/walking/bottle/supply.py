@@ -1,0 +1,221 @@
+"""The bottle of a walk file: its numbers, the gas behind its regulator, and what does not go with a bottle."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from ppafo.constants import GRAMS_PER_KILOGRAM
+from ppafo.errors import ParameterError, ScenarioError, refused_as
+from ppafo.model.cold_gas import Isobar, SupplyNow, SupplyState, following_rates, isobar, supply_now
+from ppafo.model.declaration import Quantity
+from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_density
+from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
+from ppafo.parameters.device import Device
+from ppafo.parameters.parameter_set import Entry
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, quantity_text, value_at
+from ppafo.simulation.scenario import SupplyLine
+from ppafo.units import format_quantity, to_si
+
+BOTTLE = "bottle"
+BOTTLE_NAME = f"{BOTTLE}.name"
+FILL = Quantity("fill", "1", "gas in the bottle over a full one's", 1.0, 0.0, 1.0, minimum_allowed=False)
+TEMPERATURE = Quantity("temperature", "K", "temperature of bottle, regulator and hose at the start", None, 200.0, 400.0)
+LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over that at the set pressure", 0.9, 0.0, 1.0)
+COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
+_SET_PRESSURE = "regulator.set_pressure"
+BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}": path for path in PATHS}
+"""What an override may set of the bottle's own file, ``bottle.volume`` and ``bottle.regulator.area``, by its path."""
+
+BOTTLE_NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
+
+_FOLLOWS = {
+    "content": f"set {BOTTLE}.gas_mass higher, or {BOTTLE}.content_heat_transfer lower",
+    "wall": f"set {BOTTLE}.wall_heat_capacity higher",
+    "regulator": f"set {BOTTLE}.regulator.heat_capacity higher",
+    "hose": f"set {BOTTLE}.hose.heat_capacity higher",
+}
+"""What makes a part of the supply follow more slowly."""
+
+_OWN = tuple(f"{SUPPLY_LINE}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
+"""What the bottle's own regulator says instead."""
+
+_SAME_GAS = 1.0e-2
+"""Fraction by which the gas constants of bottle and device may differ: the same species from two sources."""
+_SAME_PRESSURE = 2.0e-3
+"""Fraction by which two pressures may differ that are said to be the same: rounding of units."""
+_FASTEST = 1.0e3
+"""Rate [1/s] up to which a walk follows what warms and cools: within a millisecond, the step of the lanes."""
+
+
+@dataclass(frozen=True, slots=True)
+class BottleSupply:
+    """The bottle that a walk hangs on, in SI: gas [kg] and temperature [K] at the start, ``coupling`` [s].
+
+    ``line`` are the properties of the gas behind its regulator, which is set to the supply pressure of the device.
+    ``least_torque`` is the torque over that at the set pressure [-] below which the walk ends.
+    """
+
+    bottle: Bottle
+    line: Isobar
+    mass: float
+    temperature: float
+    least_torque: float
+    coupling: float
+
+    def start(self) -> SupplyState:
+        """Return the state at the start: all parts at one temperature, no ice."""
+        energy = content_energy(self.bottle.fluid.table, self.mass, self.bottle.volume, self.temperature)
+        return SupplyState(
+            mass=self.mass,
+            energy=energy,
+            wall_temperature=self.temperature,
+            body_temperature=self.temperature,
+            hose_temperature=self.temperature,
+            ice=0.0,
+            outflow=0.0,
+            delivered=0.0,
+            room_heat=0.0,
+        )
+
+    def offers(self, state: SupplyState, near: float, mass: float) -> SupplyNow:
+        """Return what the supply offers in a state whose content is ``near`` a temperature [K].
+
+        ``mass`` [kg] is what the device drew in the last coupling.
+        """
+        return supply_now(self.bottle.fluid.table, self.line, self.bottle.supply, state, near, mass)
+
+    def offers_first(self) -> SupplyNow:
+        """Return what the supply offers the device at the start."""
+        return self.offers(self.start(), self.temperature, 0.0)
+
+    def fed(self, line: SupplyLine) -> SupplyLine:
+        """Return the lines with the droop of the bottle's regulator, and with what it passes at the start."""
+        droop, most = self.bottle.regulator.droop, self.offers_first().largest_flow
+        return replace(line, plantarflexion=replace(line.plantarflexion, droop=droop, largest_flow=most))
+
+    @property
+    def assumed(self) -> dict[str, str]:
+        """Return the values of the bottle that no source gives, by path, with the reason for each."""
+        return {
+            f"{BOTTLE}.{path}": f"{format_quantity(entry.value, entry.unit)}, assumed: {entry.source}"
+            for path, entry in self.bottle.entries.items()
+            if entry.origin == "assumed"
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data in SI units, with the source of each value."""
+        return {
+            "name": self.bottle.name,
+            "title": self.bottle.title,
+            "gas_mass": self.mass,
+            "temperature": self.temperature,
+            "least_torque": self.least_torque,
+            "coupling": self.coupling,
+            "values": {path: entry.model_dump() for path, entry in self.bottle.entries.items()},
+        }
+
+
+def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply | None:
+    """Return the bottle of a walk file, None where it has none; ScenarioError or ParameterError for a mistake."""
+    section = value_at(reading.document, BOTTLE)
+    if section is None:
+        return None
+    if not isinstance(section.get("name"), str):
+        raise ScenarioError(
+            f"{reading.file}: '{BOTTLE_NAME}' is missing: the name of a bottle, or the path of its file"
+        )
+    own = section.get("overrides", ())
+    if any(text.partition("=")[0].strip() == _SET_PRESSURE for text in own):
+        raise ScenarioError(
+            f"{reading.file}: {BOTTLE}.{_SET_PRESSURE}: in a walk the bottle's regulator is set to supply.pressure; "
+            f"set that"
+        )
+    with refused_as(ParameterError, f"{reading.file}: [{BOTTLE}]", ParameterError):
+        name = section["name"]
+        path = Path(name)
+        is_file = path.suffix == ".toml" or is_of_catalogue(path)
+        bottle = load_bottle(folder / path if is_file and not path.is_absolute() else name, own)
+    pressure, stated = device.supply.pressure, bottle.entries[_SET_PRESSURE]
+    # Gauge is the same at both: a bottle's file knows no atmosphere, and stands in that of the device.
+    own_pressure = to_si(stated.value, stated.unit, "Pa_a", device.supply.atmospheric_pressure)
+    # A bottle of the package is set to the paper's pressure, which says nothing of this walk; a user's file does.
+    if path.suffix == ".toml" and abs(own_pressure - pressure) > _SAME_PRESSURE * pressure:
+        room = device.supply.atmospheric_pressure
+        raise ScenarioError(
+            f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
+            f"{quantity_text(own_pressure, 'Pa_a', room)}, and supply.pressure is "
+            f"{quantity_text(pressure, 'Pa_a', room)}: give both the same"
+        )
+    # The bottle with its regulator set to the supply pressure of the device, in its entries too.
+    entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
+    regulator = bottle.regulator._replace(set_pressure=pressure)
+    bottle = replace(bottle, regulator=regulator, entries={**bottle.entries, _SET_PRESSURE: entry})
+    numbers = _numbers(reading, section, bottle)
+    line = isobar(bottle.fluid.table, bottle.regulator.set_pressure)
+    supply = BottleSupply(
+        bottle,
+        line,
+        numbers["fill"] * bottle.mass,
+        # The order of BOTTLE_NUMBERS is that of the fields after the mass.
+        *(numbers[quantity.name] for quantity in BOTTLE_NUMBERS if quantity is not FILL),
+    )
+    _check(reading, device, supply)
+    return supply
+
+
+def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
+    """Return the numbers of the section; the bottle starts at the temperature of the room unless one is given."""
+    room = replace(TEMPERATURE, default=bottle.room_temperature)
+    items = (
+        room if quantity is TEMPERATURE and TEMPERATURE.name not in section else quantity for quantity in BOTTLE_NUMBERS
+    )
+    numbers = {quantity.name: reading.number(f"{BOTTLE}.{quantity.name}", quantity) for quantity in items}
+    nodes = bottle.fluid.table.temperatures
+    if not nodes[0] < numbers["temperature"] <= nodes[-1]:
+        known = f"must be above {nodes[0]:g} K and at most {nodes[-1]:g} K, where {bottle.fluid.name} is known"
+        raise reading.refusal(f"{BOTTLE}.temperature", known)
+    mass, table = numbers["fill"] * bottle.mass, bottle.fluid.table
+    most = bottle.volume * (liquid_density if has_liquid(table) else densest_gas)(table, numbers["temperature"])
+    if mass >= most:
+        fits = f"{GRAMS_PER_KILOGRAM * most:.4g} g fit into it at {numbers['temperature']:g} K"
+        raise ScenarioError(
+            f"{reading.file}: [{BOTTLE}]: {GRAMS_PER_KILOGRAM * mass:.4g} g of {bottle.fluid.name}, and {fits}: set "
+            f"{BOTTLE}.fill or {BOTTLE}.temperature lower, or {BOTTLE}.volume higher"
+        )
+    return numbers
+
+
+def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
+    """Refuse what does not go with a bottle."""
+    fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
+    if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:
+        raise reading.refusal(
+            BOTTLE_NAME,
+            f"holds {fluid.name}, and the device is fed with {device.gas.species}: set gas.species={fluid.name}, or "
+            f"take a bottle of {device.gas.species}",
+        )
+    if device.supply.relieving:
+        raise ScenarioError(f"{reading.file}: supply.relieving: no gas goes back into a bottle; set it to false")
+    if kind_at(reading.document, "gas_model") == THERMAL:
+        raise reading.refusal("gas_model.kind", "goes with gas that arrives at room temperature, not with a bottle")
+    for path in _OWN:
+        if value_at(reading.document, path) is not None:
+            raise reading.refusal(path, f"the bottle's regulator has its own: set {BOTTLE}.regulator.droop or .area")
+    # Refuse a bottle of so little gas, or parts of so little heat capacity, that they follow within no time.
+    flow = supply.offers_first().largest_flow
+    rates = following_rates(supply.bottle.fluid.table, supply.line, supply.bottle.supply, supply.mass, flow)
+    fastest = max(rates, key=rates.__getitem__)
+    if rates[fastest] > _FASTEST:
+        raise reading.refusal(
+            BOTTLE_NAME,
+            f"the temperature of its {fastest} follows within {1.0e3 / rates[fastest]:.3g} ms, and a walk follows what "
+            f"takes {1.0e3 / _FASTEST:g} ms or more: {_FOLLOWS[fastest]}",
+        )
+    pressure = supply.offers_first().content.pressure
+    if pressure < regulator.set_pressure + regulator.pressure_margin:
+        has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
+        needs = quantity_text(
+            regulator.set_pressure + regulator.pressure_margin, "Pa_a", device.supply.atmospheric_pressure
+        )
+        raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, and its regulator needs {needs}")
