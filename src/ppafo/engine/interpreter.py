@@ -68,6 +68,10 @@ class PythonProgram:
         clock: tuple[Any, ...],
         goes_on: bool,
     ) -> None:
+        """Run the loop over steps on lanes made of the rows, and write their states back.
+
+        With ``goes_on``, operations that Python refuses give what compiled code gets.
+        """
         program = self._program
         lanes = PythonLanes(program, states, parameters, *arrays)
         links = SimpleNamespace(links={}, effects={})
@@ -194,6 +198,7 @@ class Linked:
         return self._made[module]
 
     def _function(self, function: FunctionType) -> Any:
+        """A copy of a function whose names stand for what the program has; the function itself where none differs."""
         if not function.__module__.startswith(OWN) and not self._goes_on and function not in self._effects:
             return function
         if function not in self._made:

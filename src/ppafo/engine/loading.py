@@ -46,6 +46,10 @@ def compilers_to_try() -> tuple[Compiler, ...]:
 
 @lru_cache(maxsize=8)
 def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
+    """Return the compilers to try: the one of a name, or those of this computer that are not noted to have failed.
+
+    SimulationError for a name that is none, and where any of C was asked for and none is there.
+    """
     if name == PYTHON:
         return ()
     if name in OFFERED:
@@ -103,6 +107,10 @@ def runs_by_python() -> bool:
 
 @lru_cache(maxsize=64)
 def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType | None:
+    """Return the module of a text by the first of some compilers that works; None where none does.
+
+    SimulationError, or ProgramError for a law without C, where ``PPAFO_BACKEND`` names one that does not do.
+    """
     if not compilers:
         return None
     compiler, *others = compilers

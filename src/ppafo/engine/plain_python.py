@@ -92,6 +92,7 @@ def check_grammar(tree: ast.FunctionDef, file: str) -> None:
 
 
 def _problem(node: ast.AST) -> str:
+    """Why a part of a syntax tree cannot be compiled, and what to write instead; empty where it can."""
     if type(node) not in _PLAIN:
         word = _WORDS.get(type(node), f"'{type(node).__name__}'")
         return f"{word} cannot be compiled; {_INSTEAD}"

@@ -417,6 +417,7 @@ class SourceCollector:
         return self._add(self.links.get(function, function))
 
     def _add(self, item: Any) -> str:
+        """Add the function or NamedTuple class itself, not what it is linked to. ProgramError where it cannot be."""
         if not is_row(item):
             check_is_plain(item)
         name = emitted_name(item)

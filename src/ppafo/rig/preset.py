@@ -119,6 +119,7 @@ class PresetValue(StrictTable):
 
 @functools.cache
 def _layout() -> type[BaseModel]:
+    """Return the layout of a preset file: what it says of itself, and a table for each section of ``SECTIONS``."""
     fields: dict[str, Any] = {
         "schema_version": (Literal[1], Field(description="version of this layout")),
         "name": (str, Field(description="name of the preset")),

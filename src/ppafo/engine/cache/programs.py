@@ -27,6 +27,7 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
 
 
 def _import_program(wanted: Wanted) -> ModuleType:
+    """Return the module of a program from the cache, or compile it; a warning says why where it is not kept."""
     folder = cache_folder()
     # Loading runs what lies there, so the folder is looked at each time, not once for the process.
     why_not = refusal(folder)

@@ -153,6 +153,7 @@ def effect_problem(effect: Effect) -> str:
 
 
 def _problems(effect: Effect) -> Iterator[str]:
+    """What is wrong with the declaration of an effect: each as a clause behind its name."""
     if not effect.name.isidentifier():
         yield "its name is the parameter by which laws take its parameters, and must be an identifier"
     if effect.always and (effect.switch or effect.is_of_device):
@@ -172,6 +173,7 @@ def _problems(effect: Effect) -> Iterator[str]:
 
 
 def _problems_of_switch(effect: Effect) -> Iterator[str]:
+    """What is wrong with an effect that can be off: its switch and its defaults."""
     for item in effect.quantities:
         if item.default is None:
             yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"
