@@ -50,12 +50,15 @@ class Conflict:
 
 def _groups(work: Work) -> Iterator[tuple[str, list[slice]]]:
     """Return sensors, recordings, channels of recordings and further groups, none of them twice nor the whole."""
-    labels = [(one.channel, one.recording, f"{one.channel} of {one.recording}", *one.groups) for one in work.blocks]
-    seen = {tuple((one.rows.start, one.rows.stop) for one in work.blocks)}
+    labels = [
+        (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
+        for block in work.blocks
+    ]
+    seen = {tuple((block.rows.start, block.rows.stop) for block in work.blocks)}
     for column in zip(*labels, strict=True):
         for name in dict.fromkeys(column):
-            rows = [one.rows for one, label in zip(work.blocks, column, strict=True) if label == name]
-            key = tuple((one.start, one.stop) for one in rows)
+            rows = [block.rows for block, label in zip(work.blocks, column, strict=True) if label == name]
+            key = tuple((part.start, part.stop) for part in rows)
             if key not in seen:
                 seen.add(key)
                 yield name, rows
@@ -78,13 +81,13 @@ def conflict_of(work: Work, rows: Floats, point: Floats, free: Flags, freedom: f
     root, seen = root_of_inverse(slopes.T @ slopes + np.diag(prior))
     root = root[:, seen]
     variance = np.square(root).sum(axis=1)
-    groups, found = list(_groups(work)), None
-    names = np.array([one.name for one in work.numbers])[free]
+    groups, worst = list(_groups(work)), None
+    names = np.array([number.name for number in work.numbers])[free]
     count_of_tests = len(groups) + int((prior > 0.0).sum())
-    for name, own in groups:
-        part = np.concatenate([slopes[one] for one in own])
-        pull = part.T @ np.concatenate([errors[one] for one in own]) + prior * shift
-        alone, turned = np.linalg.eigh(root.T @ (part.T @ part + np.diag(prior)) @ root)
+    for name, parts in groups:
+        group = np.concatenate([slopes[part] for part in parts])
+        pull = group.T @ np.concatenate([errors[part] for part in parts]) + prior * shift
+        alone, turned = np.linalg.eigh(root.T @ (group.T @ group + np.diag(prior)) @ root)
         # In other directions the group is nearly all that is known, or says nothing: both differences are 0 over 0.
         tested = (alone > 1.0e-6) & (alone < 1.0 / (1.0 + _PARTING))
         count = int(tested.sum())
@@ -94,30 +97,30 @@ def conflict_of(work: Work, rows: Floats, point: Floats, free: Flags, freedom: f
         along = axes.T @ pull
         statistic = float(np.sum(np.square(along) / (alone * (1.0 - alone))))
         p = min(float(fisher.sf(statistic / count, count, freedom)) * count_of_tests, 1.0)
-        if p < _SIGNIFICANCE and (found is None or p < found.p):
+        if p < _SIGNIFICANCE and (worst is None or p < worst.p):
             moved = np.abs(axes @ (along / alone))
             spread = np.sqrt(np.square(axes) @ (1.0 / alone - 1.0))
             # A number of which the group says nothing moves by rounding alone. Along one direction all part as far.
             ratios = np.where(spread > 1.0e-6 * np.sqrt(variance), moved / np.maximum(spread, 1.0e-300), 0.0)
             most = int(np.argmax(ratios > (1.0 - 1.0e-6) * ratios.max()))
-            found = Conflict(group=name, number=str(names[most]), standard_errors=float(ratios[most]), p=p)
+            worst = Conflict(group=name, number=str(names[most]), standard_errors=float(ratios[most]), p=p)
     # What is stated of a tolerance is a group of its own: its mean parts from the fit by deviation^2 - C.
     own_variance = 1.0 / np.maximum(prior, 1.0e-300) - variance
-    for place in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
-        ratio = abs(float(shift[place])) / math.sqrt(float(own_variance[place]))
+    for index in np.flatnonzero((prior > 0.0) & (own_variance >= _PARTING * variance)).tolist():
+        ratio = abs(float(shift[index])) / math.sqrt(float(own_variance[index]))
         p = min(2.0 * float(student.sf(ratio, freedom)) * count_of_tests, 1.0)
-        if p < _SIGNIFICANCE and (found is None or p < found.p):
-            found = Conflict(group=STATED, number=str(names[place]), standard_errors=ratio, p=p)
-    families = np.array([one.family for one in work.numbers])[free]
+        if p < _SIGNIFICANCE and (worst is None or p < worst.p):
+            worst = Conflict(group=STATED, number=str(names[index]), standard_errors=ratio, p=p)
+    families = np.array([number.family for number in work.numbers])[free]
     for family in dict.fromkeys(families[prior > 0.0].tolist()):
         members = np.flatnonzero((families == family) & (prior > 0.0))
-        if family and len(members) > 1 and found is None:
-            found = _of_family(
+        if family and len(members) > 1 and worst is None:
+            worst = _of_family(
                 names[members],
                 shift[members] * np.sqrt(prior[members]),
                 root[members] * np.sqrt(prior[members])[:, None],
             )
-    return found
+    return worst
 
 
 def _of_family(names: NDArray[np.str_], moved: Floats, root: Floats) -> Conflict | None:

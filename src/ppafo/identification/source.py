@@ -79,10 +79,10 @@ def double_use(uses: Iterable[Use], others: Iterable[Use] | None = None) -> str:
     """
     known = [(use, _digest(use.recording)) for use in uses]
     more = None if others is None else [(use, _digest(use.recording)) for use in others]
-    for (one, digest), (other, second) in combinations(known, 2) if more is None else product(known, more):
-        if digest == second and one.overlaps(other):
+    for (use, digest), (other, other_digest) in combinations(known, 2) if more is None else product(known, more):
+        if digest == other_digest and use.overlaps(other):
             return (
-                f"{one.by} ({one.trace}) and {other.by} ({other.trace}) are the same recording, sha256 {digest[:12]} "
+                f"{use.by} ({use.trace}) and {other.by} ({other.trace}) are the same recording, sha256 {digest[:12]} "
                 f"of its numbers: its samples would count twice"
             )
     return ""
@@ -254,13 +254,13 @@ def check_no_wrong_reading(
     if values.size < _FEWEST_ALIKE:
         return
     # By the usual size, not the range, which one wrong reading would stretch.
-    sizes = [float(np.median(np.abs(one[used]))) or 1.0 for one in drivers]
-    points = np.stack([one[used] / size for one, size in zip(drivers, sizes, strict=True)], axis=1)
+    sizes = [float(np.median(np.abs(driver[used]))) or 1.0 for driver in drivers]
+    points = np.stack([driver[used] / size for driver, size in zip(drivers, sizes, strict=True)], axis=1)
     _, nearest = cKDTree(points).query(points, k=_ALIKE + 1)
-    own = nearest == np.arange(values.size)[:, None]
+    is_itself = nearest == np.arange(values.size)[:, None]
     # Of more readings in one place a reading may not be among its own nearest.
-    own[~own.any(axis=1), -1] = True
-    around = np.sort(values[nearest[~own].reshape(-1, _ALIKE)], axis=1)
+    is_itself[~is_itself.any(axis=1), -1] = True
+    around = np.sort(values[nearest[~is_itself].reshape(-1, _ALIKE)], axis=1)
     middle = np.median(around, axis=1)
     away = np.abs(values - middle)
     spread = np.minimum(np.ptp(around[:, 1:], axis=1), np.ptp(around[:, :-1], axis=1))
@@ -268,11 +268,11 @@ def check_no_wrong_reading(
     wrong = np.flatnonzero(away > 3.0 * spread + least)
     if wrong.size:
         first = int(wrong[np.argmax(away[wrong])])
-        ends = np.cumsum([len(one.recording) for one in sources])
+        ends = np.cumsum([len(source.recording) for source in sources])
         at = int(np.searchsorted(ends, places[first], side="right"))
         begins = int(ends[at]) - len(sources[at].recording)
         samples = [int(place) - begins for place in places[wrong] if begins <= place < ends[at]]
-        samples.sort(key=lambda one: one != places[first] - begins)
+        samples.sort(key=lambda sample: sample != places[first] - begins)
         _refuse_outlier(sources[at], procedure, name, samples, float(values[first]), float(middle[first]))
 
 
@@ -284,7 +284,7 @@ def usual_range(values: Floats) -> float:
 def _refuse_outlier(
     source: Source, procedure: str, name: str, samples: list[int], value: float, around: float
 ) -> NoReturn:
-    more = f", and so are samples {', '.join(str(one + 1) for one in samples[1:4])}" if samples[1:] else ""
+    more = f", and so are samples {', '.join(str(sample + 1) for sample in samples[1:4])}" if samples[1:] else ""
     raise IdentificationError(
         f"{source.name}: {procedure}: '{name}' is {_shown(source, name, value)} at sample {samples[0] + 1}, where its "
         f"neighbours are at {_shown(source, name, around)}: a wrong reading{more}; correct it or leave it out"
@@ -322,23 +322,23 @@ def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
 
 def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
     """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
-    found = []
+    remarks = []
     for source in sources:
         gap = longest_gap(source.recording.time)
         if gap is not None:
-            found.append(f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}")
+            remarks.append(f"{source.name} has no reading for {gap.duration:.4g} s after sample {gap.index + 1}")
         for name in source.recording.names:
             if name in _NO_SENSORS:
                 continue
             values = source.recording[name]
-            found += [
-                f"{source.name}: '{name}' stays at {_shown(source, name, item.value)} for {item.count} "
-                f"samples, from sample {item.first + 1}: a limit of the sensor?"
-                for item in plateaus(values)
+            remarks += [
+                f"{source.name}: '{name}' stays at {_shown(source, name, plateau.value)} for {plateau.count} "
+                f"samples, from sample {plateau.first + 1}: a limit of the sensor?"
+                for plateau in plateaus(values)
                 # Values that scatter elsewhere do not stay at an extreme for long by themselves.
-                if is_at_limit(values, item) or (item.count >= FEWEST_AT_LIMIT and scatters(values))
+                if is_at_limit(values, plateau) or (plateau.count >= FEWEST_AT_LIMIT and scatters(values))
             ]
-    return tuple(found)
+    return tuple(remarks)
 
 
 def pool(sources: tuple[Source, ...], name: str) -> Floats:

@@ -52,11 +52,11 @@ def linear_at(work: Work, point: Floats, left: Floats, slopes: Floats) -> tuple[
         known, scaled = {}, np.column_stack([left, slopes, common]) / noise[:, None]
         rows = np.column_stack([scaled, own_numbers])
         for channel in work.channels:
-            own = work.rows_of(channel)
-            kind = noise_of([series[one] / noise[one, None] for one in own], work.memory, work.is_motion)
+            of_channel = work.rows_of(channel)
+            kind = noise_of([series[part] / noise[part, None] for part in of_channel], work.memory, work.is_motion)
             known[channel] = replace(kind, deviation=sizes[channel])
-            for one in own:
-                rows[one] = whiten(rows[one], kind)
+            for part in of_channel:
+                rows[part] = whiten(rows[part], kind)
         # With D = U S V' the covariance is 1 + D D', and 1 - U (1 - 1 / sqrt(1 + S^2)) U' makes it 1.
         axes, triangle = np.linalg.qr(rows[:, 1 + len(point) :])
         turned, spread, _ = np.linalg.svd(triangle)
@@ -92,8 +92,8 @@ def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
 def whitened_errors(work: Work, left: Floats, linear: Linear) -> Floats:
     """Return residuals [SI] (rows, points) as independent errors [-], by the noise of a linear problem."""
     scaled = left / linear.noise[:, None]
-    kinds = {channel: replace(one, deviation=1.0) for channel, one in linear.sensors.items()}
-    errors = np.concatenate([whiten(scaled[one.rows], kinds[one.channel]) for one in work.blocks])
+    kinds = {channel: replace(noise, deviation=1.0) for channel, noise in linear.sensors.items()}
+    errors = np.concatenate([whiten(scaled[block.rows], kinds[block.channel]) for block in work.blocks])
     return np.asarray(errors - linear.shared @ (linear.shared.T @ errors))
 
 

@@ -14,7 +14,6 @@ from ppafo.errors import ParameterError, PpafoError, UnitError, nearest_name, on
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
-from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of
 from ppafo.parameters.graph import ATMOSPHERE_PATH, acting
 from ppafo.parameters.parameter_set import (
     SOURCE,
@@ -236,7 +235,11 @@ def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> 
 def _in_conductance(override: Override) -> str:
     """Return Cv, Kv or a nominal flow as the two settings that say it; nothing for any other value."""
     section, _, name = override.typed.rpartition(".")
-    conductance = conductance_of(name.lower(), override.text) if name.lower() in ("cv", "kv", "qn") else None
+    if name.lower() not in ("cv", "kv", "qn"):
+        return ""
+    from ppafo.parameters.flow_coefficients import USUAL_CRITICAL_RATIO, conductance_of  # few valves are given so
+
+    conductance = conductance_of(name.lower(), override.text)
     if conductance is None:
         return ""
     return (

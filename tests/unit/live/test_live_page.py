@@ -54,8 +54,8 @@ def test_the_same_scenarios_give_the_same_page(file: Path) -> None:
 
 
 def test_every_default_of_the_page_is_what_its_text_says() -> None:
+    from ppafo.page.content import Simulated, program_content
     from ppafo.page.wasm import module_of
-    from ppafo.page.workbench import Simulated, program_content
 
     for name in DEFAULT:
         scenario = load_walk(name) if name in list_walks() else load_scenario(name)
