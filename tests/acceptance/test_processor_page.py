@@ -11,7 +11,7 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.processor.catalog import CATALOG, TARGETS
-from ppafo.processor.simulators import missing_tools
+from ppafo.processor.images import missing_tools
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 

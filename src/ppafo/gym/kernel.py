@@ -11,7 +11,8 @@ from ppafo.engine.entries import ARRAY, ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INLIN
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED
 from ppafo.engine.lanes import SIGNAL_ROWS
-from ppafo.engine.loop_text import Call, RowsOfLanes, lane_loop
+from ppafo.engine.loop_rows import Call, RowsOfLanes
+from ppafo.engine.loop_text import lane_loop
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.pneumatics import HeldChambers
@@ -150,9 +151,9 @@ def _lines_of_observing(step: StepText, rows: RowsOfLanes, task: Task) -> list[s
     """Return the lines that sense, observe and judge the environment of a lane, where it is a chosen one."""
     add, parts = step.collector.add, step.parts
     names = {name: name for name in ("now", "error_weight", "gas_weight", "steps_in_all")}
-    filled = rows.called(Call(step.phase(fill_signals), {"slot": "slot"})) if parts.late_signals else ["pass"]
-    held = rows.called(Call(step.phase(hold_chambers), {})) if parts.hands_chambers_on else []
-    readings = rows.called(Call(step.phase(remember_readings), names)) if parts.late_readings else []
+    filled = rows.for_lane(Call(step.phase(fill_signals), {"slot": "slot"})) if parts.late_signals else ["pass"]
+    held = rows.for_lane(Call(step.phase(hold_chambers), {})) if parts.hands_chambers_on else []
+    readings = rows.for_lane(Call(step.phase(remember_readings), names)) if parts.late_readings else []
     within_bounds = [
         f"{rows.cells[path]} = {add(within)}({rows.cells[path]}, bounds[0, {row}], bounds[1, {row}])"
         for row, path in enumerate(task.observed_paths)
@@ -170,6 +171,6 @@ def _lines_of_observing(step: StepText, rows: RowsOfLanes, task: Task) -> list[s
         *indent(indent(filled)),
         f"now = {add(Now)}(step, sample, 1.0, 0, 0, late, 0, sample % slots, slots)",
         *readings,
-        *rows.called(Call(step.phase(observe, {"task": task}), names)),
+        *rows.for_lane(Call(step.phase(observe, {"task": task}), names)),
         *within_bounds,
     ]

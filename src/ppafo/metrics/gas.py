@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt
-from ppafo.model.columns import Number, choose
+from ppafo.model.columns import Numeric, choose
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import Course, MeterKind, Sample
@@ -20,13 +20,13 @@ def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunct
     return gains[0] if function is None else float(function(*gains))
 
 
-def gas_imbalance(supplied: Number, vented: Number, mass_1: Number, mass_2: Number) -> Number:
+def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: Numeric) -> Numeric:
     """Supplied less vented less stored gas [kg]; what a simulation loses or invents, near 0 for a sound one."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
     return supplied - vented - (mass_1 + mass_2)
 
 
-def energy_imbalance(supplied: Number, vented: Number, heat: Number, work: Number, stored: Number) -> Number:
+def energy_imbalance(supplied: Numeric, vented: Numeric, heat: Numeric, work: Numeric, stored: Numeric) -> Numeric:
     """Enthalpy supplied less vented, and heat, less work and stored energy [J]; what a simulation loses or invents."""
     return supplied - vented + heat - work - stored
 

@@ -11,11 +11,15 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-Number = TypeVar("Number", float, NDArray[np.float64])
-"""A float, or an array of them: what a function of plain arithmetic takes and gives back."""
+Numeric = TypeVar("Numeric", float, NDArray[np.float64])
+"""A float, or an array (runs,) of them: what a function of plain arithmetic takes and gives back."""
 Result = TypeVar("Result")
+"""What a function of floats returns."""
 Problem = tuple[Any, Callable[[int], str]]
-"""What may be wrong with a run: a truth value, or an array of them (runs,), and the line about one of the runs."""
+"""What may be wrong with runs: a truth value for all of them or an array (runs,), and the message about one of them.
+
+The message is made of the number of a run, from 0; it is one line, as an error shows it.
+"""
 
 
 def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
@@ -28,17 +32,18 @@ def over_runs(function: Callable[..., Result], *arguments: Any) -> Result:
         return function(*arguments)
     # A function that branches takes no arrays; one call for each distinct combination gives each run the bits that it
     # has alone.
-    distinct, places = _distinct(varied)
+    combinations, combination_of_run = _distinct(varied)
     results = []
-    for values in distinct:
+    for values in combinations:
         # Arrays give way to the numbers of one combination, in their order; all else is handed on as it is.
-        own = iter(values)
-        results.append(function(*(next(own) if isinstance(given, np.ndarray) else given for given in arguments)))
-    gathered: Result = _gather(results, places)
+        rest = iter(values)
+        single = [next(rest) if isinstance(argument, np.ndarray) else argument for argument in arguments]
+        results.append(function(*single))
+    gathered: Result = _gather(results, combination_of_run)
     return gathered
 
 
-def root(number: Number) -> Number:
+def root(number: Numeric) -> Numeric:
     """Square root of a number; element by element for a column."""
     return np.sqrt(number) if isinstance(number, np.ndarray) else math.sqrt(number)
 
@@ -62,16 +67,16 @@ def choose(test: Any, yes: Any, no: Any) -> Any:
     return np.where(test, yes, no) if isinstance(test, np.ndarray) else (yes if test else no)
 
 
-def truncated(number: Number) -> Number:
+def truncated(number: Numeric) -> Numeric:
     """A number from -2^63 to 2^63 without its fraction, as a float; element by element for a column."""
     return np.trunc(number) if isinstance(number, np.ndarray) else float(int(number))
 
 
-def rounded_up(number: Number) -> Number:
+def rounded_up(number: Numeric) -> Numeric:
     """The next whole number from a number on, as a float; element by element for a column."""
     # One expression for floats and columns, where math.ceil would give an int.
     part = truncated(number)
-    found: Number = choose(part < number, part + 1.0, part)
+    found: Numeric = choose(part < number, part + 1.0, part)
     return found
 
 
@@ -91,22 +96,22 @@ def first(number: Any) -> float:
 
 
 def _distinct(columns: Sequence[NDArray[np.float64]]) -> tuple[Iterable[Sequence[float]], NDArray[np.intp]]:
-    """The combinations of values that occur, and which of them each run has."""
+    """The combinations of values of columns (runs,) that occur, and the number of the one that each run has (runs,)."""
     if len(columns) == 1:
         # One column is sorted as numbers, several as rows, which takes many times longer.
-        values, places = np.unique(columns[0], return_inverse=True)
-        return values[:, None].tolist(), places
-    # Combinations are sorted only where there is a hope that some occur again.
+        values, value_of_run = np.unique(columns[0], return_inverse=True)
+        return values[:, None].tolist(), value_of_run
+    # Where most values of each column differ, hardly any combination occurs again: sorting saves nothing.
     if all(np.unique(column).size > column.size // 2 for column in columns):
         return np.stack(columns, axis=1).tolist(), np.arange(columns[0].size)
-    rows, places = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
-    return rows.tolist(), places.reshape(-1)
+    rows, row_of_run = np.unique(np.stack(columns, axis=1), axis=0, return_inverse=True)
+    return rows.tolist(), row_of_run.reshape(-1)
 
 
-def _gather(results: Sequence[Any], places: NDArray[np.intp]) -> Any:
-    first = results[0]
-    if not isinstance(first, tuple):
-        # Back from combinations to runs: each run gets the result of the combination that it has.
-        return np.array(results, dtype=np.float64)[places]
-    parts = [_gather([result[index] for result in results], places) for index in range(len(first))]
-    return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+def _gather(results: Sequence[Any], combination_of_run: NDArray[np.intp]) -> Any:
+    """The result of each run from those of the combinations: an array (runs,), or a tuple of them."""
+    first_result = results[0]
+    if not isinstance(first_result, tuple):
+        return np.array(results, dtype=np.float64)[combination_of_run]
+    parts = [_gather([result[index] for result in results], combination_of_run) for index in range(len(first_result))]
+    return type(first_result)(*parts) if hasattr(first_result, "_fields") else tuple(parts)

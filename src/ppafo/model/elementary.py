@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from ppafo.model.columns import Number
+from ppafo.model.columns import Numeric
 
 LOGARITHM_OF_2 = 0.6931471805599453
 _UPPER_PART = 0.693147180369123816490
@@ -77,7 +77,7 @@ def power(base: float, exponent: float) -> float:
     return exponential(exponent * logarithm(base))
 
 
-def sine_and_cosine(turns: Number) -> tuple[Number, Number]:
+def sine_and_cosine(turns: Numeric) -> tuple[Numeric, Numeric]:
     """Sine and cosine [-] of a number of turns or of an array of them, within 2e-16 for turns that are exact."""
     # To the nearest quarter turn, within which nine terms give all digits.
     quarters = np.rint(4.0 * turns)

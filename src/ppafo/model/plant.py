@@ -14,7 +14,7 @@ atmosphere and for a relieving supply, 0 for a supply with a check valve.
 
 from typing import NamedTuple
 
-from ppafo.model.columns import Number
+from ppafo.model.columns import Numeric
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
 from ppafo.model.ports import exhaust_path, supply_path
@@ -120,7 +120,7 @@ def joint_torque(plant: PlantParameters, _angle: float, pressure_1: float, press
     return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
 
 
-def gravity_torque(angle: Number, largest_torque: float) -> Number:
+def gravity_torque(angle: Numeric, largest_torque: float) -> Numeric:
     """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
@@ -174,41 +174,43 @@ def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pres
     return net_driving_torque(actuator, gravity, plant.external_torque)
 
 
-def chamber_1_volume(angle: Number, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Number:
+def chamber_1_volume(angle: Numeric, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Numeric:
     """Volume of chamber 1 [m^3], growing with the angle [rad]; equation (4) with a dead volume and a lower stop."""
     return dead_volume + displacement_per_radian * (angle - angle_min)
 
 
-def chamber_2_volume(angle: Number, angle_max: float, displacement_per_radian: float, dead_volume: float) -> Number:
+def chamber_2_volume(angle: Numeric, angle_max: float, displacement_per_radian: float, dead_volume: float) -> Numeric:
     """Volume of chamber 2 [m^3], shrinking with the angle [rad]; equation (5) with a dead volume and an upper stop."""
     return dead_volume + displacement_per_radian * (angle_max - angle)
 
 
-def chamber_volumes(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
+def chamber_volumes(plant: PlantParameters, angle: Numeric) -> tuple[Numeric, Numeric]:
     """Volumes of both chambers [m^3] at an angle [rad]. Equations (4), (5)."""
     volume_1 = chamber_1_volume(angle, plant.angle_min, plant.displacement_per_radian, plant.dead_volume_1)
     volume_2 = chamber_2_volume(angle, plant.angle_max, plant.displacement_per_radian, plant.dead_volume_2)
     return volume_1, volume_2
 
 
-def chamber_pressure(mass: Number, volume: Number, gas_product: float) -> Number:
+def chamber_pressure(mass: Numeric, volume: Numeric, gas_product: float) -> Numeric:
     """Absolute pressure [Pa] of ``mass`` [kg] in ``volume`` [m^3]; ``gas_product`` is R T / M [J/kg]. Equation (3)."""
     return mass * gas_product / volume
 
 
-def chamber_mass(pressure: float, volume: Number, gas_product: float) -> Number:
+def chamber_mass(pressure: float, volume: Numeric, gas_product: float) -> Numeric:
     """Mass [kg] that fills ``volume`` [m^3] at an absolute pressure [Pa]; the inverse of equation (3)."""
     return pressure * volume / gas_product
 
 
-def pressures_per_mass(plant: PlantParameters, angle: Number) -> tuple[Number, Number]:
+def pressures_per_mass(plant: PlantParameters, angle: Numeric) -> tuple[Numeric, Numeric]:
     """Pressures over masses [Pa/kg] of both chambers at an angle [rad], in one division, which costs ten products."""
     volume_1, volume_2 = chamber_volumes(plant, angle)
     per_volumes = plant.gas_product / (volume_1 * volume_2)
     return volume_2 * per_volumes, volume_1 * per_volumes
 
 
-def chamber_pressures(plant: PlantParameters, angle: Number, mass_1: Number, mass_2: Number) -> tuple[Number, Number]:
+def chamber_pressures(
+    plant: PlantParameters, angle: Numeric, mass_1: Numeric, mass_2: Numeric
+) -> tuple[Numeric, Numeric]:
     """Absolute pressures of both chambers [Pa]. Equation (3)."""
     per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
     return mass_1 * per_mass_1, mass_2 * per_mass_2

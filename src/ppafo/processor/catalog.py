@@ -3,7 +3,9 @@
 from collections.abc import Mapping
 
 from ppafo.errors import ScenarioError
-from ppafo.processor.simulators import Machine, Memory, MspdebugSimulator, QemuSimulator, Target
+from ppafo.processor.images import Machine, Memory, Target
+from ppafo.processor.mspdebug import MspdebugSimulator
+from ppafo.processor.qemu import QemuSimulator
 
 _VARIABLES = """\
 # Others do as well: make COMPILER="clang --target=arm-none-eabi" LINKER='$(COMPILER) -fuse-ld=lld',

@@ -12,14 +12,7 @@ from ppafo.errors import SimulationError
 from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
 from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, Readings, read
-from ppafo.processor.simulators import (
-    Decision,
-    Image,
-    ProcessorSimulator,
-    Sizes,
-    Target,
-    processor_simulator,
-)
+from ppafo.processor.images import Decision, Image, ProcessorSimulator, Sizes, Target, processor_simulator
 from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate

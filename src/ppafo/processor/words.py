@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.errors import ScenarioError
 from ppafo.processor.catalog import target_of
+from ppafo.processor.images import missing_tools
 from ppafo.processor.lock_step import (
     TRIED,
     Comparison,
@@ -16,7 +17,6 @@ from ppafo.processor.lock_step import (
     processor_figure,
     run_on_processor,
 )
-from ppafo.processor.simulators import missing_tools
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ppafo.errors import ScenarioError
-from ppafo.model.columns import Number, choose, larger, rounded_up, smaller, truncated
+from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.graph import Follows, Graph, Term
 from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_text, value_at
@@ -80,36 +80,36 @@ def links_of_times(document: Mapping[str, Any]) -> Graph:
     return found
 
 
-def step_unless_given(duration: Number, period: Number) -> Number:
+def step_unless_given(duration: Numeric, period: Numeric) -> Numeric:
     """The largest step [s] of a run where its file has none: no longer than the run or a sample of the controller."""
-    found: Number = smaller(smaller(duration, period), _LONGEST_STEP)
+    found: Numeric = smaller(smaller(duration, period), _LONGEST_STEP)
     return found
 
 
-def step_with_output(duration: Number, period: Number, output_interval: Number) -> Number:
+def step_with_output(duration: Numeric, period: Numeric, output_interval: Numeric) -> Numeric:
     """The largest step [s] of a run whose file has an output interval [s] and no step: no longer than that either."""
-    found: Number = smaller(step_unless_given(duration, period), output_interval)
+    found: Numeric = smaller(step_unless_given(duration, period), output_interval)
     return found
 
 
-def dividing_step(period: Number, step: Number) -> Number:
+def dividing_step(period: Numeric, step: Numeric) -> Numeric:
     """The largest step [s], up to one that is given, that divides the sample period."""
     # A quotient that rounding put above a whole number would make the step shorter than what is given.
-    found: Number = period / larger(1.0, rounded_up(period / step * (1.0 - _RELATIVE)))
+    found: Numeric = period / larger(1.0, rounded_up(period / step * (1.0 - _RELATIVE)))
     return found
 
 
-def output_unless_given(duration: Number, period: Number, step: Number) -> Number:
+def output_unless_given(duration: Numeric, period: Numeric, step: Numeric) -> Numeric:
     """The time [s] between two recorded samples where nobody says it: every step, or nearly so."""
-    found: Number = duration / larger(1.0, nearest_whole(duration / dividing_step(period, step)))
+    found: Numeric = duration / larger(1.0, nearest_whole(duration / dividing_step(period, step)))
     return found
 
 
-def nearest_whole(number: Number) -> Number:
+def nearest_whole(number: Numeric) -> Numeric:
     """The nearest whole number, the even one of two that are as near."""
     up = truncated(number + 0.5)
     is_odd_tie = (up - number == 0.5) & (0.5 * up != truncated(0.5 * up))
-    found: Number = choose(is_odd_tie, up - 1.0, up)
+    found: Numeric = choose(is_odd_tie, up - 1.0, up)
     return found
 
 

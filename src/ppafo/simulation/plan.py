@@ -22,7 +22,7 @@ from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
-    Number,
+    Numeric,
     Problem,
     at,
     choose,
@@ -414,10 +414,10 @@ def step_counts(duration: float, time_step: float, output_interval: float, perio
     )
 
 
-def nearly_whole(steps: Number) -> Number:
+def nearly_whole(steps: Numeric) -> Numeric:
     """A number of steps [-], to the whole number where it is one to rounding."""
     counted = truncated(steps + 0.5)
-    found: Number = choose(abs(steps - counted) <= WHOLE * steps, counted, steps)
+    found: Numeric = choose(abs(steps - counted) <= WHOLE * steps, counted, steps)
     return found
 
 

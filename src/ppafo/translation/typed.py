@@ -1,20 +1,31 @@
-"""What the typed walk finds in a composed module: terms and statements that say the same in every language."""
+"""A composed module with its types: terms and statements that mean the same in every language.
+
+The typed walk (``walk.py``) makes them of Python's syntax trees; writers of C, of expressions and of ranges read them.
+"""
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from ppafo.translation.value_types import FLOAT, Array, Items, Row, Scalar, Shared, Type, types_in
 
+FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
+"""Functions that every language has; those of a C library may come with them (``engine.compilers.LIBRARY``)."""
 _NONE: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
 class Term:
-    """A value: what makes it, its type, the terms that it is made of, and a name or number where it has one.
+    """A value. Its ``kind`` says what makes it, and with it what ``parts`` and ``detail`` are.
 
-    Kinds: number, name, field, item, build, call, choice, convert, negative, not, element (of an array), extent, part
-    (of an array, along its first places), and the signs and functions of ``SIGNS``, ``FUNCTIONS`` and ``LIBRARY``.
+    - number and name: no parts; the number, the local name.
+    - field and item: the row or tuple that has it; the field's name, the item's place.
+    - build: the values of a row or tuple in order. call: the arguments; the function's name.
+    - choice: the test, the value where it holds, the value where not. convert, negative, not: the one value.
+    - element: an array and an index for each of its places. part: an array and indexes of its first places.
+      extent: an array; which of its extents, from 0.
+    - a sign of arithmetic or comparison as Python writes it, ``and``, ``or``: the left and the right side.
+    - a function of ``FUNCTIONS`` or of the C library: its arguments.
     """
 
     kind: str
@@ -28,10 +39,6 @@ class Term:
         # Gathered once: asked again and again while scopes are found.
         names = frozenset((self.detail,)) if self.kind == "name" else _NONE
         return names.union(*(part.reads for part in self.parts)) if self.parts else names
-
-
-SIGNS = frozenset({"+", "-", "*", "/", "//", "%", "&", "|", "^", ">>", "<", "<=", ">", ">=", "==", "!=", "and", "or"})
-FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,21 +125,28 @@ class Note:
 Statement: TypeAlias = Note | Assign | Reserve | Store | If | Count | While | Leave | Return | Perform
 
 
+class Parameter(NamedTuple):
+    """A parameter of a function; a row without numbers is none."""
+
+    name: str
+    type: Type
+
+
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One function for one choice of types; ``source`` is its name in the composed module.
-
-    ``bound`` lists the functions that were handed over. What is empty is no parameter. ``returns`` None is nothing.
-    ``is_entry`` is true for one that returns nothing and is called from outside.
-    """
+    """One function for one choice of types."""
 
     name: str
     source: str
-    parameters: tuple[tuple[str, Type], ...]
+    """Its name in the composed module, which has it once for all types."""
+    parameters: tuple[Parameter, ...]
     returns: Type | None
+    """None where it returns nothing."""
     body: tuple[Statement, ...]
     bound: tuple[str, ...] = ()
+    """Which functions were handed over as arguments, each as ``NAME is FUNCTION``."""
     is_entry: bool = False
+    """True where it returns nothing and is called from outside."""
 
 
 @dataclass(slots=True)
@@ -160,7 +174,7 @@ def field_of(term: Term, name: str) -> Term:
     row = term.type.row if isinstance(term.type, Shared) else term.type
     assert isinstance(row, Row)
     # A field of a struct that is just made is the value it was made of: no struct need exist.
-    index = [own for own, _ in row.fields].index(name)
+    index = [field_name for field_name, _ in row.fields].index(name)
     return term.parts[index] if term.kind == "build" else Term("field", row.fields[index][1], (term,), name)
 
 

@@ -18,7 +18,7 @@ from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
 from ppafo.translation.scopes import Names, changed, needed
-from ppafo.translation.typed import FUNCTIONS, Function, Module, Statement, Term, converted
+from ppafo.translation.typed import FUNCTIONS, Function, Module, Parameter, Statement, Term, converted
 from ppafo.translation.value_types import (
     BOOL,
     FLOAT,
@@ -556,7 +556,7 @@ class _FunctionWalk:
                 raise self.refused(self.definition, problem)
         if self.writes is not None and self.returns is not None:
             raise self.refused(self.writes, f"'{self.definition.name}' returns a value and writes into an array")
-        kept = tuple((name, self.types[name]) for name in names if not is_empty(self.types[name]))
+        kept = tuple(Parameter(name, self.types[name]) for name in names if not is_empty(self.types[name]))
         bound = tuple(
             f"{name} is {kind.name}" for name, kind in zip(names, types, strict=True) if isinstance(kind, Handed)
         )

@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeAlias
 
 from ppafo.errors import ProgramError
 from ppafo.translation import typed
-from ppafo.translation.typed import Function, Module, Statement, Term
+from ppafo.translation.typed import Function, Module, Parameter, Statement, Term
 from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, Scalar, Type, types_in
 
 # Loops are gone through turn by turn: more would take long, and no fixed-point law has them.
@@ -227,7 +227,7 @@ class _Narrowing:
     def function(self) -> Function:
         """The function with its parameters, result and body in widths."""
         assert self.item.returns is not None
-        parameters = tuple((name, self.of_name(name, kind)) for name, kind in self.item.parameters)
+        parameters = tuple(Parameter(name, self.of_name(name, kind)) for name, kind in self.item.parameters)
         returns = self.type_of(self.item.returns, self.ranges.returned[self.item.name])
         return replace(self.item, parameters=parameters, returns=returns, body=self.block(self.item.body, returns))
 

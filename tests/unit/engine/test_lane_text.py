@@ -5,7 +5,8 @@ from typing import Any
 
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, lanes_of
-from ppafo.engine.loop_text import LoopText, RowsOfLanes
+from ppafo.engine.loop_rows import RowsOfLanes
+from ppafo.engine.loop_text import LoopText
 from ppafo.engine.program import Program
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import loop

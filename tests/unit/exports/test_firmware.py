@@ -14,16 +14,9 @@ from ppafo.errors import ProgramError, ScenarioError
 from ppafo.processor.catalog import CATALOG
 from ppafo.processor.firmware import firmware, fixed_point_controller, proof
 from ppafo.processor.fixed_point import Readings
+from ppafo.processor.images import Target, built, missing_tools, processor_simulator, read_image, sizes
 from ppafo.processor.lock_step import PythonProcessor, compare_drawn, drawn_readings, run_on_processor
-from ppafo.processor.simulators import (
-    QemuSimulator,
-    Target,
-    built,
-    missing_tools,
-    processor_simulator,
-    read_image,
-    sizes,
-)
+from ppafo.processor.qemu import QemuSimulator
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario

@@ -11,8 +11,9 @@ import pytest
 from ppafo.processor.catalog import CORTEX_M0
 from ppafo.processor.firmware import firmware, fixed_point_controller
 from ppafo.processor.fixed_point import Readings
+from ppafo.processor.images import built, missing_tools, read_image
 from ppafo.processor.lock_step import PythonProcessor
-from ppafo.processor.simulators import Debugger, built, missing_tools, read_image
+from ppafo.processor.qemu import Debugger
 from tests.unit.exports.test_firmware import scenario_of
 
 MISSING = missing_tools(CORTEX_M0)

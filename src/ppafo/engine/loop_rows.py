@@ -1,0 +1,247 @@
+"""Where the numbers of a step lie in the text of the loop: in rows of ``x`` for many runs, or under names for one.
+
+The writer of the loop (``loop_text.py``) asks these for each phase that is called, each question to all runs, and each
+function of ``lanes``.
+"""
+
+import ast
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import deepcopy
+from types import FunctionType
+from typing import NamedTuple, Protocol
+
+from ppafo.engine.entries import indent, parse_expression
+from ppafo.engine.generator import Composed, StepText
+from ppafo.engine.lane_rows import HANDED, lanes_of
+from ppafo.engine.reduction import HISTORIES, NUMBER, Slot, with_arguments
+from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
+from ppafo.errors import ProgramError
+
+
+class Call(NamedTuple):
+    """A call of a phase in a loop over lanes."""
+
+    phase: Composed
+    arguments: Mapping[str, str]
+    """The phase's own arguments as text, by their names."""
+
+    def text(self, number: str) -> str:
+        """The call for the lane of a number, with the groups that the phase is handed."""
+        handed = [number if name == NUMBER else name for name in self.phase.handed]
+        own = [self.arguments[name] for name in self.phase.effects.takes]
+        return f"{self.phase.name}({', '.join([*handed, *own])})"
+
+    def places(self, slot: Slot) -> list[str]:
+        """Where in its history the phase sets a number: all places as text, but that of the lane."""
+        arguments = {name: parse_expression(text) for name, text in self.arguments.items()}
+        return [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
+
+
+class Question(NamedTuple):
+    """A question to all runs: the lines before it, and the expression of its answer."""
+
+    lines: list[str]
+    answer: str
+
+
+class Rows(Protocol):
+    """Where the numbers of a step are, for the writer of the loop."""
+
+    def over_lanes(self, calls: Sequence[Call]) -> list[str]:
+        """Lines that call phases, one after the other, for each run."""
+
+    def any_of(self, condition: ast.expr, is_none: bool) -> Question:
+        """The question whether a condition on ``lane`` holds in any run, or with ``is_none`` in none."""
+
+    def action(self, method: str, arguments: Sequence[str]) -> list[str]:
+        """Lines for a function of ``lanes`` that does something: ``record``, ``set_aside`` or ``put_back``."""
+
+    def value(self, method: str, arguments: Sequence[str]) -> str:
+        """Expression for a function of ``lanes`` that gives something: ``traces`` or ``slot``."""
+
+    def heading(self, function: FunctionType) -> list[ast.stmt]:
+        """What stands before the statements of a function of the loop."""
+
+
+class RowsOfLanes:
+    """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, its parts.
+
+    One array for all of them lets the compiler see that no two rows overlap. From row ``aside`` on lies what lanes that
+    wait for others keep, where few do: the state, what was left of the step, and what it was handed.
+    """
+
+    def __init__(self, step: StepText, lanes: int = 0) -> None:
+        self.step = step
+        self.lanes = lanes or lanes_of(step.parts)
+        self.state_at = row_numbers(step.states)
+        self.parameter_at = row_numbers(step.parameters, len(self.state_at))
+        self.step_at = row_numbers(step.of_step, len(self.state_at) + len(self.parameter_at))
+        numbered = self.state_at | self.parameter_at | self.step_at
+        self.cells = {path: f"x[{row}, lane]" for path, row in numbered.items()}
+        self.aside = len(numbered)
+        # What was left of the step comes first: it says which lanes wait.
+        handed = [path for path in self.step_at if path.startswith(HANDED)]
+        self.kept = [*self.state_at, "remaining", *handed] if step.parts.parts_are_rare else []
+        self.count = self.aside + len(self.kept)
+
+    def load(self, group: str) -> str:
+        """Line that makes the group from its rows."""
+        return f"{group} = {row_expression(self.step.rows[group], group, self.cells, self.step.collector.add)}"
+
+    def over_lanes(self, calls: Sequence[Call]) -> list[str]:
+        """A loop over all lanes of the block."""
+        lines = [line for call in calls for line in self.for_lane(call)]
+        return _for_each_lane(lines or ["pass"])
+
+    def for_lane(self, call: Call) -> list[str]:
+        """Lines for one lane: what the phase asks for, the call, and what it returns in its rows.
+
+        ProgramError where it asks for a group that no phase before it has kept.
+        """
+        effects, rows = call.phase.effects, self.step.rows
+        for name in call.phase.handed:
+            if name not in rows and name not in (NUMBER, *HISTORIES):
+                raise ProgramError(f"{call.phase.name} asks for '{name}', which no phase before it has kept")
+        if not effects.results:
+            return []
+        is_one = len(effects.results) == 1
+        whole = effects.results[0] if is_one else call.phase.own
+        lines = [self.load(name) for name in call.phase.handed if name in rows]
+        lines.append(f"{whole} = {call.text('lane')}")
+        for group, fields in effects.groups.items():
+            for path in leaf_paths(rows[group], group):
+                changes = fields is None or path.split(".")[1].partition("[")[0] in fields
+                if changes and path in self.cells:
+                    lines.append(f"{self.cells[path]} = {path if is_one else f'{whole}.{path}'}")
+        for name, slot in effects.slots.items():
+            cell = f"{slot.history}[{', '.join(call.places(slot))}, lane]"
+            lines.append(f"{cell} = {name if is_one else f'{whole}.{name}'}")
+        return lines
+
+    def any_of(self, condition: ast.expr, is_none: bool) -> Question:
+        """A count of lanes: a sum of whole numbers is taken of several at once, a largest float is not."""
+        text = ast.unparse(_Cells(self.cells).visit(deepcopy(condition)))
+        lines = ["counted = 0", "for lane in range(width):", f"    counted += 1 if {text} else 0"]
+        return Question(lines, "counted == 0" if is_none else "counted > 0")
+
+    def action(self, method: str, arguments: Sequence[str]) -> list[str]:
+        """Lines that copy rows: to a sample of the record, aside for lanes that wait, or back again."""
+        actions: dict[str, Callable[..., list[str]]] = {
+            "record": self._record,
+            "set_aside": self._set_aside,
+            "put_back": self._put_back,
+        }
+        return actions[method](*arguments)
+
+    def _record(self, index: str) -> list[str]:
+        lanes = "1" if self.lanes == 1 else "record.shape[2]"
+        return [
+            "for row in range(record.shape[1]):",
+            f"    for lane in range({lanes}):",
+            f"        record[{index}, row, lane] = x[row, lane]",
+        ]
+
+    def _set_aside(self) -> list[str]:
+        copied = over_rows(len(self.state_at), f"x[{self.aside} + row, lane] = x[row, lane]")
+        return [*copied, *_for_each_lane(f"{aside} = {cell}" for cell, aside in self._kept_beside_state())]
+
+    def _put_back(self) -> list[str]:
+        states = len(self.state_at)
+        # A lane whose step was done when it was set aside has waited since.
+        goes_on = f"x[{self.aside + states}, lane] > 0.0"
+        copied = over_rows(states, f"x[row, lane] = x[row, lane] if {goes_on} else x[{self.aside} + row, lane]")
+        _, *handed = self._kept_beside_state()
+        lines = [f"{cell} = {cell} if {goes_on} else {aside}" for cell, aside in handed]
+        return [*copied, *(_for_each_lane(lines) if lines else [])]
+
+    def _kept_beside_state(self) -> list[tuple[str, str]]:
+        """Cells of what is kept beside the state, and those aside: first what was left of the step."""
+        cells = [(self.cells[path], f"x[{self.aside + index}, lane]") for index, path in enumerate(self.kept)]
+        return cells[len(self.state_at) :]
+
+    def value(self, method: str, arguments: Sequence[str]) -> str:
+        """Whether a sample is traced, and where its trace is kept: one with less room than samples keeps the last."""
+        index, trace_every = arguments
+        return f"{index} % {trace_every} == 0" if method == "traces" else f"{index} // {trace_every} % trace.shape[0]"
+
+    def heading(self, function: FunctionType) -> list[ast.stmt]:  # noqa: ARG002 - a protocol
+        """Nothing: no person reads this text."""
+        return []
+
+
+class RowsOfRun:
+    """Groups of a single run: NamedTuples under their own names, of which the outputs of a sample are a row, too."""
+
+    def __init__(self, step: StepText, outputs: str) -> None:
+        self.step, self.outputs = step, outputs
+
+    def over_lanes(self, calls: Sequence[Call]) -> list[str]:
+        """The bare calls, whose results get the names of their groups."""
+        lines: list[str] = []
+        for call in calls:
+            results, slots = call.phase.effects.results, call.phase.effects.slots
+            if not results:
+                continue
+            text = call.text("0")
+            if len(results) == 1:
+                lines.append(f"{results[0]} = {text}")
+                continue
+            whole = call.phase.own
+            lines.append(f"{whole} = {text}")
+            traced = [f"{whole}.{name}" for name, slot in slots.items() if slot.history == "trace"]
+            if traced:
+                lines += ["samples.before = samples.last", f"samples.last = {self.outputs}(0.0, {', '.join(traced)})"]
+            else:
+                lines += [f"{name} = {whole}.{name}" for name in results]
+            for name, slot in slots.items():
+                if slot.history != "trace":
+                    lines.append(f"{slot.history}[{', '.join(call.places(slot))}, 0] = {name}")
+        return lines or ["pass"]
+
+    def any_of(self, condition: ast.expr, is_none: bool) -> Question:
+        """The condition of the run itself."""
+        text = ast.unparse(_OfRun().visit(deepcopy(condition)))
+        return Question([], f"not {text}" if is_none else text)
+
+    def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - a protocol
+        """Nothing: a single run records nothing, and waits for no other."""
+        return ["pass"]
+
+    def value(self, method: str, arguments: Sequence[str]) -> str:  # noqa: ARG002 - a protocol
+        """That each sample is traced, and that its trace lies at the first place."""
+        return "True" if method == "traces" else "0"
+
+    def heading(self, function: FunctionType) -> list[ast.stmt]:
+        """The first line of the function's docstring."""
+        return [ast.Expr(ast.Constant((function.__doc__ or "").split("\n")[0]))]
+
+
+class _Cells(ast.NodeTransformer):
+    """Puts the cell of each number in the place of ``lane.GROUP.FIELD``."""
+
+    def __init__(self, cells: Mapping[str, str]) -> None:
+        self.cells = cells
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        path = ast.unparse(node).removeprefix("lane.")
+        return parse_expression(self.cells[path]) if path in self.cells else node
+
+
+class _OfRun(ast.NodeTransformer):
+    """Puts the name of a group in the place of ``lane.GROUP``."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        if isinstance(node.value, ast.Name) and node.value.id == "lane":
+            return ast.Name(node.attr, ast.Load())
+        self.generic_visit(node)
+        return node
+
+
+def over_rows(count: int, line: str) -> list[str]:
+    """A loop with a line for all lanes of the first ``count`` rows."""
+    return [f"for row in range({count}):", *indent(_for_each_lane([line]))]
+
+
+def _for_each_lane(lines: Iterable[str]) -> list[str]:
+    """A loop with some lines for all lanes of the block."""
+    return ["for lane in range(width):", *indent(lines)]

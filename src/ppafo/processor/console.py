@@ -1,0 +1,73 @@
+"""A simulator as a program of this machine, spoken to by its standard input and output; and how deep its stack was."""
+
+import os
+import select
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import final
+from weakref import finalize
+
+from ppafo.errors import SimulationError, one_line, reason
+
+UNTOUCHED = 0xA5
+"""What the RAM for the stack is filled with, so that what the stack has overwritten can be seen."""
+_PATIENCE = 60.0
+"""Seconds without a byte before a simulator is given up; a busy machine starts QEMU in some ten."""
+
+
+@final
+class Console:
+    """A program of this machine that is spoken to by its standard input and output; ``close`` ends it."""
+
+    def __init__(self, command: Sequence[str], folder: Path) -> None:
+        self._name = command[0]
+        self._seen = b""
+        try:
+            self._process = subprocess.Popen(
+                command,
+                cwd=folder,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                bufsize=0,
+            )
+        except OSError as error:
+            raise SimulationError(f"{self._name} cannot be run: {reason(error)}") from error
+        # Nothing else ends it where what holds this object fails before it can close it.
+        self.close = finalize(self, _end, self._process)
+
+    def say(self, text: bytes) -> None:
+        """Write to the program. SimulationError where it has ended."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(text)
+        except OSError as error:
+            raise SimulationError(f"{self._name} has ended: {reason(error)}; {self._last()}") from error
+
+    def until(self, mark: bytes) -> bytes:
+        """What the program says up to a mark. SimulationError where it falls silent."""
+        assert self._process.stdout is not None
+        while mark not in self._seen:
+            ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)
+            said = os.read(self._process.stdout.fileno(), 65536) if ready else b""
+            if not said:
+                raise SimulationError(f"{self._name} does not answer; {self._last()}")
+            # What comes behind the mark is kept for the next question.
+            self._seen += said
+        output, _, self._seen = self._seen.partition(mark)
+        return output
+
+    def _last(self) -> str:
+        last = self._seen.decode(errors="replace").strip().splitlines()[-1:]
+        return f"the last it said: {one_line(' '.join(last))}"
+
+
+def _end(process: "subprocess.Popen[bytes]") -> None:
+    process.kill()
+    process.communicate()
+
+
+def depth_of_stack(memory: bytes) -> int:
+    """How deep a stack has been [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
+    return len(memory) - next((depth for depth, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))

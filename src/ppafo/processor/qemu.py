@@ -1,0 +1,127 @@
+"""QEMU with a Cortex-M in it, driven by the remote protocol of gdb over its standard input and output."""
+
+import struct
+from collections.abc import Callable, Iterable, Sequence
+from typing import final
+
+from ppafo.errors import SimulationError
+from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
+from ppafo.processor.images import Decision, Image, Target
+
+DEEPEST = 1024
+"""How far below the end of RAM the stack is looked for [bytes]."""
+_SHIFT = 7
+"""Power of 2 that QEMU takes for an instruction, in nanoseconds."""
+_NANOSECONDS = 2**_SHIFT
+"""What an instruction takes of the machine's time [ns]: more than two ticks of the counter, so that none is missed."""
+_COUNTER_BITS = 24
+"""Bits of SysTick, the counter that counts the ticks of the processor's clock down."""
+_PIECE = 1024
+"""Bytes that are read or written at once; a packet has no room for many more."""
+_FORM_OF_OUTPUTS = struct.Struct("<hhII")
+"""Command, whether readings are sound, and the counter before and after the sample, as they lie in memory."""
+_THUMB, _LENGTH_OF_NOP = 1, 2
+"""Bit of an address that says that the instruction is Thumb, and the bytes of one that does nothing."""
+
+
+@final
+class Debugger:
+    """A machine of QEMU that stands still but when it is told to go on; addresses are its processor's."""
+
+    def __init__(self, machine: str, image: Image) -> None:
+        time = f"shift={_SHIFT},sleep=off"
+        command = ["qemu-system-arm", "-M", machine, "-kernel", image.file.name, "-icount", time, "-S"]
+        quiet = ["-display", "none", "-monitor", "none", "-serial", "none", "-gdb", "stdio"]
+        self._console = Console([*command, *quiet], image.file.parent)
+        self.close: Callable[[], object] = self._console.close
+        self.packet("QStartNoAckMode")
+        # The answer to this packet is the last that is acknowledged.
+        self._console.say(b"+")
+
+    def reset(self) -> None:
+        """Reset the machine; it stands still at its beginning."""
+        answer = self.packet(f"qRcmd,{b'system_reset'.hex()}")
+        # Before its OK, QEMU may send what the command has to say.
+        while answer != "OK":
+            answer = self._answer()
+
+    def stop_at(self, address: int) -> None:
+        """Let the machine stop before an instruction, whenever it comes there."""
+        self._expect(self.packet(f"Z0,{address:x},2"), "OK")
+
+    def go_on(self, address: int | None = None) -> None:
+        """Let the machine run, from an address where one is given, until it stops."""
+        # Bit 0 of an address says that the instruction is Thumb; a Cortex-M has no other.
+        self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
+
+    def read(self, address: int, size: int) -> bytes:
+        """What is in memory."""
+        content = b""
+        for at in range(address, address + size, _PIECE):
+            count = min(_PIECE, address + size - at)
+            answer = self.packet(f"m{at:x},{count:x}")
+            if len(answer) != 2 * count:
+                raise SimulationError(f"QEMU cannot read {count} bytes at 0x{at:x}: {answer}")
+            content += bytes.fromhex(answer)
+        return content
+
+    def write(self, address: int, content: bytes) -> None:
+        """Put something into memory."""
+        for at in range(0, len(content), _PIECE):
+            piece = content[at : at + _PIECE]
+            self._expect(self.packet(f"M{address + at:x},{len(piece):x}:{piece.hex()}"), "OK")
+
+    def packet(self, text: str) -> str:
+        """The answer to a packet of the protocol."""
+        self._console.say(b"$%b#%02x" % (text.encode(), sum(text.encode()) % 256))
+        return self._answer()
+
+    def _answer(self) -> str:
+        self._console.until(b"$")
+        return self._console.until(b"#").decode()
+
+    def _expect(self, answer: str, wanted: str) -> None:
+        if answer != wanted:
+            raise SimulationError(f"QEMU answers '{answer}' where '{wanted}' was expected")
+
+
+@final
+class QemuSimulator:
+    """QEMU with the image of a controller in it.
+
+    It has no model of cycles: what is counted are instructions, by a clock that goes on by the same time with each.
+    """
+
+    def __init__(self, target: Target, image: Image) -> None:
+        self._stop = image.symbols["simulated_stop"] & ~_THUMB
+        self._readings, self._outputs = (image.symbols[f"simulated_{name}"] for name in ("readings", "outputs"))
+        self._ticks = target.machine.clock * _NANOSECONDS * 1.0e-9
+        self._bottom = target.ram.start + target.ram.size - DEEPEST
+        self.debugger = Debugger(target.machine.name, image)
+        self.close: Callable[[], object] = self.debugger.close
+        self.debugger.write(self._bottom, bytes([UNTOUCHED]) * DEEPEST)
+        self.debugger.stop_at(self._stop)
+        self.debugger.go_on()
+
+    def begin(self) -> None:
+        """Reset the processor, and let it come to where it waits for a sample."""
+        self.debugger.reset()
+        self.debugger.go_on()
+
+    def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
+        """What it decides for some samples, one after the other."""
+        decisions = []
+        for readings in every:
+            self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
+            # Behind the breakpoint, or the machine would stop at once.
+            self.debugger.go_on(self._stop + _LENGTH_OF_NOP)
+            outputs = self.debugger.read(self._outputs, _FORM_OF_OUTPUTS.size)
+            command, is_sound, begun, ended = _FORM_OF_OUTPUTS.unpack(outputs)
+            # The counter counts down, and begins anew at 2^24.
+            ticks = (begun - ended) % 2**_COUNTER_BITS
+            decisions.append(Decision(command, is_sound, round(ticks / self._ticks)))
+        return decisions
+
+    def stack(self) -> int:
+        """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
+        return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))
