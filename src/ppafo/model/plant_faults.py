@@ -14,7 +14,12 @@ from ppafo.model.shut_off import NEVER, ShutOff, Unpowered, vents_line
 
 
 class ChamberFaults(NamedTuple):
-    """Faults of one chamber: when each begins [s], and how large it is: absolute pressures [Pa], shares, openings."""
+    """Faults of one chamber, each from its time [s] on, ``NEVER`` for none.
+
+    The valve is stuck at an ``opening`` [-], 1 to the supply and -1 to the atmosphere; the hose is off, or kinked to
+    ``kinked_share`` [-] of its conductance; the regulator gives another ``pressure`` [Pa, absolute], creeps by ``rate``
+    [Pa/s], or is frozen to ``frozen_share`` [-] of its flow.
+    """
 
     stuck_time: float = NEVER
     opening: float = 0.0
@@ -30,7 +35,12 @@ class ChamberFaults(NamedTuple):
 
 
 class PlantFaults(NamedTuple):
-    """Faults of both chambers and of their common parts: when each begins [s], and how large it is."""
+    """Faults of both chambers and of their common parts, each from its time [s] on, ``NEVER`` for none.
+
+    The valve feeds the other chamber; the bottle empties with ``empty_lag`` [s]; the vane leaks ``leak_factor`` [-]
+    times as much. The valve takes a command once in each ``slow_delay`` [s], the controller runs once in each
+    ``late_delay`` [s], misses ``jitter_share`` [-] of its samples, or is without power for ``brown_out_duration`` [s].
+    """
 
     chamber_1: ChamberFaults
     chamber_2: ChamberFaults

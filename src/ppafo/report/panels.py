@@ -4,7 +4,7 @@ import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -58,6 +58,7 @@ _LINE = 0.17
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
 """Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
 _AREA = {"alpha": 0.15, "linewidth": 0}
+"""Words of Matplotlib for a band, unless it has its own."""
 
 
 def _line(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
@@ -133,7 +134,7 @@ def draw_panels(
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
         grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
-        drawn = [_draw(axes, panel) for axes, panel in zip(grid, panels, strict=False)]
+        drawn = [_Drawn(axes, panel, _draw(axes, panel)) for axes, panel in zip(grid, panels, strict=False)]
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
         for upper, lower, panel, other in zip(grid, grid[across:], panels, panels[across:], strict=False):
@@ -141,7 +142,7 @@ def draw_panels(
                 upper.sharex(lower)
                 upper.tick_params(labelbottom=False)
                 upper.set_xlabel("")
-        _share_scales(figure, [(axes, panel, each) for axes, panel, each in zip(grid, panels, drawn, strict=False)])
+        _share_scales(figure, drawn)
         # Names and messages come from files: a dollar sign in them begins no formula.
         if title:
             # Beside it stands what kind of numbers these are.
@@ -183,16 +184,26 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
     return mapped
 
 
-def _share_scales(figure: "Figure", drawn: list[tuple["Axes", Panel, Any]]) -> None:
+class _Drawn(NamedTuple):
+    """A panel that is drawn: its axes, and what of it has colours that stand for numbers, if anything has."""
+
+    axes: "Axes"
+    panel: Panel
+    coloured: Any
+
+
+def _share_scales(figure: "Figure", drawn: Sequence[_Drawn]) -> None:
     """Give panels that follow each other with one scale the same limits and one bar."""
-    for scale, group in groupby(drawn, key=lambda item: item[1].scale):
+    for scale, group in groupby(drawn, key=lambda each: each.panel.scale):
         members = list(group)
         if scale is None:
             continue
-        limits = np.array([each.get_clim() for _, _, each in members], dtype=np.float64)
+        limits = np.array([member.coloured.get_clim() for member in members], dtype=np.float64)
         # A panel of nothing but failed runs has no limits.
         limits = limits[np.isfinite(limits).all(axis=1)]
-        for _, _, each in members if limits.size else ():
-            each.set_clim(float(limits[:, 0].min()), float(limits[:, 1].max()))
-        bar = figure.colorbar(members[0][2], ax=[axes for axes, _, _ in members], pad=0.02)
+        if limits.size:
+            lowest, highest = float(limits[:, 0].min()), float(limits[:, 1].max())
+            for member in members:
+                member.coloured.set_clim(lowest, highest)
+        bar = figure.colorbar(members[0].coloured, ax=[member.axes for member in members], pad=0.02)
         bar.set_label(scale.axis)

@@ -1,8 +1,9 @@
 """What was measured, the law or the model beside it, and what is left: the panels of every fit and comparison."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,25 +17,36 @@ if TYPE_CHECKING:
 
 _HOLLOW = {"linestyle": "", "markerfacecolor": "none"}
 _READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
-_LOOKS: dict[str, tuple[str, int, dict[str, Any]]] = {
-    "rising": (BLUE, 1200, {"marker": "x", **_READING}),
-    "falling": (VERMILION, 1200, {"marker": "o", "markerfacecolor": "none", **_READING}),
-    "measured": (BLUE, 1200, {"marker": ".", "linestyle": "none", "markersize": 4}),
-    "circles": (BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
-    "dots": (BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
+
+
+class _Look(NamedTuple):
+    """How readings are drawn: colour, how many at most, words of Matplotlib.
+
+    A page with every sample would have some megabytes.
+    """
+
+    colour: str
+    most: int
+    style: dict[str, Any]
+
+
+_LOOKS = {
+    "rising": _Look(BLUE, 1200, {"marker": "x", **_READING}),
+    "falling": _Look(VERMILION, 1200, {"marker": "o", "markerfacecolor": "none", **_READING}),
+    "measured": _Look(BLUE, 1200, {"marker": ".", "linestyle": "none", "markersize": 4}),
+    "circles": _Look(BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
+    "dots": _Look(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
 }
-"""Colour, largest number and style of what was measured: a page with every sample would have some megabytes."""
-
-
+"""Looks of readings by name."""
 _ROUNDING = 1.0e-9
 """Residual over the range of the samples that is none."""
 
 
 def readings_mark(label: str, x: Floats, y: Floats, look: str = "measured") -> Mark:
     """Return readings or samples [SI], some of them where there are very many, in one of the looks."""
-    colour, most, style = _LOOKS[look]
-    some = slice(None, None, -(-x.size // most))
-    return Mark("line", x[some], y[some], (), label, colour, style)
+    drawn_as = _LOOKS[look]
+    some = slice(None, None, math.ceil(x.size / drawn_as.most))
+    return Mark("line", x[some], y[some], (), label, drawn_as.colour, drawn_as.style)
 
 
 def curve_mark(label: str, x: Floats, y: Floats) -> Mark:

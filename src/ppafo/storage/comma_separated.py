@@ -127,6 +127,7 @@ _MARKS: dict[RecordingKind, str] = {
 
 _MARK = re.compile(r"#\s*(\w+):.*")
 _LONGEST_CELL = 40
+"""Characters of a cell that a message repeats."""
 _UNDERSCORE = "_"
 """Python takes 1_000 for a thousand, and digits of any script; in a table they are a slip."""
 

@@ -9,6 +9,7 @@ from ppafo.errors import one_line
 from ppafo.signals.recording import Floats
 
 _LONGEST_SHOWN = 40
+"""Characters of a name that a remark repeats."""
 
 
 def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:

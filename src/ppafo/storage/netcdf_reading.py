@@ -28,6 +28,7 @@ _GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3
 _SUPPORTED_FILTERS = frozenset({_GZIP, _SHUFFLE, _FLETCHER})
 
 _BYTES_OF_A_FLOAT = 8
+"""Bytes of a number as a recording keeps it, whatever its file has."""
 _ALWAYS_ALLOWED = 32_000_000
 """Bytes of memory that any file may ask for."""
 _MAXIMUM_GROWTH = 100

@@ -18,7 +18,9 @@ from ppafo.storage.files import LEFT_ASIDE, write_file
 
 _ADDRESS_MARK = "://"
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000
+"""Bytes of a document that is read; no document of a study comes near."""
 _BLOCK = 1_000_000
+"""Bytes that are read at once."""
 _LONGEST_WRITING = 86400.0
 """Nobody writes a file for longer [s]."""
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 _MAXIMUM_BYTES_WRITTEN = 16_000_000
 """No document of ours comes near; one repeats what a scenario file of at most 1 MB says, but not sixteen times."""
 _NAMED = 3
+"""Files that a message names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -323,24 +324,28 @@ def read_recording(
         # The HDF5 library can crash on a damaged file, or go round in it for ever, and would take this process with it.
         check_can_be_read(file, read_netcdf, "h5py")
         return read_netcdf(file)
+    if file.suffix.lower() in TEXT_SUFFIXES:
+        return _read_text(file, atmosphere)
     if file.suffix.lower() == ".mat":
         raise DataError(
             f"{path}: is a .mat file, whose variables have no units: name them in a column map, "
             "--columns FILE.toml:NAME"
         )
-    if file.suffix.lower() in TEXT_SUFFIXES:
-        found = read_csv(file, atmosphere=atmosphere)
-        run_file = file.parent / RUN_FILE
-        if file.name != CSV_FILE or not run_file.exists():
-            return found
-        # The recording of a result folder is what ``run.json`` beside it says of it.
-        described = read_document(file.parent)["recording"]
-        with refused_as(DataError, run_file, DataError):
-            kind = recording_kind(str(described.get("kind", found.kind)))
-        return replace(found, label=str(described.get("label", found.label)), kind=kind)
     if not file.exists():
         raise DataError(f"{path}: no such file or folder")
     raise DataError(
         f"{path}: is neither a .nc nor a {', '.join(TEXT_SUFFIXES)} file nor a result folder; a table of another "
         "suffix is read through a column map, --columns FILE.toml:NAME"
     )
+
+
+def _read_text(file: Path, atmosphere: float) -> Recording:
+    """Return the recording in a table of text; that of a result folder is what ``run.json`` beside it says of it."""
+    recording = read_csv(file, atmosphere=atmosphere)
+    run_file = file.parent / RUN_FILE
+    if file.name != CSV_FILE or not run_file.exists():
+        return recording
+    described = read_document(file.parent)["recording"]
+    with refused_as(DataError, run_file, DataError):
+        kind = recording_kind(str(described.get("kind", recording.kind)))
+    return replace(recording, label=str(described.get("label", recording.label)), kind=kind)

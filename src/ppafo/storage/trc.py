@@ -18,6 +18,7 @@ from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, te
 
 _FIRST_WORD = "PathFileType"
 _HEAD_LINES = 5
+"""Lines before the first row."""
 _UNITS = ("mm", "cm", "m")
 _UNSEEN = ("", "nan")
 """What stands for the coordinates of a marker that was not seen."""

@@ -145,6 +145,7 @@ NOISE = "sensors.seed"
 """The path by which a run is given its realisation of the noise."""
 _NOISE_LEVELS = ("sensors.angle_noise", "sensors.pressure_noise", "sensors.force_noise")
 _KEY = 1
+"""Seed of the permutation that makes other seeds of noise."""
 
 
 def with_noise(

@@ -196,6 +196,7 @@ def _bounded(made: Callable[[float, float], Distribution], entry: Any, varied: V
 
 
 def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: VariedPath) -> Distribution:
+    """Return the distribution of a number whose logarithm is uniform or normal; UnitError where it may be 0."""
     # Of the absolute pressure: a gauge pressure may be 0 or below, where there is no logarithm.
     absolute = replace(varied, is_gauge=False)
     distribution: Distribution
@@ -213,12 +214,14 @@ def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: Varied
 
 
 def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> Distribution:
+    """Return a normal distribution, whole or between two bounds."""
     bounds = _bounds(entry, varied) if isinstance(entry, declared.TruncatedNormal) else None
     mean, deviation = _key(entry, "mean", varied), _deviation(entry, varied)
     return NormalAround(mean, deviation) if bounds is None else NormalBetween(mean, deviation, *bounds)
 
 
 def _triangular(entry: declared.Triangular, varied: VariedPath) -> Distribution:
+    """Return a triangular distribution; UnitError where the mode is not between the bounds."""
     minimum, maximum = _bounds(entry, varied)
     mode = _key(entry, "mode", varied)
     if not minimum <= mode <= maximum:
@@ -229,6 +232,7 @@ def _triangular(entry: declared.Triangular, varied: VariedPath) -> Distribution:
 
 
 def _choice(entry: declared.Choice, varied: VariedPath) -> Distribution:
+    """Return the distribution of one of some values; UnitError where the weights do not fit them."""
     values = _all_whole(entry.path, tuple(_level("values", value, varied) for value in entry.values))
     weights = entry.weights or (1.0,) * len(values)
     if len(weights) != len(values):

@@ -20,6 +20,7 @@ SCRAMBLES = 8
 _INNER = 3
 """Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
+"""Smallest fraction of a draw, whose normal score is finite, and so is that of the largest, 1 less it."""
 _NEAREST = 0.2
 """Fraction of the runs, nearest to an end of a value, that say what the metric is there."""
 
