@@ -17,11 +17,11 @@ from ppafo.exports.hil.plant import Plant, check_baud, plant_of
 from ppafo.exports.hil.result import HardwareRun, longest_silence
 from ppafo.exports.hil.run import run_plant
 from ppafo.exports.hil.wire import OVER, VENTED, Answer, Sample, answer_bytes
+from ppafo.loading import load_scenario
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.device import Device
 from ppafo.running import simulate
-from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import result_of
 from tests.virtual_wire import (
     Fault,
@@ -360,6 +360,11 @@ def test_log_document_and_figure_say_what_happened() -> None:
     assert "VENTED     at 0.119 s: no answer for 20 ms" in found.text()
     last = contents["until-vented.csv"].decode().splitlines()[-1]
     assert float(last.split(",")[0]) == pytest.approx(0.118)
+
+
+def test_a_walk_is_refused_whose_controller_reads_forces_that_the_wire_does_not_carry() -> None:
+    with pytest.raises(ScenarioError, match="'proportional' is a walk, and the wire carries no forces under the foot"):
+        plant_of(load_scenario("proportional"))
 
 
 @pytest.mark.parametrize("rate", [49, 2001])

@@ -10,7 +10,7 @@ from ppafo.errors import ScenarioError
 from ppafo.loading import load_scenario
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.motion_kind import MOTIONS, VANE_MOTIONS, is_walk
-from ppafo.simulation.numbers import declared_numbers, number_at, with_numbers
+from ppafo.simulation.numbers import declared_numbers, number_at, path_of_locked_angle, with_numbers
 from ppafo.simulation.simulate import simulate
 
 SWAY = """
@@ -43,6 +43,22 @@ def test_each_kind_of_motion_of_a_vane_has_the_name_by_which_it_is_found_and_a_s
     kinds = [MOTIONS[name] for name in VANE_MOTIONS]
     assert [kind.name for kind in kinds] == list(VANE_MOTIONS)
     assert all(kind.section is not None and not is_walk(kind.name) for kind in kinds)
+
+
+def test_what_is_no_kind_of_motion_is_refused_with_its_type(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "halves.py").write_text(
+        "class Half:\n    name = 'half'\n\n    def plan(self, scenario): ...\n\n\nHALF = Half()\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ScenarioError, match="motion 'halves:HALF' is of type Half, not MotionKind"):
+        load_scenario("torque-task-proportional", ["motion.kind=halves:HALF"], plugins=["halves.py"])
+
+
+def test_a_vane_follows_its_reference_and_a_walk_the_torque_that_its_controller_makes() -> None:
+    names = ("torque-task-proportional", "step-response", "proportional")
+    assert [load_scenario(name).follows_reference for name in names] == [True, False, False]
+    assert [load_scenario(name).motion.stride_time > 0.0 for name in names] == [False, False, True]
+    assert [path_of_locked_angle(load_scenario(name)) for name in names] == ["motion.angle", None, None]
 
 
 def test_a_kind_of_another_package_is_read_run_and_varied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
