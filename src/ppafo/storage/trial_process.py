@@ -11,8 +11,9 @@ from importlib import import_module
 from pathlib import Path
 
 from ppafo.errors import DataError
-from ppafo.storage.trial_reading import OUT_OF_MEMORY, REFUSED
 
+REFUSED, OUT_OF_MEMORY = 76, 77
+"""Exit codes: the file is refused in one line on the output; reading it needs more memory than allowed."""
 _ALWAYS_ALLOWED = 400_000_000
 """Bytes of memory that reading any file may take."""
 _MAXIMUM_GROWTH = 100

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ppafo.errors import DataError
+from ppafo.storage import trial_process
+from ppafo.storage.trial_process import OUT_OF_MEMORY, REFUSED
 
-TRIAL = ("-P", "-m", "ppafo.storage.trial_process")
+TRIAL = ("-P", "-m", trial_process.__name__)
 """What Python runs in the other process; by ``-P`` nothing of the working folder is imported."""
-REFUSED, OUT_OF_MEMORY = 76, 77
-"""Exit codes of the other process: it refuses the file in one line on its output; it needs more memory than allowed."""
 
 _MAXIMUM_SECONDS = 30.0
 """Time [s] that reading any file may take: what the start of a process takes on a busy computer."""
