@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -20,7 +21,7 @@ from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
 from ppafo.identification.residuals import Block, Free, Indices, Residuals, Work
-from ppafo.identification.whitened import cost_of, linear_at
+from ppafo.identification.whitened import Linear, cost_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.faults import noise_of as white_noise_of
@@ -203,8 +204,23 @@ def _outliers(work: Work, left: Floats) -> Indices:
     return np.sort(np.concatenate(found)[order])
 
 
-def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
-    """Return the fit after whitening and Gauss-Newton steps from the least squares."""
+class _Settled(NamedTuple):
+    """Where the steps of a fit ended: scaled numbers, residuals of the samples, the line through both, the last gain.
+
+    ``gain`` is by how much the last step lowered the cost, -inf where none did.
+    """
+
+    point: Floats
+    residuals: Floats
+    linear: Linear
+    gain: float
+
+
+def _settled(work: Work, point: Floats) -> _Settled:
+    """Return where Gauss-Newton steps on whitened samples end, from the least squares at a scaled ``point``.
+
+    Samples that stand alone are left out, and in a fit of motion once more those on which the rest hangs.
+    """
     left = work.one(point)
     work.left_out, is_checked = work.outliers, False
     kept = left.copy()
@@ -220,10 +236,10 @@ def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
             gain = cost - cost_of(work, after, reached, linear) if np.isfinite(after).all() else -math.inf
             if gain > 0.0:
                 break
-        settled = gain < _GAIN
-        if (settled and (is_checked or not work.is_motion)) or number == _LAST_STEPS - 1:
+        is_settled = gain < _GAIN
+        if (is_settled and (is_checked or not work.is_motion)) or number == _LAST_STEPS - 1:
             break
-        if settled:
+        if is_settled:
             is_checked = True
             # What a sample near an impact seems to say alone is narrow and false: its slope holds on one side only.
             leverage = np.square(linear.rows[:, 1:] @ linear.root).sum(axis=1)
@@ -231,6 +247,12 @@ def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
             work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, left = reached, after
+    return _Settled(point, left, linear, gain)
+
+
+def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
+    """Return the fit after whitening, with its intervals and what speaks against it, from scaled least squares."""
+    point, left, linear, gain = _settled(work, start)
     rows = linear.rows
     known, whitened, errors = linear.sensors, rows[:, 1:], rows[:, 0]
     covariance = linear.root @ linear.root.T
@@ -241,34 +263,35 @@ def _whitened(work: Work, point: Floats, confidence: float) -> Fit:
     gradient = errors @ whitened + np.square(work.prior) * (point - work.mean)
     near = 1.0e-6 * np.maximum(1.0, np.abs(point))
     touching = ((point - work.low < near) & (gradient > 0.0)) | ((work.high - point < near) & (gradient < 0.0))
-    names = [one.name for one in work.numbers]
-    fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
+    names = [number.name for number in work.numbers]
     return Fit(
         numbers=work.numbers,
         values=point * work.scale,
         covariance=covariance * np.outer(work.scale, work.scale),
         low=low * work.scale,
         high=high * work.scale,
-        noise={channel: one.deviation for channel, one in known.items()},
-        correlation={channel: len(one.reflection) + (one.gain > 0.0) for channel, one in known.items()},
+        noise={channel: sensor.deviation for channel, sensor in known.items()},
+        correlation={channel: len(sensor.reflection) + (sensor.gain > 0.0) for channel, sensor in known.items()},
         residuals=left,
         outliers=tuple(work.outliers.tolist()),
         conflict=conflict_of(work, rows, point, ~touching, freedom) or too_smooth(known),
         unidentified=tuple(unidentified(covariance, names)),
-        shares={
-            names[place]: tuple(
-                (names[at], float(fractions[place, at]))
-                for at in np.argsort(-fractions[place]).tolist()
-                if fractions[place, at] >= _SHOWN
-            )
-            for place in range(len(names))
-        },
+        shares=_shares(work, covariance, names),
         evaluations=work.evaluations,
         has_converged=gain < _CONVERGED,
         sensors=known,
         jacobian=whitened / work.scale,
         confidence=confidence,
     )
+
+
+def _shares(work: Work, covariance: Floats, names: Sequence[str]) -> dict[str, tuple[tuple[str, float], ...]]:
+    """Return the shares [-] of the variance of each number that come from what is assumed of others, largest first."""
+    fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
+    return {
+        name: tuple((names[other], float(row[other])) for other in np.argsort(-row).tolist() if row[other] >= _SHOWN)
+        for name, row in zip(names, fractions, strict=True)
+    }
 
 
 def _likelihood(work: Work, found: Fit) -> float:

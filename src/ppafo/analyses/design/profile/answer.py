@@ -280,43 +280,15 @@ _READING = (
 @in_units(lambda sizing: sizing.problem.scenario.device.shown)
 def finding_of(sizing: Sizing) -> Finding[Sizing]:
     """Return a sizing study in words, tables and panels; it has not passed where nothing can be suggested."""
-    problem, profile, recording = sizing.problem, sizing.problem.profile, sizing.recording
-    table_error = profile.table_error
-    near = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
-    wanted = (
-        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
-        f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
-        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
-    )
-    failed = sum(sizing.failures.values())
-    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
-    noisy = (
-        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
-        "largest of them, its gas the mean"
-    )
-    others = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
-    method = (
-        f"The mass counts valve and full bottle{others}.",
-        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
-        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
-        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
-        f"Made with: ppafo design {problem.file}",
-    )
+    problem, recording = sizing.problem, sizing.recording
     return Finding(
         name="design",
         kicker="Sizing study",
         title=problem.name,
-        said=(*([problem.description] if problem.description else []), wanted),
+        said=(*([problem.description] if problem.description else []), _wanted(sizing)),
         parts=(
             *_tables(sizing),
-            finding.Part(
-                remarks=(
-                    suggestion_sentence(sizing),
-                    *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
-                    *([noisy] if sizing.streams else []),
-                    f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
-                )
-            ),
+            finding.Part(remarks=_remarks(sizing)),
             finding.Part(
                 "Error and gas over pressure",
                 panels=partial(pressure_panels, sizing),
@@ -335,12 +307,52 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 is_detail=True,
             ),
             *parts_to_check(sizing.doubtful),
-            finding.Part("How to read it", said=(*_READING, *method), is_detail=True),
+            finding.Part("How to read it", said=(*_READING, *_method(problem)), is_detail=True),
             part_titles([sized.valve for sized in sizing.valves]),
         ),
         found=sizing,
         passed=sizing.choice is not None,
         files={} if recording is None else {"suggested.csv": partial(marked_csv_bytes, recording)},
+    )
+
+
+def _wanted(sizing: Sizing) -> str:
+    """Return what a device is wanted for: profile, repetitions, error and reserve."""
+    problem, profile = sizing.problem, sizing.problem.profile
+    table_error = profile.table_error
+    near = f", {profile.knot_times.size} knots, to {_TORQUE.text(table_error)}" if table_error else ""
+    return (
+        f"profile of {TIME.text(profile.period, '.3g')} with up to {_TORQUE.text(profile.largest)} "
+        f"({_ORIGINS[profile.kind]}{near}); {problem.repetitions:.0f} repetitions ({problem.hours:.2g} h), RMS error "
+        f"at most {_TORQUE.text(problem.largest_error)}, {100 * problem.reserve:.0f} % of the gas as reserve"
+    )
+
+
+def _remarks(sizing: Sizing) -> tuple[str, ...]:
+    """Return the suggestion, a remark on each valve that has one, and how many runs it took and how many failed."""
+    failed = sum(sizing.failures.values())
+    failures = f"{failed:,} failed; the first: {next(iter(sizing.failures))}" if failed else "none failed"
+    noisy = (
+        f"sensors are noisy: every trial was run in the same {sizing.streams} noise streams; its error is the "
+        "largest of them, its gas the mean"
+    )
+    return (
+        suggestion_sentence(sizing),
+        *(f"{sized.valve.name}: {sized.remark}" for sized in sizing.valves if sized.remark),
+        *([noisy] if sizing.streams else []),
+        f"{sizing.runs:,} runs in {sizing.seconds:.0f} s; {failures}",
+    )
+
+
+def _method(problem: SizingProblem) -> tuple[str, ...]:
+    """Return how the numbers were found, in sentences."""
+    others = f" with {', '.join(part.title for part in problem.carried)}" if problem.carried else ""
+    return (
+        f"The mass counts valve and full bottle{others}.",
+        f"{problem.simulated} repetitions of the profile were simulated from the initial state of the scenario; "
+        "error and gas cover all of them, including the first filling of the chambers. Friction, leak, dead volumes "
+        "and sensors are the scenario's; what the data sheet of a valve does not state is taken as ideal.",
+        f"Made with: ppafo design {problem.file}",
     )
 
 
