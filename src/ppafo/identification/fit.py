@@ -247,7 +247,7 @@ def _settled(work: Work, point: Floats) -> _Settled:
             work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, left = reached, after
-    return _Settled(point, left, linear, gain)
+    return _Settled(point=point, residuals=left, linear=linear, gain=gain)
 
 
 def _whitened(work: Work, start: Floats, confidence: float) -> Fit:

@@ -96,7 +96,13 @@ _TOTALS: dict[type | None, TotalsKind] = {
     None: TotalsKind(Totals, totals),
     # Totals of a gas that is not ideal count true masses.
     TrueMasses: TotalsKind(Totals, real_totals, ("masses",)),
-    ThermalState: TotalsKind(ThermalTotals, thermal_totals, ("masses",), ("plant", "thermal"), frozenset()),
+    ThermalState: TotalsKind(
+        row=ThermalTotals,
+        function=thermal_totals,
+        states=("masses",),
+        parameters=("plant", "thermal"),
+        missing=frozenset(),
+    ),
 }
 """Totals by the row in which a gas keeps what is no number of the plant's state."""
 

@@ -114,4 +114,4 @@ class CompiledRig:
         self._state[:] = state
         self._inputs[len(Openings._fields) :] = vane
         self._show(0.0)
-        return Observed(*self._observed.tolist())
+        return Observed._make(self._observed.tolist())

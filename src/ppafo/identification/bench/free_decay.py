@@ -158,10 +158,10 @@ class _Law:
         """Return the angles [rad] of all decays at some numbers, each with its velocity [rad/s] where it has one."""
         moved = self.inertia * (1.0 + at[_INERTIA])
         slowing = Slowing(
-            max(at[self.damping.path], 0.0) / moved,
-            max(at[self.friction.path], 0.0) / moved,
-            math.expm1(at[_RISE]),
-            at[_RISE_VELOCITY],
+            damping_rate=max(at[self.damping.path], 0.0) / moved,
+            deceleration=max(at[self.friction.path], 0.0) / moved,
+            rise=math.expm1(at[_RISE]),
+            rise_velocity=at[_RISE_VELOCITY],
         )
         series = []
         for place, decay in enumerate(self.decays):
@@ -185,10 +185,10 @@ class _Law:
     def slowing(self, fitted: Values) -> Slowing:
         """Return how the vane slows down with the fitted numbers, at the inertia that was given."""
         return Slowing(
-            fitted[self.damping.path] / self.inertia,
-            fitted[self.friction.path] / self.inertia,
-            math.expm1(fitted.get(_RISE, 0.0)),
-            fitted.get(_RISE_VELOCITY, 0.0),
+            damping_rate=fitted[self.damping.path] / self.inertia,
+            deceleration=fitted[self.friction.path] / self.inertia,
+            rise=math.expm1(fitted.get(_RISE, 0.0)),
+            rise_velocity=fitted.get(_RISE_VELOCITY, 0.0),
         )
 
 

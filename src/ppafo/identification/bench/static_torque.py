@@ -197,7 +197,7 @@ def _straight_line(readings: "Sweeps", files: str) -> _Rough:
             f"{files}: {PROCEDURE}: the rising branch lies above the falling one, as if friction drove the motion; "
             "reverse the sign of channel 'direction'"
         )
-    return _Rough(slope, zero, friction, max(abs(friction), deviation))
+    return _Rough(slope=slope, zero=zero, friction=friction, size=max(abs(friction), deviation))
 
 
 @dataclass(frozen=True, slots=True)

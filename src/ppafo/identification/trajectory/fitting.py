@@ -187,10 +187,12 @@ def _fitted_runs(
         samples = {channel.name: Channel(channel.values, CHANNELS[channel.name].unit) for channel in run.channels}
         fitted_runs.append(
             _FittedRun(
-                with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)),
-                Recording(f"model of {run.label}", run.time, modelled, kind="simulated"),
-                Recording(experiment.label, run.time, samples, kind=experiment.recording.kind),
-                tuple(_channel(fitted, run.label, channel, columns[channel.name][:, 0]) for channel in run.channels),
+                scenario=with_numbers(run.scenario, numbers_in(run.label, numbers, fitted.values)),
+                model=Recording(f"model of {run.label}", run.time, modelled, kind="simulated"),
+                measurement=Recording(experiment.label, run.time, samples, kind=experiment.recording.kind),
+                channels=tuple(
+                    _channel(fitted, run.label, channel, columns[channel.name][:, 0]) for channel in run.channels
+                ),
             )
         )
     return fitted_runs
