@@ -207,7 +207,8 @@ def _outliers(work: Work, left: Floats) -> Indices:
 class _Settled(NamedTuple):
     """Where the steps of a fit ended: scaled numbers, residuals of the samples, the line through both, the last gain.
 
-    ``gain`` is by how much the last step lowered the cost, -inf where none did.
+    ``gain`` is by how much the last step that was tried would lower the cost, at most 0 where it was not taken, and
+    -inf where no run succeeds there.
     """
 
     point: Floats

@@ -21,7 +21,8 @@ def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
     near = [] if wanted is None else difflib.get_close_matches(name, sorted(spellings()), _TRIED, _NEAR)
     same += [f"deg{name}"] if wanted is not None and f"deg{name}" in spellings() else []
     # nm for N m: a force has a capital letter.
-    same += [product for word in (name.capitalize(), name.lower().capitalize()) if (product := as_product(word))]
+    product = as_product(name.capitalize())
+    same += [product] if product else []
     for known in dict.fromkeys((*same, *near)):
         unit = re.sub(rf"(?<![A-Za-zµ]){re.escape(name)}(?![A-Za-zµ])", known, unknown.unit)
         try:

@@ -133,7 +133,7 @@ def load_walk(
     file, given = label(str(scenario)), read_overrides(overrides, ScenarioError)
     named = {"gait": gait, "task_sequence": task_sequence, BOTTLE_NAME: bottle}
     instead = {path: str(value) for path, value in named.items() if value is not None}
-    # Refuse an override beside another word for the same value, by path in ``others``.
+    # Refuse an override of what an argument has chosen too.
     for override in given:
         path = override.typed
         other = instead.get(OF_A_WALK.same.get(path, path))

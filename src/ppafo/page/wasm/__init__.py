@@ -1,6 +1,6 @@
 """A scenario or a walk as a WebAssembly module, for a page that simulates; this is how such a module is called.
 
-``module_of(item)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON with what a person and a page
+``module_of(scenario)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON with what a person and a page
 must know of each setting, channel and metric. A module imports nothing. It needs 128-bit vectors, which
 every browser in use has; without them ``WebAssembly.validate`` says false. All numbers are 64-bit floats in SI units,
 pressures absolute; all arguments and results are 32-bit integers, and pointers are bytes from the start of ``memory``.
@@ -74,7 +74,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.package_key import COMPOSED, package_key
@@ -106,9 +106,6 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.translation.compiling import asked, complaint
 from ppafo.units import split_pressure_kind, to_si
 from ppafo.version import __version__
-
-if TYPE_CHECKING:
-    from ppafo.simulation.scenario import Scenario
 
 _KINDS = {VANE: "scenario", WALK: "walk"}
 """What a page calls what it simulates."""
@@ -458,7 +455,7 @@ def prebuilt_programs() -> dict[str, str]:
 @final
 @dataclass(frozen=True, slots=True)
 class WasmModule:
-    """The bytes of a module, and the description of what it simulates (plain data, see ``description.py``)."""
+    """The bytes of a module, and the description of what it simulates (plain data, by ``description_of``)."""
 
     wasm: bytes
     description: dict[str, Any]
