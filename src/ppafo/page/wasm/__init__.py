@@ -1,7 +1,7 @@
 """A scenario or a walk as a WebAssembly module, for a page that simulates; this is how such a module is called.
 
-``module_of(scenario)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON with what a person and a page
-must know of each setting, channel and metric. A module imports nothing. It needs 128-bit vectors, which
+``module_of(scenario)`` gives the ``wasm`` bytes and a ``description``, plain data for JSON with what a person and a
+page must know of each setting, channel and metric. A module imports nothing. It needs 128-bit vectors, which
 every browser in use has; without them ``WebAssembly.validate`` says false. All numbers are 64-bit floats in SI units,
 pressures absolute; all arguments and results are 32-bit integers, and pointers are bytes from the start of ``memory``.
 
