@@ -5,12 +5,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Batch
 from ppafo.engine.program import Program
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.signals.meter import MeterKind
+from ppafo.signals.recording import Floats
 
 
 def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] = (), trace_every: int = 0) -> Batch:
@@ -27,7 +27,7 @@ def add_meters(batch: Batch, meters: Sequence[MeterKind], traced: Sequence[str] 
     return Batch(program, clock, batch.parameters, states)
 
 
-def meters_of(program: Program, states: "NDArray[np.float64]") -> dict[str, Any]:
+def meters_of(program: Program, states: Floats) -> dict[str, Any]:
     """The last state of each meter by its name, from final states (rows, runs): arrays (runs,), units of the meter."""
     groups = program.state_rows()
     return {kind.name: group_of(group, groups, states) for group, kind in program.meter_groups.items()}

@@ -61,10 +61,8 @@ class Simulated:
 def program_content(simulated: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
     described = simulated.module.description
-    gauge, keys = (
-        _gauge_texts(simulated.scenario, described["settings"]),
-        {setting["key"] for setting in described["settings"]},
-    )
+    gauge = _gauge_texts(simulated.scenario, described["settings"])
+    keys = {setting["key"] for setting in described["settings"]}
     # The file of a scenario or walk with the overrides in it; overrides of the device stay overrides.
     shown = shown_motion(simulated.scenario)
     overridden = read_overrides(described["overrides"], ScenarioError)

@@ -60,7 +60,7 @@ from ppafo.simulation.declaration import (
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.motion_kind import MOTIONS, Clock
 from ppafo.simulation.nominal import nominal_terms
-from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths
+from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, is_of_device
 from ppafo.simulation.profiles import reference_problem
 from ppafo.simulation.scenario import (
     Assumption,
@@ -191,6 +191,18 @@ def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[O
     before = atmospheric_pressure(parameter_set) if overrides else None
     changed = with_overrides(parameter_set, overrides, valve)
     return Hardware(changed, name, links_of_set(changed, {override.typed for override in overrides}, before))
+
+
+def parameter_set_of(origin: Origin) -> ParameterSet:
+    """Return the set of which the device of a scenario was made, with the overrides of its file and then the caller's.
+
+    ParameterError where it cannot be read any more.
+    """
+    folder = Path() if origin.file is None else Path(origin.file).parent
+    of_file = read_overrides(origin.content.get("device", {}).get("overrides", ()))
+    of_caller = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
+    parameter_set = load_parameter_set(set_name(origin.parameter_set, folder))
+    return with_overrides(with_overrides(parameter_set, of_file, origin.valve), of_caller, origin.valve)
 
 
 def set_name(name: str, folder: Path) -> str:

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,16 +11,13 @@ import numpy as np
 from ppafo.errors import ScenarioError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters import load_parameter_set
 from ppafo.parameters.declaration import alternatives, is_within
 from ppafo.parameters.graph import counts_from, gauge_link
-from ppafo.parameters.overrides import read_overrides, with_overrides
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
 from ppafo.simulation.declaration import written_unit
-from ppafo.simulation.loading import set_name
+from ppafo.simulation.loading import parameter_set_of
 from ppafo.simulation.numbers import declared_numbers, number_at
-from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import (
@@ -285,12 +281,8 @@ def _level(key: str, value: str | float, varied: VariedPath) -> float:
 def stated_normal(varied: VariedPath, scenario: Scenario) -> tuple[NormalAround, str]:
     """Return the distribution of a path, and its unit in the set; UnitError where that states no uncertainty for it."""
     origin, path = scenario.origin, varied.path
-    folder = Path(origin.file).parent if origin.file is not None else Path()
-    own = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
     # What the set reports with the overrides of the scenario: one that replaces a value takes its uncertainty away.
-    parameters = load_parameter_set(set_name(origin.parameter_set, folder))
-    for overrides in (read_overrides(origin.content["device"].get("overrides", ())), own):
-        parameters = with_overrides(parameters, overrides, origin.valve)
+    parameters = parameter_set_of(origin)
     inside = f"valves.{origin.valve}.{path.removeprefix('valve.')}" if path.startswith("valve.") else path
     entry = parameters.numbers.get(inside)
     if entry is None or not entry.uncertainty:

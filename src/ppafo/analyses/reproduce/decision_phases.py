@@ -81,12 +81,12 @@ def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[_Run]:
     ramp = scenario.reference.settings
     slope = ramp["level"] / ramp["ramp_time"]
     # A constant reference just off 0 calls one valve at once and holds it on.
-    constant = _with_reference(scenario, start_level=tie, level=tie)
+    constant = with_reference(scenario, start_level=tie, level=tie)
     held = simulate(replace(constant, run=replace(scenario.run, duration=period))).recording
     for number in range(1, PHASES + 1):
         phase = period * number / PHASES
         last = round(phase / _STEP)
-        onward = _with_reference(scenario, start_level=slope * phase, ramp_time=ramp["ramp_time"] - phase)
+        onward = with_reference(scenario, start_level=slope * phase, ramp_time=ramp["ramp_time"] - phase)
         rest = simulate(
             replace(
                 onward,
@@ -101,7 +101,7 @@ def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[_Run]:
         yield _Run(float(np.sqrt(square / duration)), GRAMS_PER_KILOGRAM * gas)
 
 
-def _with_reference(scenario: Scenario, **settings: float) -> Scenario:
+def with_reference(scenario: Scenario, **settings: float) -> Scenario:
     """Return a scenario with other settings [SI] of its reference."""
     reference = scenario.reference
     return replace(scenario, reference=replace(reference, settings={**reference.settings, **settings}))

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from ppafo.analyses.reproduce.decision_phases import with_reference
 from ppafo.metrics import Metric
-from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
 READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
@@ -29,13 +29,13 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
     pair, spool = solenoid.scenario, proportional.scenario
     if spool.controller.kind != "pid" or {pair.reference.kind, spool.reference.kind} != {"ramp_hold"}:
         return ()
-    against, against_within_reach = (simulate(run).metrics for run in (pair, _to_level(pair, WITHIN_REACH)))
+    against, against_within_reach = (simulate(run).metrics for run in (pair, with_reference(pair, level=WITHIN_REACH)))
     readings = []
     for name, full in READINGS_OF_U:
         # Volts times a gain for volts give the same opening.
         gains = {gain: spool.controller.settings[gain] / full for gain in _GAINS}
         read = replace(spool, controller=replace(spool.controller, settings={**spool.controller.settings, **gains}))
-        metrics, within_reach = (simulate(run).metrics for run in (read, _to_level(read, WITHIN_REACH)))
+        metrics, within_reach = (simulate(run).metrics for run in (read, with_reference(read, level=WITHIN_REACH)))
         readings.append(
             InterpretationOfU(
                 name,
@@ -45,12 +45,6 @@ def readings_of_u(solenoid: Result, proportional: Result) -> tuple[Interpretatio
             )
         )
     return tuple(readings)
-
-
-def _to_level(scenario: Scenario, level: float) -> Scenario:
-    """Return the task to another level [N m] of its ramp."""
-    reference = scenario.reference
-    return replace(scenario, reference=replace(reference, settings={**reference.settings, "level": level}))
 
 
 def _less(metrics: Mapping[str, Metric], against: Mapping[str, Metric], name: str) -> float:

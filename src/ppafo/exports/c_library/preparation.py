@@ -164,7 +164,7 @@ class Writing:
     @property
     def stiffness(self) -> str:
         """By how much faster the pressure of the gas follows than at one temperature."""
-        return "gas_heat_capacity_ratio" if "thermal" in self.program.gas.PARAMETERS else "1.0"
+        return "gas_heat_capacity_ratio" if self.program.is_thermal else "1.0"
 
     def section(self, section: str, names: Sequence[str]) -> dict[str, str]:
         """The names in C of some settings of a section, by their own."""
@@ -259,7 +259,7 @@ class Writing:
         add = self.add
         flaws = self.section("sensors", FLAWS)
         yield f"sensors = {add(SensorParameters)}({', '.join(flaws.values())}, sensors_seed)"
-        if "thermal" in self.program.gas.PARAMETERS:
+        if self.program.is_thermal:
             walls = self.section("gas_model", [quantity.name for quantity in gas_settings(THERMAL)])
             yield f"thermal = {add(thermal_gas)}({self.row('Walls', walls)}, gas)"
         if self.lines is not None:

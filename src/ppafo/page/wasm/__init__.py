@@ -69,7 +69,6 @@ import math
 import re
 import sys
 import tempfile
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -91,15 +90,15 @@ from ppafo.exports.c_library.files import (
     conditions_of_program,
     run_words,
 )
-from ppafo.parameters import ParameterSet, load_parameter_set
+from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
-from ppafo.parameters.overrides import one_path, read_overrides, with_overrides
+from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
 from ppafo.report.display_units import display_unit, quantity_of_unit
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
-from ppafo.simulation.loading import set_name
+from ppafo.simulation.loading import parameter_set_of
 from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
@@ -274,14 +273,8 @@ def _of_set(parameter_set: ParameterSet | None, device: Device, setting: Setting
 
 def _parameter_set(scenario: Scenario) -> ParameterSet | None:
     """The set of the device with all overrides; None where it cannot be read any more."""
-    origin, device = scenario.origin, scenario.device
-    section: Mapping[str, Any] = origin.content.get("device", {})
-    folder = Path() if origin.file is None else Path(origin.file).parent
-    own = [override for override in read_overrides(origin.overrides) if is_of_device(override.typed)]
     try:
-        loaded = load_parameter_set(set_name(section.get("set", device.name), folder))
-        of_file = with_overrides(loaded, read_overrides(section.get("overrides", ())), device.valve_name)
-        return with_overrides(of_file, own, device.valve_name)
+        return parameter_set_of(scenario.origin)
     except PpafoError:
         return None
 

@@ -31,7 +31,7 @@ class OnBottle(NamedTuple):
 def lightest_on_bottle(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Report) -> OnBottle | None:
     """Return the lightest pair and bottle whose walk does what is wanted, with that walk; None if none does.
 
-    No pair whose gas might do is left out, so that what is offered is found when it is asked for.
+    No pair that might last on a bottle is left out, so that an offer is found again when its values are requested.
     """
     # Heaviest first: of pairs with the same overrides the lightest replaces the others.
     able = {pair.overrides: pair for pair in sorted(tried, key=lambda pair: -pair.mass) if pair.has(wish)}

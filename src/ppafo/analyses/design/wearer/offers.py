@@ -25,9 +25,9 @@ _MOST_WALKED = 4
 _USABLE = 0.8
 """Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
 _SHOWN_TIME = 0.6
-"""A hundredth of a minute [s], to which a command line is told a time."""
+"""Time [s] to which an offer rounds times down: a hundredth of a minute."""
 _SHOWN_TORQUE = 100.0
-"""Parts of a newton metre to which a command line is told a torque."""
+"""Parts of a newton metre to which an offer rounds torques down."""
 
 
 class _Candidate(NamedTuple):

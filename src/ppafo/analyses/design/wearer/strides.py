@@ -1,7 +1,7 @@
 """A few strides with a valve and an actuator at a constant supply: which torque, clearance and gas they have.
 
-A torque controller is told the lowest request that gives the torque, and lifts the foot earlier and harder where the
-toes would not clear the ground.
+Of a torque controller the lowest torque is requested that gives the one wanted; it lifts the foot earlier and harder
+where the toes would not clear the ground.
 """
 
 from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
@@ -16,11 +16,11 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import walk
 
 _REQUESTS = (1.0, 1.3, 1.7)
-"""Torque that a torque controller is told, over the torque that is wanted: it lags behind its reference."""
+"""Torque requested of a torque controller over the torque wanted, in turn: it lags behind its reference."""
 _ABOVE = 1.1
 """Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
 _LIMIT = next(quantity.default or 0.0 for quantity in ASSISTANCE_QUANTITIES if quantity.name == "largest_torque")
-"""Torque [N m] above which a controller of walking requests no more, unless it is told."""
+"""Largest torque [N m] that a controller of walking requests by default."""
 _MINUTES = 0.15
 """Minutes of the walks that are compared at a constant supply: a few strides after those that settle."""
 _DORSIFLEXION = 0.9
@@ -28,7 +28,7 @@ _DORSIFLEXION = 0.9
 _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.1", "controller.swing_fall_time=0.2")
 """A lift that begins at toe-off, when the toes come down late with the walk's own; with all the torque there is."""
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
-"""Numbers of an actuator in the catalogue that a walk is told."""
+"""Numbers of an actuator in the catalogue that a walk takes over."""
 _PROPORTIONAL = "proportional"
 """The kind of valve whose controller follows a torque; that of a pair of solenoid valves only has a limit."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
@@ -103,7 +103,7 @@ def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tupl
     if valve.kind != _PROPORTIONAL:
         return [()]
     held = actuator.values["torque_constant"] * _DORSIFLEXION * (wish.pressure - STANDARD_ATMOSPHERE)
-    # The limit as the controller is told it, with four digits.
+    # The limit as its override has it, with four digits.
     torque = min(held, max(float(f"{request:.4g}"), _LIMIT))
     return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
 
