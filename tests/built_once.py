@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine.cache.lock import one_process
+from ppafo.engine.cache.making import one_process
 from tests.costs import BUILT
 
 FOLDER = "PPAFO_TEST_BUILDS"

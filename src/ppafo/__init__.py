@@ -20,7 +20,6 @@ from ppafo.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from ppafo.analyses.compare.question import compare as compare
-    from ppafo.analyses.design.front.answer import Design as Design
     from ppafo.analyses.design.loading import load_design as load_design
     from ppafo.analyses.design.profile.answer import Sizing as Sizing
     from ppafo.analyses.design.question import design as design
@@ -127,7 +126,6 @@ _HOMES = {
     "ppafo.parameters.audit": ("audit",),
     "ppafo.parameters.device": ("Device",),
     "ppafo.parameters.parts": ("Catalogue", "Part", "load_catalogue"),
-    "ppafo.analyses.design.front.answer": ("Design",),
     "ppafo.analyses.design.loading": ("load_design",),
     "ppafo.analyses.design.profile.answer": ("Sizing",),
     "ppafo.analyses.endurance.answer": ("Endurance",),

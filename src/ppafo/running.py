@@ -14,7 +14,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 
 if TYPE_CHECKING:
-    from ppafo.simulation.oscillation import Gains
+    from ppafo.simulation.gains import Gains
 
 
 @checked()
@@ -40,7 +40,7 @@ def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plug
 
 def gains(scenario: Scenario) -> "Gains | None":
     """Return the gains in force of a scenario's torque law; None for a law that has none."""
-    from ppafo.simulation.oscillation import gains_of
+    from ppafo.simulation.gains import gains_of
 
     law = scenario.law
     return None if law is None else gains_of(scenario, law)
@@ -48,7 +48,7 @@ def gains(scenario: Scenario) -> "Gains | None":
 
 def most_reversals(scenario: Scenario) -> float:
     """Return the ``command_reversals`` of a run above which its loop oscillates; infinite for a law that may turn."""
-    from ppafo.simulation import oscillation as rules
+    from ppafo.simulation import tracking as rules
 
     law = scenario.law
     if law is None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.identification.bench.slowing import Slowing, course
+from ppafo.identification.bench.free_decay import Slowing, course
 
 AT = 37
 """Index of the sample that is spoilt."""

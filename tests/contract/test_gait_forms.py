@@ -12,7 +12,7 @@ from ppafo.cli.main import main
 from ppafo.gait import load_gait, walk_recording
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.form import GaitForm
-from ppafo.gait.recorded.reading import FORMS, read_table
+from ppafo.gait.recorded.source import FORMS, read_table
 from tests.page_code import block_with, write_package
 
 PAGE = "how-to/extend.md"

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ppafo.engine.continuous_time import free_motion, real_gas_rates
 from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.generator import StepText
+from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.linking import link_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
@@ -214,7 +215,7 @@ def parameter_groups(program: Program) -> dict[str, type]:
     """Groups of numbers that the right-hand side needs, in order."""
     return {
         "plant": program.actuator.plant,
-        **program.gas.PARAMETERS,
+        **rows_of(program.gas.groups(program), Role.PARAMETER),
         "valve_orifice": ExactOrifice,
         "leak_orifice": ExactOrifice,
         "valve": program.valve.parameters,

@@ -18,17 +18,16 @@ from ppafo.engine.continuous_time import (
     mode_at_rest,
     roots_at_rest,
     roots_sliding,
+    torque_at_rest,
 )
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
-from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.linking import python_place
 from ppafo.engine.loading import load_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import SimulationError
-from ppafo.model.plant import gravity_torque, net_driving_torque
 from ppafo.model.ports import at_valve, friction_at_rest, shown_signals
 from ppafo.model.sensors import Measurement, measure
 from tests.reference.reference_slopes import (
@@ -196,6 +195,7 @@ class _Solution:
         self.limit = python_place(friction_at_rest, run.program.effects, run.effects)
         self.follows = python_place(at_valve, run.program.effects, run.effects)
         self.settle = python_place(run.program.valve.settle, run.program.effects, run.effects)
+        self.driven = torque_at_rest(run)
         self.arrived = 0.0
         self.command, self.time = 0.0, 0.0
         self.way = self.rest_mode() if run.program.angle is None else 0.0
@@ -256,10 +256,8 @@ class _Solution:
 
     def torque(self, time: float, y: Sequence[float]) -> float:
         """Torque before friction and damping [N m] with unknowns at a time [s]. Equation (1)."""
-        run, plant, actuator = self.run, self.run.plant, self.run.program.actuator
-        driven = actuator.torque(plant, y[0], *actuator.pressures(plant, y[0], y[2], y[3]))
-        alone = net_driving_torque(driven, gravity_torque(y[0], plant.gravity_torque), plant.external_torque)
-        return alone if run.leg is None else alone + torque_of_leg(run.program, run.leg, time, y[0])
+        pressures = self.run.program.actuator.pressures(self.run.plant, y[0], y[2], y[3])
+        return self.driven(self.states_in(y), time, y[0], *pressures)
 
     def is_thrown_at_its_stop(self) -> bool:
         """True for a vane on a stop with an angular velocity into it; a root that is 0 at the start is no event."""

@@ -24,7 +24,7 @@ FIGURE = "figure"
 def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = (), out: Folder | None = None) -> Said:
     """Run a scenario and write its recording, metrics and figure.
 
-    Exit code 1 where it diverged, or a check finds it numerically sensitive, its loop oscillating or at a standstill.
+    Exit code 1 where it diverged, or a check finds it numerically sensitive, or its reference not followed.
 
     check: run again with finer steps and from a start moved by 1e-7, and report which metrics can be repeated
     out: result folder with the report; default out/NAME of the scenario
@@ -49,7 +49,9 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     from ppafo.simulation.simulate import simulate
 
     result = simulate(chosen)
-    in_force, verdict, stands = gains(chosen), result.oscillation, result.standstill
+    from ppafo.simulation.tracking import tried
+
+    in_force, verdict = gains(chosen), tried(chosen, result.tracking)
     # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None
     error = None if checked is None else checked.error
@@ -63,7 +65,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     from ppafo.report.recording_figure import figure_files
 
     figures = figure_files(result.plot())
-    first = [item.sentence for item in (verdict, stands, in_force) if item is not None]
+    first = [item.sentence for item in (verdict, in_force) if item is not None]
     report = page_of(_finding(result, checked, first), {FIGURE: figures[f"{FIGURE}.svg"]})
     files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **files})
@@ -73,19 +75,18 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     document = {
         "scenario": result.scenario.name,
         "status": plain(result.status),
-        "oscillation": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
-        "standstill": None if stands is None else {**plain(stands), "sentence": stands.sentence},
+        "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
         "gains": plain(in_force),
         "metrics": metrics,
         **({} if error is None else {"error": plain(error)}),
         **({} if checked is None else {"check": checked.document()}),
         "folder": str(folder),
     }
-    # A loop that oscillates or stands still makes the result useless, and a check fails.
-    is_useful = verdict is None and stands is None
+    # A reference that is not followed makes the result useless, and a check fails.
+    is_useful = verdict is None or not verdict.is_useless
     is_good = result.status.is_completed and (checked is None or (checked.is_determined and is_useful))
     return Said(
-        _text(result, error, checked, folder, "" if in_force is None else f"{in_force.sentence}\n"),
+        _text(result, error, checked, folder, first),
         document,
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
         aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
@@ -131,12 +132,14 @@ def list_descriptions() -> list[dict[str, Any]]:
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
 
 
-def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path, in_force: str) -> str:
+def _text(
+    result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path, first: Sequence[str]
+) -> str:
     checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     further = result.scenario.motion.motion_kind.further_command(str(result.scenario.origin.file))
-    # The gains in force stand below the warnings.
-    head, gap, metrics = str(result).partition("\n\n")
-    run = f"{head}\n{in_force}{gap[1:]}{metrics}"
+    # The gains in force stand below the verdict, which knows more than the result's own: its remedies were tried.
+    metrics = str(result).partition("\n\n")[2]
+    run = "\n".join([f"{result.scenario.name}: {result.status.kind}", *first, "", metrics])
     return "\n".join([run, "", *checked, *([further] if further else []), f"written: {folder} ({written})"])

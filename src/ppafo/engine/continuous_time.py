@@ -3,9 +3,10 @@
 A vane that sticks, slides or stands at a stop is in modes, which root functions end.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.linking import python_place
 from ppafo.engine.run import Run
 from ppafo.engine.scheme.real_gas import content_rate
@@ -13,7 +14,10 @@ from ppafo.model.plant import (
     PlantParameters,
     chamber_volumes,
     driving_torque,
+    gravity_torque,
     holds_still,
+    loaded,
+    net_driving_torque,
     vane_acceleration,
 )
 from ppafo.model.ports import friction_in_motion, rebound
@@ -60,7 +64,26 @@ def free_motion(
         return 0.0, 0.0
     torque = driving_torque(plant, angle, pressure_1, pressure_2) + added_torque
     friction = way * friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
-    return angular_velocity, vane_acceleration(torque, angular_velocity, friction, plant.viscous_damping, plant.inertia)
+    return angular_velocity, vane_acceleration(
+        torque, friction, plant.viscous_damping, plant.inertia, angle, angular_velocity
+    )
+
+
+def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float, float], float]:
+    """What drives the joint of a run at rest before friction [N m], with its actuator, its loads and its leg.
+
+    The function takes states of effects by name, time [s], angle [rad] and two absolute pressures [Pa]. Equation (1).
+    """
+    plant, program = run.plant, run.program
+    taken = python_place(loaded, program.effects, run.effects)
+
+    def torque(states: Mapping[str, Any], time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
+        actuator = program.actuator.torque(plant, angle, pressure_1, pressure_2)
+        alone = net_driving_torque(actuator, gravity_torque(angle, plant.gravity_torque), plant.external_torque)
+        left: float = alone if taken is None else taken(states, alone, angle)
+        return left if run.leg is None else left + torque_of_leg(program, run.leg, time, angle)
+
+    return torque
 
 
 class Roots(NamedTuple):

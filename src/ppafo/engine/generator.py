@@ -8,9 +8,9 @@ from types import FunctionType
 from typing import Any
 
 from ppafo.engine.linking import link_program
-from ppafo.engine.plain_python import check_flow, check_grammar
+from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
 from ppafo.engine.program import Program
-from ppafo.engine.reduction import NUMBER, Effects, Reduction
+from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, uses_of_group
 from ppafo.engine.source_text import (
     Composer,
     Names,
@@ -18,7 +18,7 @@ from ppafo.engine.source_text import (
     emitted_name,
     is_step_function,
 )
-from ppafo.errors import ProgramError
+from ppafo.errors import ProgramError, nearest_name
 from ppafo.model.declaration import PlainFunction
 
 
@@ -110,6 +110,27 @@ class StepText:
     def note_read(self, scope: Mapping[str, Any], name: str) -> None:
         """Keep that a name was looked up."""
         self.collector.note_read(scope, name, scope[name])
+
+    def refuse_unkept(self, name: str, asking: Composed) -> ProgramError:
+        """The error for a phase that asks for a group that nothing keeps for it: the line, and what to do."""
+        known = [function for function, composed in self.composed.items() if name in composed.effects.reads]
+        reads = ((item, node) for item in [asking.function, *known] for node in uses_of_group(item, name, ast.Load))
+        # A phase that only sets the group must be handed what it was before.
+        function, node = next(reads, (asking.function, definition_of(asking.function).tree))
+        sets = [
+            place(item.__code__.co_filename, found.lineno)
+            for item in self.composed
+            for found in uses_of_group(item, name, ast.Store)
+        ]
+        if not sets:
+            hint = nearest_name(name, self.rows)
+            problem = f"no phase before this one sets 'lane.{name}', and no component has it among its groups{hint}"
+        else:
+            problem = (
+                f"'lane.{name}', which {sets[0]} sets, lives in that phase alone; a component that hands it on has "
+                f"'{name}': handed(CLASS) among its groups, with CLASS float or a NamedTuple"
+            )
+        return refusal(function.__code__.co_filename, node, problem)
 
     def composer(self, function: FunctionType, names: Names) -> Composer:
         """What replaces names from outside a function of the step that was reduced."""

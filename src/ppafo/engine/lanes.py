@@ -21,10 +21,12 @@ from numpy.typing import NDArray
 from ppafo import interrupts
 from ppafo.engine.cache.texts import kept_bytes
 from ppafo.engine.entries import INLINE
+from ppafo.engine.groups import Role, check_rows
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.loading import HOW_TO_INSTALL, compiled, compilers_to_try, runs_by_python
 from ppafo.engine.package_key import package_key
 from ppafo.engine.program import Program
+from ppafo.engine.rows import row_numbers
 from ppafo.engine.source_text import MadeFrom, SourceCollector
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.progress import time_text
@@ -106,9 +108,11 @@ class Advancing(Protocol):
 def load_program(program: Program) -> Advancing:
     """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
 
-    A program is written anew where a number or function that it was made from stands for something else by now.
+    A program is written anew where a number or function that it was made from stands for something else by now. It is
+    written where Python runs it, too: what cannot be compiled is refused on every computer, in the same words.
     """
-    module: Any = None if runs_by_python() else compiled(_current_source(program))
+    source = _current_source(program)
+    module: Any = None if runs_by_python() else compiled(source)
     if module is not None:
         return module  # type: ignore[no-any-return]
     from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
@@ -243,10 +247,20 @@ def join_results(results: Sequence[BatchResult]) -> BatchResult:
     return BatchResult(states, np.concatenate([result.record for result in results], axis=2))
 
 
+@lru_cache(maxsize=64)
+def _row_counts(program: Program) -> tuple[int, int]:
+    """Number of rows of parameters and of states of a program."""
+    return len(row_numbers(program.parameter_rows())), len(row_numbers(program.state_rows()))
+
+
 class LaneBlock:
     """One block of runs in progress; ``states`` (rows, runs) may be read and written between two ``advance``."""
 
     def __init__(self, module: Advancing, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
+        given, kept = _row_counts(program)
+        if (len(parameters), len(states)) != (given, kept):
+            check_rows(len(parameters), program.parameter_rows(), Role.PARAMETER)
+            check_rows(len(states), program.state_rows(), Role.STATE)
         self._module = module
         self._clock = clock
         self._width = states.shape[1]

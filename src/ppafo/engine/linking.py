@@ -15,6 +15,7 @@ from ppafo.errors import ProgramError
 from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
+from ppafo.model.valves.kind import valve_problem
 
 
 class Linked(Protocol):
@@ -34,6 +35,9 @@ def link_program(program: Program, collector: Linked) -> None:
 
     ProgramError for an effect that cannot act, or whose name other rows of the program have.
     """
+    problem = valve_problem(program.valve)
+    if problem:
+        raise ProgramError(f"valve: {problem}")
     own = links_of(program.actuator)
     collector.links.update(own)
     if own:

@@ -15,7 +15,6 @@ from ppafo.engine.generator import Composed, StepText
 from ppafo.engine.lane_rows import HANDED, lanes_of
 from ppafo.engine.reduction import HISTORIES, NUMBER, Slot, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
-from ppafo.errors import ProgramError
 
 
 class Call(NamedTuple):
@@ -101,7 +100,7 @@ class RowsOfLanes:
         effects, rows = call.phase.effects, self.step.rows
         for name in call.phase.handed:
             if name not in rows and name not in (NUMBER, *HISTORIES):
-                raise ProgramError(f"{call.phase.name} asks for '{name}', which no phase before it has kept")
+                raise self.step.refuse_unkept(name, call.phase)
         if not effects.results:
             return []
         is_one = len(effects.results) == 1
@@ -185,6 +184,7 @@ class RowsOfRun:
             text = call.text("0")
             if len(results) == 1:
                 lines.append(f"{results[0]} = {text}")
+                lines += [f"{slot.history}[{', '.join(call.places(slot))}, 0] = {name}" for name, slot in slots.items()]
                 continue
             whole = call.phase.own
             lines.append(f"{whole} = {text}")

@@ -17,9 +17,9 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
-from ppafo.control.binding import frame_of
 from ppafo.engine.rows import is_row
 from ppafo.engine.source_text import MadeFrom, Read
+from ppafo.model.binding import frame_of
 
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
 """Where functions stand that the text of a program has, and those that compose it."""

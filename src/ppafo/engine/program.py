@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol, get_type_hints
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Protocol
 
 from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.channels import REQUEST, paths_of_traces
+from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
@@ -33,16 +35,12 @@ class GasPhases(Protocol):
     """How the gas in both chambers goes through a step of two stages: a module of ``engine.step``."""
 
     @property
-    def PARAMETERS(self) -> Rows:  # noqa: N802 - constants of modules
-        """Groups of its parameters."""
+    def IS_THERMAL(self) -> bool:  # noqa: N802 - constants of modules
+        """True where it has an energy balance."""
 
     @property
-    def STATES(self) -> Rows:  # noqa: N802
-        """Groups of its states."""
-
-    @property
-    def CHANGE(self) -> Rows:  # noqa: N802
-        """What a step adds to the state."""
+    def HAS_TRUE_MASSES(self) -> bool:  # noqa: N802
+        """True where its true masses stand beside what ``PlantState`` counts."""
 
     @property
     def START(self) -> Callable[[Any, PlantState], Any] | None:  # noqa: N802
@@ -52,8 +50,8 @@ class GasPhases(Protocol):
     def IN_SHAPES(self) -> Mapping[Any, Any]:  # noqa: N802
         """What stands for its functions in a program whose actuator has a shape of its own."""
 
-    def stage(self, parts: "Program") -> Rows:
-        """What the first stage leaves for later phases."""
+    def groups(self, parts: "Program") -> Groups:
+        """Groups of numbers that it has in a lane."""
 
     def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
         """The first stage over a length [s], with volumes that run to an angle [rad]."""
@@ -86,20 +84,8 @@ class GasPhases(Protocol):
 class FeedPhases(Protocol):
     """What stands between constant pressures and the valve, with a state that the stages solve with the gas."""
 
-    @property
-    def PARAMETERS(self) -> Rows:  # noqa: N802
-        """Groups of its parameters."""
-
-    @property
-    def STATES(self) -> Rows:  # noqa: N802
-        """Groups of its states."""
-
-    @property
-    def NEXT(self) -> Rows:  # noqa: N802
-        """States of the feed at the end of a part that may be refused."""
-
-    def stage(self, parts: "Program") -> Rows:
-        """What the first stage leaves for later phases, that of the gas among it."""
+    def groups(self, parts: "Program") -> Groups:
+        """Groups of numbers that it has in a lane, the first stage of the gas among them."""
 
     def source(self, parts: "Program", lane: "Lane") -> PlantParameters:
         """The plant at the pressures that feed it as a step begins."""
@@ -120,17 +106,8 @@ class FeedPhases(Protocol):
 class LegPhases(Protocol):
     """A leg that walks with the device, in a step."""
 
-    @property
-    def STATES(self) -> Rows:  # noqa: N802
-        """Groups of its states."""
-
-    @property
-    def CARRIED(self) -> Rows:  # noqa: N802
-        """What a step is handed by the one before."""
-
-    @property
-    def ENDED(self) -> Rows:  # noqa: N802
-        """What phases hand on of where the foot would be, and where it ends."""
+    def groups(self, parts: "Program") -> Groups:
+        """Groups of numbers that it has in a lane."""
 
     @property
     def ASKED(self) -> Mapping[Any, tuple[str, ...]]:  # noqa: N802
@@ -138,12 +115,6 @@ class LegPhases(Protocol):
 
     def links(self, parts: "Program") -> Mapping[Any, Any]:
         """What stands for functions of the controller."""
-
-    def parameters(self, parts: "Program") -> Rows:
-        """Groups of its parameters."""
-
-    def led(self, parts: "Program") -> Rows:
-        """What says where the gait is at the end of a step."""
 
     def carry(self, parts: "Program", lane: "Lane") -> None:
         """What a step is handed by the one before, where there was none."""
@@ -182,13 +153,8 @@ class LegPhases(Protocol):
 class FaultPhases(Protocol):
     """Faults of a plant in a walk, and a shut-off valve in its line."""
 
-    @property
-    def PARAMETERS(self) -> Rows:  # noqa: N802
-        """Groups of their parameters."""
-
-    @property
-    def STATES(self) -> Rows:  # noqa: N802
-        """Groups of their states."""
+    def groups(self, parts: "Program") -> Groups:
+        """Groups of numbers that they have in a lane."""
 
     def failed_plant(self, parts: "Program", lane: "Lane", time: float) -> PlantParameters:
         """The plant as faults leave it at a time [s]."""
@@ -259,25 +225,22 @@ class Program:
     foot: FootPhases | None = None
     controlled: str = TORQUE
 
+    @property
+    def groups(self) -> Groups:
+        """All groups of numbers of this program by name, in the order of their rows."""
+        return groups_of(self)
+
     def parameter_rows(self) -> dict[str, type]:
         """Groups of parameter rows of this program, in order."""
-        shank = self.shank
-        return {
-            "timing": LaneTiming,
-            "plant": self.actuator.plant,
-            **self.gas.PARAMETERS,
-            "valve": self.valve.parameters,
-            "controller": NoParameters if self.controller is None else self.controller.parameters,
-            "reference": self.reference.parameters,
-            "path": NoParameters if self.angle is None else self.angle.parameters,
-            "sensors": SensorParameters,
-            **({} if self.leg is None else self.leg.parameters(self)),
-            **({} if self.faults is None else self.faults.PARAMETERS),
-            **({} if self.feed is None else self.feed.PARAMETERS),
-            # By its place, for few vanes carry a leg.
-            **({"load": kind_at("ppafo.model.leg:FootLoad"), "shank": shank.parameters} if shank is not None else {}),
-            **{effect.name: effect.parameters for effect in self.effects},
-        }
+        return rows_of(self.groups, Role.PARAMETER)
+
+    def state_rows(self) -> dict[str, type]:
+        """Groups of state rows of this program, in order."""
+        return rows_of(self.groups, Role.STATE)
+
+    def step_rows(self) -> dict[str, type]:
+        """Groups of numbers that a phase of a step hands to the later ones, in order."""
+        return rows_of(self.groups, Role.STEP)
 
     @property
     def shank_jumps(self) -> bool:
@@ -327,33 +290,15 @@ class Program:
         """Groups of rows of the states of effects, by their names."""
         return {f"{name}_state": kind.row for name, kind in self.stated.items()}
 
-    def state_rows(self) -> dict[str, type]:
-        """Groups of state rows of this program, in order."""
-        return {
-            "result": LaneResult,
-            "pace": Pace,
-            "state": PlantState,
-            **self.gas.STATES,
-            "valve_state": self.valve.state,
-            "controller_state": NoParameters if self.controller is None else type(self.controller.initial),
-            **({} if self.leg is None else self.leg.STATES),
-            **({} if self.faults is None else self.faults.STATES),
-            **({} if self.feed is None else self.feed.STATES),
-            **self.effect_states,
-            "course": Course if self.follows_reference else NoParameters,
-            **{group: kind.state for group, kind in self.meter_groups.items()},
-            **({"start": LaneStart} if self.starts_apart else {}),
-        }
-
     @property
     def is_thermal(self) -> bool:
         """True where the gas has an energy balance."""
-        return bool(self.gas.PARAMETERS)
+        return self.gas.IS_THERMAL
 
     @property
     def has_true_masses(self) -> bool:
         """True where the true masses of the gas stand beside what ``PlantState`` counts."""
-        return bool(self.gas.STATES)
+        return self.gas.HAS_TRUE_MASSES
 
     @property
     def walks(self) -> bool:
@@ -435,7 +380,7 @@ class Program:
     @property
     def has_single_ports(self) -> bool:
         """True where one path of each chamber is open, false where a valve blends them."""
-        return bool(get_type_hints(self.valve.connect)["return"] == tuple[SinglePort, SinglePort])
+        return self.valve.port is SinglePort
 
     @property
     def has_reference(self) -> bool:
@@ -473,26 +418,51 @@ class Program:
         """True where the chambers are known as a step begins: once for all, or from the step before."""
         return self.keeps_volumes or self.walks
 
-    def step_rows(self) -> dict[str, type]:
-        """Groups of numbers that a phase of a step hands to the later ones, in order."""
-        leg, feed, is_alone = self.leg, self.feed, self.angle is None and self.leg is None
-        # In the order of declaration: plant, what the valve shows beside its openings, result.
-        _, shown, _ = get_type_hints(self.valve.connect).values()
-        return {
-            **({} if leg is None else leg.led(self)),
-            **({"held": HeldChambers} if self.hands_chambers_on else {}),
-            **({} if leg is None else leg.CARRIED),
-            **({"begun": FreePart} if is_alone else {}),
-            **({"prescribed": PrescribedStep} if self.angle is not None and not self.is_locked else {}),
-            "flowing": SlopedFlows,
-            **(self.gas.stage(self) if feed is None else feed.stage(self)),
-            "passing": StageFlows,
-            "shown": shown,
-            **(self.gas.CHANGE if self.angle is None else {}),
-            **({"slid": PartSlide, "moved": PartEnd} if is_alone else {}),
-            **({} if leg is None else leg.ENDED),
-            **({"next_valve": self.valve.state} if self.is_parted else {}),
-            **(feed.NEXT if self.is_parted and feed is not None else {}),
-            **(dict.fromkeys(("length", "before", "remaining"), float) if self.is_parted else {}),
-            **({"gas_error": float} if self.is_adaptive and self.angle is None else {}),
-        }
+
+@lru_cache(maxsize=256)
+def groups_of(program: Program) -> Groups:
+    """All groups of numbers of a program by name, in the order of their rows."""
+    leg, feed, faults, shank = program.leg, program.feed, program.faults, program.shank
+    is_alone = program.angle is None and leg is None
+    controller = program.controller
+    before = {
+        "timing": given(LaneTiming),
+        "result": kept(LaneResult),
+        "pace": kept(Pace),
+        "plant": given(program.actuator.plant),
+        "state": kept(PlantState),
+        **({"held": handed(HeldChambers)} if program.hands_chambers_on else {}),
+        **({"begun": handed(FreePart)} if is_alone else {}),
+        **({"prescribed": handed(PrescribedStep)} if program.angle is not None and not program.is_locked else {}),
+        "flowing": handed(SlopedFlows),
+    }
+    after = {
+        "passing": handed(StageFlows),
+        "valve": given(program.valve.parameters),
+        "valve_state": kept(program.valve.state),
+        "shown": handed(program.valve.shown),
+        **({"next_valve": handed(program.valve.state)} if program.is_parted else {}),
+        "controller": given(NoParameters if controller is None else controller.parameters),
+        "controller_state": kept(NoParameters if controller is None else type(controller.initial)),
+        "reference": given(program.reference.parameters),
+        "path": given(NoParameters if program.angle is None else program.angle.parameters),
+        "sensors": given(SensorParameters),
+    }
+    worn = [part.groups(program) for part in (leg, faults, feed) if part is not None]
+    # By its place, for few vanes carry a leg.
+    foot = {"load": given(kind_at("ppafo.model.leg:FootLoad")), "shank": given(shank.parameters)} if shank else {}
+    last = {
+        **({"slid": handed(PartSlide), "moved": handed(PartEnd)} if is_alone else {}),
+        **(dict.fromkeys(("length", "before", "remaining"), handed(float)) if program.is_parted else {}),
+        **({"gas_error": handed(float)} if program.is_adaptive and program.angle is None else {}),
+    }
+    return {
+        **merged(before, program.gas.groups(program), after, *worn, foot, last),
+        # Linking refuses an effect with a name that is here already.
+        **{effect.name: given(effect.parameters) for effect in program.effects},
+        **{name: kept(row) for name, row in program.effect_states.items()},
+        # What only some blocks have comes last: its rows are added to those of a run.
+        "course": kept(Course if program.follows_reference else NoParameters),
+        **{group: kept(kind.state) for group, kind in program.meter_groups.items()},
+        **({"start": kept(LaneStart)} if program.starts_apart else {}),
+    }

@@ -30,6 +30,9 @@ NUMBER = "lane_number"
 _GROUP = "@"
 """Before the name of a group in a reduced function, until names are told apart."""
 _UNKNOWN = object()
+_STATEMENTS = (
+    "one sets names or groups of its lane, calls functions that do, decides with 'if', or goes through what parts have"
+)
 
 
 def is_known_part(value: Any) -> bool:
@@ -144,6 +147,13 @@ def definition_of(function: FunctionType) -> Definition:
     if definition is None:
         raise ProgramError(f"cannot compile {function.__qualname__}: its source text is not available")
     return Definition(definition)
+
+
+def uses_of_group(function: FunctionType, name: str, use: type[ast.expr_context]) -> list[ast.Attribute]:
+    """Where a function of the step reads or sets ``lane.NAME``, in order."""
+    nodes = [node for node in ast.walk(definition_of(function).tree) if isinstance(node, ast.Attribute)]
+    found = [node for node in nodes if node.attr == name and isinstance(node.ctx, use)]
+    return [node for node in found if isinstance(node.value, ast.Name) and node.value.id == "lane"]
 
 
 @lru_cache(maxsize=64)
@@ -358,10 +368,7 @@ class Reduction:
 
     def called(self, called: FunctionType, node: ast.Call) -> tuple[str, list[ast.expr]]:
         """Name in the module of a function of the step that is called, and its own arguments."""
-        names = called.__code__.co_varnames[: called.__code__.co_argcount]
-        if len(node.args) != len(names) or node.keywords:
-            raise self.refuse(node, f"{called.__name__}({', '.join(names)}): its arguments are given in their order")
-        own = list(zip(names, node.args, strict=True))[2:]
+        own = self.own_arguments(called, node)[2:]
         known = {name: self.value_of(value) for name, value in own}
         known = {name: value for name, value in known.items() if is_known_part(value)}
         name = self.collector.add_called(self.function, called, known)
@@ -369,6 +376,16 @@ class Reduction:
         for row in effects.reads:
             self.read(row)
         return name, [self.visit(value) for own_name, value in own if own_name in effects.takes]
+
+    def own_arguments(self, called: FunctionType, node: ast.Call) -> list[tuple[str, ast.expr]]:
+        """Arguments of a call of a function of the step by name, in its order. ProgramError where they do not fit."""
+        names = called.__code__.co_varnames[: called.__code__.co_argcount]
+        given = dict(zip(names, node.args, strict=False))
+        named = {keyword.arg: keyword.value for keyword in node.keywords if keyword.arg is not None}
+        given |= {name: value for name, value in named.items() if name not in given}
+        if len(given) != len(node.args) + len(node.keywords) or given.keys() != set(names):
+            raise self.refuse(node, f"{called.__name__}({', '.join(names)}): each argument is given once")
+        return [(name, given[name]) for name in names]
 
     def arguments(self, node: ast.expr) -> Iterator[ast.expr]:
         """An argument, or those that ``*(... for ... in ...)`` stands for."""
@@ -422,7 +439,11 @@ class Reduction:
                 return self.assignment(target, node.value)
             case ast.AnnAssign(target=ast.Name() as target, value=ast.expr() as value):
                 return self.assignment(target, value)
-        raise self.refuse(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of a phase")
+            case ast.AugAssign(target=ast.Name(id=name) as target, op=op, value=value):
+                before = ast.copy_location(ast.Name(name, ast.Load()), target)
+                return self.assignment(target, ast.copy_location(ast.BinOp(before, op, value), node))
+        line = ast.unparse(node).splitlines()[0]
+        raise self.refuse(node, f"'{line}' is no statement of a phase: {_STATEMENTS}")
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
         """A decision: of the parts one branch alone, else a group that only one of both sets is also read."""
@@ -560,8 +581,7 @@ class Reduction:
             return []
         for group, fields in effects.groups.items():
             self.note_set(group, fields)
-        names = called.__code__.co_varnames[: called.__code__.co_argcount]
-        own = [(key, value) for key, value in zip(names, node.args, strict=True) if key not in ("parts", "lane")]
+        own = self.own_arguments(called, node)[2:]
         given_by_name = {key: self.visit(value) for key, value in own} if effects.slots else {}
         for result, slot in effects.slots.items():
             places = tuple(with_arguments(index, given_by_name) for index in slot.places)

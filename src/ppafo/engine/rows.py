@@ -4,7 +4,7 @@ A path such as ``state.angle`` or ``law.knots[3]`` names a number; nested rows s
 tuple of a fixed length is declared as ``Annotated[tuple[float, ...], 16]``, of floats or of NamedTuples.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache, lru_cache
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -88,16 +88,6 @@ def leaves(row: Any) -> list[Any]:
 def numbers(row: Any) -> list[float]:
     """All numbers of a NamedTuple of floats, in the units of its fields, in the order of ``leaf_paths``."""
     return [float(value) for value in leaves(row)]
-
-
-def table(groups: Sequence[Any], runs: int) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
-    """Rows (numbers, runs) of some NamedTuples whose numbers are floats, the same for all runs, or arrays (runs,)."""
-    values = [value for group in groups for value in leaves(group)]
-    rows = np.empty((len(values), runs))
-    for row, value in zip(rows, values, strict=True):
-        # Broadcast: a float fills the row of all runs.
-        row[:] = value
-    return rows
 
 
 def rebuilt(row: Any, values: Iterable[Any]) -> Any:

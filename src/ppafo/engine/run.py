@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.engine.groups import Role, filled
 from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
 from ppafo.engine.linking import composed_with
 from ppafo.engine.program import FaultPhases, LegPhases, Program
-from ppafo.engine.rows import of_each, row_numbers, table
+from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
@@ -44,13 +45,13 @@ WHOLE = 1.0e-9
 
 
 class LegGroups(NamedTuple):
-    """How a leg goes through a step, its groups of parameters, and its groups of states at the start."""
+    """How a leg goes through a step, its groups of parameters, and its groups of states at the start, by name."""
 
     leg: LegPhases
     takes_task_sequence: bool
     faults: FaultPhases | None
-    parameters: list[Any]
-    states: list[Any]
+    parameters: dict[str, Any]
+    states: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,19 +71,25 @@ class Walk:
     failing: "tuple[PlantFaults, ShutOff] | None" = None
 
     def groups(self) -> LegGroups:
-        """Scheme of the program, and its groups of rows in the order of ``Program``."""
+        """Scheme of the program, and its groups of numbers by name."""
         from ppafo.engine.step import walk  # most devices walk on no leg
 
-        parameters = [self.leg, self.share, self.gait, self.timing, self.sensors]
-        parameters += [] if self.task_sequence is None else [self.task_sequence]
-        states: list[Any] = [self.initial, NOTHING_SEEN]
+        parameters: dict[str, Any] = {
+            "leg": self.leg,
+            "share": self.share,
+            "gait": self.gait,
+            "gait_timing": self.timing,
+            "gait_sensors": self.sensors,
+        }
+        parameters |= {} if self.task_sequence is None else {"task_sequence": self.task_sequence}
+        states: dict[str, Any] = {"walk": self.initial, "gait_seen": NOTHING_SEEN}
         faults: FaultPhases | None = None
         if self.failing is not None:
             from ppafo.engine.step import failing as faults  # most runs have no fault
             from ppafo.model.shut_off import POWERED
 
-            parameters += self.failing
-            states.append(POWERED)
+            parameters["plant_faults"], parameters["shut_off"] = self.failing
+            states["unpowered"] = POWERED
         return LegGroups(
             leg=walk,
             takes_task_sequence=self.task_sequence is not None,
@@ -170,15 +177,8 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     timing = LaneTiming(
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
-    plant, valve = [run.plant, run.thermal], [run.valve]
-    walk, walk_states = ([], []) if run.walk is None else run.walk.groups()[-2:]
-    lines, line_states = ([], []) if run.lines is None else ([run.lines.parameters], [run.lines.initial])
-    leg = [] if run.leg is None else [run.leg.load, run.leg.shank]
-    rest = [run.controller, run.reference, run.path, run.sensors, *walk, *lines, *leg, *run.effects]
-    controller = NoParameters() if program.controller is None else program.controller.initial
-    states_of_device = [AT_REST, Pace(run.step), run.initial, gas_at_start(run), program.valve.initial(), controller]
-    parameters = table([timing, *plant, *valve, *rest], runs)
-    states = table([*states_of_device, *walk_states, *line_states, *states_at_start(run)], runs)
+    parameters = filled(program.parameter_rows(), _parameters_of(run, timing), runs, Role.PARAMETER)
+    states = filled(program.state_rows(), _states_of(run), runs, Role.STATE)
     counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     for column, count in enumerate(numbers):
@@ -199,6 +199,40 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         ordered = members[_alike_together(run, runs, members)] if own.is_adaptive and members.size > 1 else members
         batches.append((ordered, Batch(own, ticks, parameters[:, ordered], states[:, ordered])))
     return batches
+
+
+def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
+    """Groups of parameters of a run, by name."""
+    return {
+        "timing": timing,
+        "plant": run.plant,
+        "thermal": run.thermal,
+        "valve": run.valve,
+        "controller": run.controller,
+        "reference": run.reference,
+        "path": run.path,
+        "sensors": run.sensors,
+        **({} if run.walk is None else run.walk.groups().parameters),
+        **({} if run.lines is None else {"lines": run.lines.parameters}),
+        **({} if run.leg is None else {"load": run.leg.load, "shank": run.leg.shank}),
+        **{effect.name: row for effect, row in zip(run.program.effects, run.effects, strict=True)},
+    }
+
+
+def _states_of(run: Run) -> dict[str, Any]:
+    """Groups of states of a run at its start, by name."""
+    program = run.program
+    return {
+        "result": AT_REST,
+        "pace": Pace(run.step),
+        "state": run.initial,
+        "masses": gas_at_start(run),
+        "valve_state": program.valve.initial(),
+        "controller_state": NoParameters() if program.controller is None else program.controller.initial,
+        **({} if run.walk is None else run.walk.groups().states),
+        **({} if run.lines is None else {"line_state": run.lines.initial}),
+        **dict(zip(program.effect_states, states_at_start(run), strict=True)),
+    }
 
 
 def _alike_together(run: Run, runs: int, members: Members) -> Members:

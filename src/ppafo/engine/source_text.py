@@ -47,6 +47,12 @@ def each(convert: Callable[[float], float], row: Row) -> Row:
     return made_row
 
 
+def is_made_of(value: object) -> bool:
+    """True for the parts of a function: a NamedTuple of functions, each known while the function is composed."""
+    is_struct = isinstance(value, tuple) and hasattr(value, "_fields") and len(value) > 0
+    return is_struct and all(isinstance(part, FunctionType) for part in value)  # type: ignore[attr-defined]
+
+
 def is_step_function(function: object) -> bool:
     """True for a function of the step: its first parameter is ``parts``, what the device is made of."""
     return isinstance(function, FunctionType) and function.__code__.co_varnames[:1] == ("parts",)
@@ -267,12 +273,13 @@ class Composer(ast.NodeTransformer):
             if hasattr(builtins, node.id):
                 raise self.refuse(node, f"'{node.id}' cannot be compiled")
             hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
-            raise self.refuse(node, f"there is no '{node.id}'{hint}")
+            remedy = "; import math" if node.id == "math" else ""
+            raise self.refuse(node, f"there is no '{node.id}'{hint}{remedy}")
         if not isinstance(node, ast.Attribute):
             return _INSIDE
         owner = self.value_of(node.value)
         if not isinstance(owner, types.ModuleType):
-            return _INSIDE
+            return getattr(owner, node.attr, _INSIDE) if is_made_of(owner) else _INSIDE
         if not hasattr(owner, node.attr):
             hint = nearest_name(node.attr, dir(owner))
             raise self.refuse(node, f"module '{owner.__name__}' has no '{node.attr}'{hint}")
@@ -471,6 +478,8 @@ class SourceCollector:
             lambda callee: self.needs.get(callee, ()),
             self.stands_for,
         )
+        composer.kept = {name: part for name, part in (function.__kwdefaults__ or {}).items() if is_made_of(part)}
+        tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.kept]
         rows = self.effects.get(function, ())
         _compose_parameters(composer, tree, rows)
         body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body

@@ -109,7 +109,7 @@ _TOTALS: dict[type | None, TotalsKind] = {
 
 def totals_kind(program: Program) -> TotalsKind:
     """How the totals of the gas of a program are made."""
-    return _TOTALS[program.gas.STATES.get("masses")]
+    return _TOTALS[program.state_rows().get("masses")]
 
 
 def has_channels(program: Program, kind: MetricKind) -> bool:

@@ -50,6 +50,7 @@ EFFECTS: Kinds[Effect] = Kinds(
         "laminar_leak": "ppafo.model.effects.laminar_leak:EFFECT",
         "spool_play": "ppafo.model.effects.spool_play:EFFECT",
         "coil_heating": "ppafo.model.effects.coil_heating:EFFECT",
+        "joint_load": "ppafo.model.effects.joint_load:EFFECT",
         "seal_friction": "ppafo.model.effects.seal_friction:EFFECT",
         "stribeck": "ppafo.model.effects.stribeck:EFFECT",
         "bandwidth": bandwidth.EFFECT,

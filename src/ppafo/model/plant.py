@@ -17,7 +17,7 @@ from typing import NamedTuple
 from ppafo.model.columns import Numeric
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
-from ppafo.model.ports import exhaust_path, supply_path
+from ppafo.model.ports import exhaust_path, load_torque, supply_path
 
 
 class PlantParameters(NamedTuple):
@@ -144,11 +144,31 @@ def net_driving_torque(actuator: float, gravity: float, external: float) -> floa
     return actuator - gravity - external
 
 
+def loaded(torque: float, angle: float) -> float:
+    """Torque [N m] less what loads take at an angle [rad] from a joint at rest. Equation (1)."""
+    return torque - load_torque(0.0, angle, 0.0)
+
+
+def undamped_torque(driving: float, friction: float, angle: float, angular_velocity: float) -> float:
+    """Net torque [N m] but for the viscous damping, which an implicit step finds with its end. Equation (1).
+
+    ``driving`` [N m] is less what loads take at rest (``loaded``): what they take of a joint that moves is subtracted
+    here, and ``friction`` [N m], along the motion.
+    """
+    moving = load_torque(0.0, angle, angular_velocity) - load_torque(0.0, angle, 0.0)
+    return driving - friction - moving
+
+
+def net_torque(driving: float, friction: float, viscous_damping: float, angle: float, angular_velocity: float) -> float:
+    """Torque [N m] that is left to accelerate the joint: the right-hand side of equation (1), and its only home."""
+    return undamped_torque(driving, friction, angle, angular_velocity) - viscous_damping * angular_velocity
+
+
 def vane_acceleration(
-    driving_torque: float, angular_velocity: float, friction: float, viscous_damping: float, inertia: float
+    driving: float, friction: float, viscous_damping: float, inertia: float, angle: float, angular_velocity: float
 ) -> float:
-    """Angular acceleration [rad/s^2]; friction [N m] and damping are subtracted. Equation (1)."""
-    return (driving_torque - viscous_damping * angular_velocity - friction) / inertia
+    """Angular acceleration [rad/s^2] of a joint that moves; arguments as ``net_torque`` has them. Equation (1)."""
+    return net_torque(driving, friction, viscous_damping, angle, angular_velocity) / inertia
 
 
 def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:
@@ -168,10 +188,10 @@ def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at
 
 
 def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Torque on the vane before friction and damping [N m], positive in plantarflexion. Equations (1), (2)."""
+    """Torque on a vane at rest before friction [N m], positive in plantarflexion. Equations (1), (2)."""
     actuator = joint_torque(plant, angle, pressure_1, pressure_2)
     gravity = gravity_torque(angle, plant.gravity_torque)
-    return net_driving_torque(actuator, gravity, plant.external_torque)
+    return loaded(net_driving_torque(actuator, gravity, plant.external_torque), angle)
 
 
 def chamber_1_volume(angle: Numeric, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Numeric:

@@ -55,6 +55,15 @@ def friction_in_motion(torque: float, angular_velocity: float, pressure_1: float
     return torque
 
 
+def load_torque(torque: float, angle: float, angular_velocity: float) -> float:
+    """Torque [N m] that a load takes from the joint at an angle [rad] and a rate [rad/s]; it is subtracted.
+
+    Given what other loads take, 0 without any. Equation (1). What it takes at a rate of 0 friction may hold, as it does
+    the weight of the foot plate; the rest is a drag.
+    """
+    return torque
+
+
 def gas_density(density: float) -> float:
     """Density [kg/m^3] of the gas in a chamber, given an ideal gas's at its pressure. Equation (3)."""
     return density

@@ -6,11 +6,13 @@ and units, episodes of agents. So a setting means the same at all of them.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from types import FunctionType
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.model.binding import bind, frame_of
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.units import to_si
@@ -48,6 +50,10 @@ class Term:
     rows: tuple[type, ...] = ()
     orifice: str = ""
     in_other_form: "Term | None" = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """A bound function is pickled by what it was bound from."""
+        return _made_again, (self.sources, _by_frame(self.function), self.rows, self.orifice, self.in_other_form)
 
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
@@ -212,3 +218,26 @@ def joined(parts: Iterable[Graph]) -> dict[str, tuple[Follows, ...]]:
     for part in parts:
         links |= part
     return links
+
+
+class _Bound(NamedTuple):
+    frame: Any
+    name: str
+    components: tuple[Any, ...]
+
+
+def _by_frame(value: Any) -> Any:
+    frame = frame_of(value) if isinstance(value, FunctionType) else None
+    if frame is None:
+        return value
+    return _Bound(frame.function, value.__name__, tuple((name, _by_frame(item)) for name, item in frame.components))
+
+
+def _again(value: Any) -> Any:
+    if not isinstance(value, _Bound):
+        return value
+    return bind(_again(value.frame), value.name, {name: _again(item) for name, item in value.components})
+
+
+def _made_again(sources: Any, function: Any, rows: Any, orifice: str, other: Any) -> Term:
+    return Term(sources, _again(function), rows, orifice, other)

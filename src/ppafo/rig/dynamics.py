@@ -260,7 +260,7 @@ def rig_rates(
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
     pressed = pressed_in_motion(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
     friction = direction * more_near_standstill(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
-    acceleration = vane_acceleration(torque, speed, friction, plant.viscous_damping, plant.inertia)
+    acceleration = vane_acceleration(torque, friction, plant.viscous_damping, plant.inertia, angle, speed)
     grows = plant.displacement_per_radian * (speed if direction != 0.0 else rate)
     heat_1, heat_2 = wall_heat(rig, node_1, volume_1), wall_heat(rig, node_2, volume_2)
     # Chambers that are open to the room take part in nothing, and their gas stays as it was.

@@ -23,7 +23,7 @@ from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.plan import CarriedLeg, plan_vane
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Leg, Scenario, vane_motion
-from ppafo.simulation.vane_recording import friction_sizes, measured
+from ppafo.simulation.vane_recording import measured, net_torques
 
 
 def on_gait(leg: Leg, name: str, folder: Path) -> Leg:
@@ -128,8 +128,7 @@ def _torque_on_leg(leg: Leg, run: Run, times: Floats, rows: Mapping[str, Floats]
     kind = shank_kind(leg)
     now = shank_over_samples(kind, run.leg.shank, times)
     added, needed = (over_samples(torque_on_foot, load, now, angle) for load in (run.leg.load, foot))
-    net = torque + added - plant.external_torque - plant.viscous_damping * rate
-    net -= np.sign(rate) * friction_sizes(run, rows)
+    net = net_torques(run, rows, torque + added - plant.external_torque)
     # A vane at rest is held by friction or a stop.
     acceleration = np.where(rate != 0.0, net / plant.inertia, 0.0)
     return np.asarray(foot.inertia * acceleration - needed + plant.external_torque)

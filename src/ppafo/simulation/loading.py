@@ -36,6 +36,7 @@ from ppafo.simulation.declaration import (
     ACCURACY,
     AT_REST,
     INITIAL,
+    LOCKED_ANGLE,
     OF_A_VANE,
     PRESSURE_WORDS,
     REFERENCE_OF,
@@ -264,10 +265,13 @@ def _control(
     if not any(quantity.follows for quantity in items):
         return Control(kind, reading.section("controller", items), period), {}
     rows = None if lines is None else lines.row(device.supply)
-    seen = seen_in_scenario(controlled, leg is not None)
+    is_locked = getattr(motion, "locked_angle", None) is not None and motion.motion_kind.name == "locked"
+    seen = seen_in_scenario(controlled, leg is not None, is_locked)
     terms = nominal_terms(device, rows) | loop_terms(device, CONTROLLERS[kind], seen, controlled)
     of_sensors = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
     present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
+    if is_locked:
+        present |= {LOCKED_ANGLE: motion.locked_angle}
     if leg is not None:
         present |= {path: getattr(leg, path.removeprefix("motion.")) for path in LEG_PATHS}
     followed, links = read_followers(reading, {"controller": items}, terms, device, present)

@@ -5,11 +5,11 @@ A vane is taken with the foot at a right angle, or 0.2 rad inside a stop where t
 
 from typing import Annotated, Any, NamedTuple
 
-from ppafo.control.binding import bind
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.actuators.vane import VaneSettings
+from ppafo.model.binding import bind
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.declaration import Number, PlainFunction, quantities_of
 from ppafo.parameters.device import VANE, Device
 
 RIGHT_ANGLE = 1.5707963267948966
@@ -82,12 +82,15 @@ def measured_shape_of(settings: Any, stops: Range) -> Any:
     return prepared_shape(settings, stops, TABLE)  # type: ignore[call-arg]
 
 
-def vane_at_right_angle(settings: VaneSettings, stops: Range, _around: Surroundings) -> MeanChambers:
-    """Both chambers of a vane with the foot at a right angle. Equations (2), (4), (5)."""
-    middle = 0.5 * (stops.angle_min + stops.angle_max)
-    inside = min(max(RIGHT_ANGLE, stops.angle_min + INSIDE), stops.angle_max - INSIDE)
-    # A range of less than 0.4 rad has no such place.
-    angle = inside if stops.angle_max - stops.angle_min > 2.0 * INSIDE else middle
+def inside_stops(lowest: float, highest: float) -> float:
+    """A right angle [rad], or 0.2 rad inside the stop before it; the middle of a range of less than 0.4 rad."""
+    middle = 0.5 * (lowest + highest)
+    inside: float = min(max(RIGHT_ANGLE, lowest + INSIDE), highest - INSIDE)
+    return inside if highest - lowest > 2.0 * INSIDE else middle
+
+
+def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: float) -> MeanChambers:
+    """Both chambers of a vane at an angle [rad]. Equations (2), (4), (5)."""
     growth = settings.displacement_per_radian
     return MeanChambers(
         torque_per_pressure_1=settings.torque_constant,
@@ -99,9 +102,9 @@ def vane_at_right_angle(settings: VaneSettings, stops: Range, _around: Surroundi
     )
 
 
-def shaped_in_the_middle(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
-    """Both chambers of another kind in the middle of its range, half filled."""
-    angle, room = 0.5 * (stops.angle_min + stops.angle_max), around.atmospheric_pressure
+def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float) -> MeanChambers:
+    """Both chambers of another kind at an angle [rad], half filled."""
+    room = around.atmospheric_pressure
     plant = StillPlant(
         shape=shape_of(settings, stops),
         gas_product=1.0,
@@ -129,6 +132,31 @@ def shaped_in_the_middle(settings: Any, stops: Range, around: Surroundings) -> M
     )
 
 
+def chambers_at(settings: Any, stops: Range, around: Surroundings, angle: float) -> MeanChambers:
+    """Stand for the chambers at an angle [rad]."""
+    raise NotImplementedError
+
+
+def middle_of(stops: Range) -> float:
+    """Middle of the range [rad]."""
+    return 0.5 * (stops.angle_min + stops.angle_max)
+
+
+def right_angle_in(stops: Range) -> float:
+    """A right angle [rad], or 0.2 rad inside a stop."""
+    return inside_stops(stops.angle_min, stops.angle_max)
+
+
+def usual_place(stops: Range) -> float:
+    """Stand for the angle at which the gains take the chambers where nobody knows where the joint is [rad]."""
+    raise NotImplementedError
+
+
+def usual_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
+    """Both chambers where nobody knows where the joint is."""
+    return chambers_at(settings, stops, around, usual_place(stops))
+
+
 def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
     """Growth of chamber 1 of a vane with the angle [m^3/rad], which is the same everywhere."""
     return settings.displacement_per_radian
@@ -143,10 +171,11 @@ def shaped_growth(settings: Any, stops: Range, around: Surroundings) -> float:
 class ChambersOf(NamedTuple):
     """The functions of an actuator that give its ``MeanChambers`` and the mean growth of chamber 1 [m^3/rad].
 
-    Both take the same: by path, and in which rows.
+    Both take the same: by path, and in which rows. ``at`` gives the chambers at an angle [rad], which it takes last.
     """
 
     function: Any
+    at: Any
     growth: Any
     sources: tuple[str, ...]
     rows: tuple[type, ...]
@@ -165,7 +194,9 @@ def chambers_of(device: Device) -> ChambersOf:
         for quantity in quantities_of(row)
     )
     if actuator.kind == VANE:
-        return ChambersOf(function=vane_at_right_angle, growth=vane_growth, sources=sources, rows=rows)
+        own: dict[str, PlainFunction] = {"chambers_at": vane_at, "usual_place": right_angle_in}
+        usual = bind(usual_chambers, "usual_chambers_of_vane", own)
+        return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
     components = {
         "prepared_shape": kind.model.prepare,
         "both_chambers": kind.model.chambers,
@@ -174,6 +205,8 @@ def chambers_of(device: Device) -> ChambersOf:
     }
     prepared = shape_of if actuator.table is None else measured_shape_of
     components["shape_of"] = bind(prepared, f"shape_of_{actuator.kind}", components)
-    middle = bind(shaped_in_the_middle, f"middle_of_{actuator.kind}", components)
+    there = bind(shaped_at, f"chambers_at_of_{actuator.kind}", components)
+    usual_parts: dict[str, PlainFunction] = {"chambers_at": there, "usual_place": middle_of}
+    middle = bind(usual_chambers, f"usual_chambers_of_{actuator.kind}", usual_parts)
     growth = bind(shaped_growth, f"growth_of_{actuator.kind}", components)
-    return ChambersOf(function=middle, growth=growth, sources=sources, rows=rows)
+    return ChambersOf(function=middle, at=there, growth=growth, sources=sources, rows=rows)

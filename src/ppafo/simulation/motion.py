@@ -107,7 +107,10 @@ class VaneKind:
         """Return how the controller sees what it controls, with the foot of a leg or without."""
         from ppafo.simulation.torque_loop import seen_in_scenario
 
-        return seen_in_scenario(scenario.controlled, vane_motion(scenario).leg is not None)
+        motion = vane_motion(scenario)
+        return seen_in_scenario(
+            scenario.controlled, motion.leg is not None, scenario.motion.motion_kind.name == "locked"
+        )
 
     def follows_reference(self, scenario: Scenario) -> bool:
         """Tell whether there is a law that follows the reference, and not a constant command."""

@@ -5,9 +5,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.control.binding import bind
 from ppafo.control.kind import NOMINAL
 from ppafo.model.actuators.kind import Range
+from ppafo.model.binding import bind
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import first
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant

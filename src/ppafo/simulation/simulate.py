@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
     from ppafo.metrics.metric import Metric
     from ppafo.simulation.check import Check, ErrorEstimate
-    from ppafo.simulation.oscillation import Oscillation
-    from ppafo.simulation.standstill import Standstill
+    from ppafo.simulation.tracking import Tracking
 
 REMEDY = (
     "the step may be too long for this device, or a value unrealistic: try a smaller run.step, "
@@ -109,24 +108,17 @@ class Result:
         return self.measured().metrics
 
     @property
-    def oscillation(self) -> "Oscillation | None":
-        """The verdict where the loop oscillates; None where it does not, or has a controller of yours."""
-        from ppafo.simulation.oscillation import oscillation_in
+    def tracking(self) -> "Tracking | None":
+        """The verdict where what is controlled does not follow its reference; None where it does, or has none."""
+        from ppafo.simulation.tracking import tracking_in
 
-        return oscillation_in(self)
-
-    @property
-    def standstill(self) -> "Standstill | None":
-        """The verdict where the loop does not move at all; None where it does, or has a controller of yours."""
-        from ppafo.simulation.standstill import standstill_of
-
-        law = self.scenario.law
-        return standstill_of(self.scenario, law, self.recording) if law and self.status.is_completed else None
+        return tracking_in(self) if self.status.is_completed else None
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What makes the run useless for its purpose, a sentence each: a loop that oscillates or does not move."""
-        return tuple(verdict.sentence for verdict in (self.oscillation, self.standstill) if verdict is not None)
+        """What makes the run useless for its purpose, a sentence each: a loop that does not follow its reference."""
+        verdict = self.tracking
+        return () if verdict is None else (verdict.sentence,)
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""

@@ -11,16 +11,17 @@ from typing import Annotated, Any, NamedTuple
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.angle_loop import Joint
-from ppafo.control.binding import bind
 from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import SAMPLES_LATE, TorqueLoop
 from ppafo.model.actuators.kind import Range
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Number, PlainFunction, row_with
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
+from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 from ppafo.simulation.motion_kind import Seen
 from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
@@ -73,35 +74,84 @@ class Signals(NamedTuple):
 
 
 _Joint = {"inertia": _Inertia, "gravity_torque": _Torque, "viscous_damping": _Damping, "dynamic_torque": _Torque}
+Locked: Any = row_with("Locked", Signals, locked_angle=Annotated[float, Number("rad", "")])
+"""Signals of a joint that is locked, with its angle [rad]."""
 OfJoint: Any = row_with("OfJoint", Signals, angle_bandwidth=_Hertz, **_Joint)
 """Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
 OfLeg: Any = row_with("OfLeg", OfJoint, foot_mass=_Mass, foot_mass_centre=_Length, foot_inertia=_Inertia)
 """Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
 
 
-def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
-    """Stand for the chambers of the actuator."""
-    raise NotImplementedError
+class SpoolParts(NamedTuple):
+    """What the time of a spool is made of: the time [s] after which the valve has followed a command."""
+
+    follow_time: Callable[[Any], float]
 
 
-def valve_flow(numbers: FlowNumbers) -> float:
-    """Stand for R T times the conductance of the valve [m^3/s]."""
-    raise NotImplementedError
+class ChamberParts(NamedTuple):
+    """Chambers of an actuator: where the joint is anywhere between its stops, and at an angle [rad]."""
+
+    usual: Callable[[Any, Range, Surroundings], MeanChambers]
+    at: Callable[[Any, Range, Surroundings, float], MeanChambers]
 
 
-def time_of_valve(valve: Any, period: float) -> float:
-    """Stand for how late the valve follows a command [s], once it is sampled every ``period`` [s]."""
-    raise NotImplementedError
+def chambers_of_moving_joint(
+    settings: Any, stops: Range, around: Surroundings, signals: Any, *, parts: ChamberParts
+) -> MeanChambers:
+    """Chambers for the gains of a joint that moves."""
+    return parts.usual(settings, stops, around)
 
 
-def time_of_signals(signals: Any) -> float:
-    """Stand for how late the measurements are [s]."""
-    raise NotImplementedError
+def chambers_of_locked_joint(
+    settings: Any, stops: Range, around: Surroundings, signals: Any, *, parts: ChamberParts
+) -> MeanChambers:
+    """Chambers for the gains of a joint that is locked: those at its angle."""
+    return parts.at(settings, stops, around, signals.locked_angle)
 
 
-def follow_time(settings: Any) -> float:
-    """Stand for the time [s] after which a valve has followed a command."""
-    raise NotImplementedError
+class LoopParts(NamedTuple):
+    """What a loop is made of, each by the rows that it takes.
+
+    The chambers of the actuator, R T times the conductance of the valve [m^3/s], how late the valve follows a command
+    [s] once it is sampled every period [s], how late the measurements are [s], and how what is controlled goes with the
+    pressure in each chamber.
+    """
+
+    mean_chambers: Callable[[Any, Range, Surroundings, Any], MeanChambers]
+    valve_flow: Callable[[FlowNumbers], float]
+    time_of_valve: Callable[[Any, float], float]
+    time_of_signals: Callable[[Any], float]
+    per_pressure_1: Callable[[MeanChambers], float]
+    per_pressure_2: Callable[[MeanChambers], float]
+
+
+class JointParts(NamedTuple):
+    """What a joint is made of: chambers of the actuator; inertia [kg m^2] and gravity torque [N m] of what turns."""
+
+    mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
+    turning: Callable[[Any], tuple[float, float]]
+
+
+class AngleParts(NamedTuple):
+    """What a loop of the angle is made of: the torque loop of a device and its joint, by all their rows."""
+
+    torque_loop_of: Callable[..., TorqueLoop]
+    joint_of: Callable[..., Joint]
+
+
+class GainParts(NamedTuple):
+    """What a gain is made of: the loop of a device, and a rule of ``control.torque_loop``."""
+
+    loop_of: Callable[..., TorqueLoop]
+    rule: Callable[..., float]
+
+
+class GainOfJointParts(NamedTuple):
+    """What a gain is made of that the joint decides too: loop and joint, and a rule of ``control.angle_loop``."""
+
+    torque_loop_of: Callable[..., TorqueLoop]
+    joint_of: Callable[..., Joint]
+    rule: Callable[[TorqueLoop, Joint], float]
 
 
 def area_flow(numbers: FlowNumbers) -> float:
@@ -116,9 +166,9 @@ def sonic_flow(numbers: FlowNumbers) -> float:
     return flow_of_sonic(numbers.molar_mass, numbers.temperature, numbers.orifice_1)
 
 
-def time_of_spool(valve: Any, period: float) -> float:
+def time_of_spool(valve: Any, period: float, *, parts: SpoolParts) -> float:
     """Time [s] from a sample to the flow: what the valve needs, and the wait for the command and in it."""
-    return follow_time(valve) + SAMPLES_LATE * period
+    return parts.follow_time(valve) + SAMPLES_LATE * period
 
 
 def time_of_pair(valve: Any, period: float) -> float:
@@ -143,12 +193,12 @@ def time_in_walk(signals: SignalsOfWalk) -> float:
     return lag_of_sensor(signals.bandwidth)
 
 
-def per_pressure_1(mean: MeanChambers) -> float:
+def torque_by_pressure_1(mean: MeanChambers) -> float:
     """How what is controlled goes with the pressure in chamber 1: of a torque [m^3], which grows with it."""
     return mean.torque_per_pressure_1
 
 
-def per_pressure_2(mean: MeanChambers) -> float:
+def torque_by_pressure_2(mean: MeanChambers) -> float:
     """How what is controlled falls with the pressure in chamber 2: of a torque [m^3]."""
     return mean.torque_per_pressure_2
 
@@ -164,17 +214,24 @@ def no_pressure(_mean: MeanChambers) -> float:
 
 
 def loop_of(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    *,
+    parts: LoopParts,
 ) -> TorqueLoop:
     """The loop of a device at a constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure."""
-    mean = mean_chambers(settings, stops, around)
+    mean = parts.mean_chambers(settings, stops, around, signals)
     per_flow = max(
-        per_pressure_1(mean) * around.supply_pressure / mean.volume_1,
-        per_pressure_2(mean) * around.dorsiflexion_pressure / mean.volume_2,
+        parts.per_pressure_1(mean) * around.supply_pressure / mean.volume_1,
+        parts.per_pressure_2(mean) * around.dorsiflexion_pressure / mean.volume_2,
     )
     return TorqueLoop(
-        rate=valve_flow(numbers) * per_flow,
-        dead_time=time_of_valve(valve, signals.period) + time_of_signals(signals),
+        rate=parts.valve_flow(numbers) * per_flow,
+        dead_time=parts.time_of_valve(valve, signals.period) + parts.time_of_signals(signals),
     )
 
 
@@ -197,15 +254,12 @@ def turning_with_foot(signals: Any) -> tuple[float, float]:
     return inertia, signals.gravity_torque + moment * STANDARD_GRAVITY
 
 
-def turning(signals: Any) -> tuple[float, float]:
-    """Stand for what turns."""
-    raise NotImplementedError
-
-
-def joint_of(settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float) -> Joint:
+def joint_of(
+    settings: Any, stops: Range, around: Surroundings, signals: Any, travel: float, *, parts: JointParts
+) -> Joint:
     """The joint of a device, with its gas at the atmosphere's pressure, which is the softest spring of it."""
-    mean = mean_chambers(settings, stops, around)
-    inertia, weight = turning(signals)
+    mean = parts.mean_chambers(settings, stops, around)
+    inertia, weight = parts.turning(signals)
     spring_1 = mean.torque_per_pressure_1 * mean.growth_1 * around.atmospheric_pressure / mean.volume_1
     spring_2 = mean.torque_per_pressure_2 * mean.growth_2 * around.atmospheric_pressure / mean.volume_2
     return Joint(
@@ -219,57 +273,78 @@ def joint_of(settings: Any, stops: Range, around: Surroundings, signals: Any, tr
 
 
 def slow_loop_of(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    *,
+    parts: AngleParts,
 ) -> TorqueLoop:
     """The loop of the angle that a law sees which opens the valve by its error."""
-    loop = torque_loop_of(settings, stops, around, numbers, valve, signals)
-    return angle_loop.slow_loop(loop, joint_of(settings, stops, around, signals, 0.0))
-
-
-def torque_loop_of(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
-) -> TorqueLoop:
-    """Stand for the torque loop of a device."""
-    raise NotImplementedError
-
-
-def rule_of_joint(loop: TorqueLoop, joint: Joint) -> float:
-    """Stand for a rule of ``control.angle_loop``."""
-    raise NotImplementedError
+    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
+    return angle_loop.slow_loop(loop, parts.joint_of(settings, stops, around, signals, 0.0))
 
 
 def gain_of_joint(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any, travel: float
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    travel: float,
+    *,
+    parts: GainOfJointParts,
 ) -> float:
     """What a rule makes of the torque loop of a device and of its joint, which is to go so far at a time [rad]."""
-    loop = torque_loop_of(settings, stops, around, numbers, valve, signals)
-    return rule_of_joint(loop, joint_of(settings, stops, around, signals, travel))
-
-
-def rule(loop: TorqueLoop, *_number: float) -> float:
-    """Stand for a rule of ``control.torque_loop``."""
-    raise NotImplementedError
+    loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
+    return parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel))
 
 
 def gain_of_loop(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    *,
+    parts: GainParts,
 ) -> float:
     """What a rule makes of the torque loop of a device."""
-    return rule(loop_of(settings, stops, around, numbers, valve, signals))
+    return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals))
 
 
 def gain_of_loop_and_setting(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any, setting: float
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    setting: float,
+    *,
+    parts: GainParts,
 ) -> float:
     """What a rule makes of the torque loop of a device and of another setting of the law."""
-    return rule(loop_of(settings, stops, around, numbers, valve, signals), setting)
+    return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
 
 
 def opening_beyond_band(
-    settings: Any, stops: Range, around: Surroundings, numbers: FlowNumbers, valve: Any, signals: Any, setting: float
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    setting: float,
+    *,
+    parts: GainParts,
 ) -> float:
     """Command [-] for what a rule makes an opening of, of a valve that opens beyond a dead band."""
-    opening = rule(loop_of(settings, stops, around, numbers, valve, signals), setting)
+    opening = parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
     return float(valve.dead_band + (1.0 - valve.dead_band) * opening)
 
 
@@ -296,10 +371,10 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
 }
 """What follows the torque loop and the joint, and by which rule."""
 
-_PER_PRESSURE: dict[str, dict[str, Callable[[MeanChambers], float]]] = {
-    "pressure_1": {"per_pressure_1": whole_pressure, "per_pressure_2": no_pressure},
-    "pressure_2": {"per_pressure_1": no_pressure, "per_pressure_2": whole_pressure},
-    "pressure_difference": {"per_pressure_1": whole_pressure, "per_pressure_2": whole_pressure},
+_PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanChambers], float]]] = {
+    "pressure_1": (whole_pressure, no_pressure),
+    "pressure_2": (no_pressure, whole_pressure),
+    "pressure_difference": (whole_pressure, whole_pressure),
 }
 """How a pressure that is controlled goes with both."""
 
@@ -307,14 +382,14 @@ _PER_PRESSURE: dict[str, dict[str, Callable[[MeanChambers], float]]] = {
 class LoopFrames(NamedTuple):
     """The loop of what is controlled and the torque loop, as functions of rows; the rows, what fills them, components.
 
-    ``joint`` is what ``joint_of`` needs, {} where it is not known.
+    ``joint`` is the joint, None where it is not known.
     """
 
     loop: PlainFunction
     torque_loop: PlainFunction
     rows: tuple[type, ...]
     sources: tuple[str, ...]
-    joint: dict[str, PlainFunction]
+    joint: PlainFunction | None
 
 
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
@@ -323,12 +398,14 @@ IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES)
 """The torque in a walk."""
 IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"))
 """A torque or a pressure of a vane alone."""
+LOCKED = Seen(signals=Locked, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay", LOCKED_ANGLE))
+"""The same of a joint that is locked at an angle."""
 
 
-def seen_in_scenario(controlled: str, has_leg: bool) -> Seen:
+def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False) -> Seen:
     """Return how the law of a vane alone sees what is controlled, on a joint with a leg's foot or without."""
     if controlled != ANGLE:
-        return IN_SCENARIO
+        return LOCKED if is_locked else IN_SCENARIO
     if has_leg:
         paths = (*_ANGLE, *LEG_PATHS)
         return Seen(signals=OfLeg, late=time_with_angle, paths=paths, turning=turning_with_foot)
@@ -343,22 +420,26 @@ def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFra
     valve = VALVES[device.valve.kind]
     chambers = chambers_of(device)
     names = {quantity.name for quantity in valve.quantities}
-    timed = {"follow_time": valve.lag or valve.choose(valve_settings(device.valve)).command_delay}
-    components = {
-        "mean_chambers": chambers.function,
-        "valve_flow": sonic_flow if sonic else area_flow,
-        "time_of_valve": time_of_pair
-        if {"opening_delay", "closing_delay", "switching_interval"} <= names
-        else bind(time_of_spool, "time_of_spool_valve", timed),
-        "time_of_signals": seen.late,
-        **_PER_PRESSURE.get(controlled, {}),
-    }
-    loop = inner = bind(loop_of, "loop_of_device", components)
-    joint: dict[str, PlainFunction] = {}
+    timed = SpoolParts(valve.lag or valve.choose(valve_settings(device.valve)).command_delay)
+    is_pair = {"opening_delay", "closing_delay", "switching_interval"} <= names
+    per_pressure_1, per_pressure_2 = _PER_PRESSURE.get(controlled, (torque_by_pressure_1, torque_by_pressure_2))
+    parts = LoopParts(
+        mean_chambers=made_of(
+            chambers_of_locked_joint if seen is LOCKED else chambers_of_moving_joint,
+            "chambers_of_loop",
+            ChamberParts(chambers.function, chambers.at),
+        ),
+        valve_flow=sonic_flow if sonic else area_flow,
+        time_of_valve=time_of_pair if is_pair else made_of(time_of_spool, "time_of_spool_valve", timed),
+        time_of_signals=seen.late,
+        per_pressure_1=per_pressure_1,
+        per_pressure_2=per_pressure_2,
+    )
+    loop = inner = made_of(loop_of, "loop_of_device", parts)
+    joint: PlainFunction | None = None
     if seen.turning is not None:
-        parts = {"mean_chambers": chambers.function, "turning": seen.turning}
-        joint = {"joint_of": bind(joint_of, "joint_of_device", parts), "torque_loop_of": inner}
-        loop = bind(slow_loop_of, "slow_loop_of_device", joint)
+        joint = made_of(joint_of, "joint_of_device", JointParts(chambers.function, seen.turning))
+        loop = made_of(slow_loop_of, "slow_loop_of_device", AngleParts(inner, joint))
     sources = (
         *chambers.sources,
         *("gas.molar_mass", "gas.heat_capacity_ratio", "gas.temperature"),
@@ -381,8 +462,12 @@ def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str 
     def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> Term:
         # A law of the angle alone has the torque loop inside it.
         own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
-        inner = {**frames.joint, "rule_of_joint": by} if frame is gain_of_joint else {"loop_of": own_loop, "rule": by}
-        return Term((*frames.sources, *settings), bind(frame, f"{by.__name__}_of_device", inner), frames.rows)
+        if frame is gain_of_joint:
+            assert frames.joint is not None, "a law of the angle knows its joint"
+            made = made_of(frame, f"{by.__name__}_of_device", GainOfJointParts(frames.torque_loop, frames.joint, by))
+        else:
+            made = made_of(frame, f"{by.__name__}_of_device", GainParts(own_loop, by))
+        return Term((*frames.sources, *settings), made, frames.rows)
 
     def term(frame: PlainFunction, by: PlainFunction, *settings: str) -> Term:
         return in_its_form(device, VALVE, in_form(of_area, frame, by, settings), in_form(of_sonic, frame, by, settings))

@@ -1,6 +1,7 @@
 """Recording and metrics of a run of a vane alone, from its rows: most runs of many are never looked at."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -13,8 +14,9 @@ from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.metrics import evaluate
 from ppafo.model.controlled import CONTROLLED
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import gravity_torque, sliding_friction
+from ppafo.model.plant import gravity_torque, loaded, net_torque, sliding_friction
 from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
@@ -37,10 +39,8 @@ def measured_prescribed(scenario: Scenario, run: Run, times: Floats, rows: Mappi
 
     def external_torque(torque: Floats) -> Floats:
         acceleration = profile_values(path, times)[2]
-        angle, rate = rows["state.angle"], rows["state.angular_velocity"]
-        friction = over_samples(sliding_friction, rate, 1.0) * friction_sizes(run, rows)
-        gravity = gravity_torque(angle, plant.gravity_torque)
-        return np.asarray(torque - gravity - friction - plant.viscous_damping * rate - plant.inertia * acceleration)
+        gravity = gravity_torque(rows["state.angle"], plant.gravity_torque)
+        return np.asarray(net_torques(run, rows, torque - gravity) - plant.inertia * acceleration)
 
     return measured(scenario, run, times, rows, external_torque)
 
@@ -121,16 +121,31 @@ def gas_channels(gas: Gas, run: Run, rows: Mapping[str, Floats]) -> dict[str, tu
     return channels
 
 
-def friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Floats | float:
+def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
+    """Net torque [N m] at each sample of a vane that another ``torque`` [N m] than loads drives. Equation (1)."""
+    angle, rate = rows["state.angle"], rows["state.angular_velocity"]
+    friction = over_samples(sliding_friction, rate, 1.0) * _friction_sizes(run, rows)
+    driving = _with_effects(run, rows, loaded, torque, angle)
+    return np.asarray(_with_effects(run, rows, net_torque, driving, friction, run.plant.viscous_damping, angle, rate))
+
+
+def _friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Any:
     """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    law = place_over_samples(friction_in_motion, run.program.effects, run.effects)
-    if law is None:
+    if not run.program.effects:
         return run.plant.dynamic_torque
     angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
     pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)
+    rate = rows["state.angular_velocity"]
+    return _with_effects(run, rows, friction_in_motion, run.plant.dynamic_torque, rate, *pressures)
+
+
+def _with_effects(run: Run, rows: Mapping[str, Floats], function: PlainFunction, *given: Any) -> Any:
+    """Value of a function of the model at each sample, with the effects of a run in it."""
+    law = place_over_samples(function, run.program.effects, run.effects)
+    if law is None:
+        return function(*given)
     states = {
         name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
         for name, row in run.program.effect_states.items()
     }
-    sizes: Floats = law(states, run.plant.dynamic_torque, rows["state.angular_velocity"], *pressures)
-    return sizes
+    return law(states, *given)

@@ -3,24 +3,145 @@
 What cannot be read is named with file, line and column, and what is wrong in the map with its key.
 """
 
+import re
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, one_line, refused_as
+from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
 from ppafo.signals import Channel, Recording
-from ppafo.signals.recording import PLAIN_NUMBER, TIME, Floats
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
 from ppafo.storage.clock import clock_seconds
-from ppafo.storage.column_map import ColumnMap, MappedChannel, MappedTable, check_sources, in_map
+from ppafo.storage.column_map import (
+    ColumnMap,
+    MappedChannel,
+    MappedDirection,
+    MappedTable,
+    check_sources,
+    in_map,
+    shown_names,
+)
 from ppafo.storage.comma_separated import Column, check_clock, in_si
 from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes
-from ppafo.storage.mapped_direction import with_direction
-from ppafo.storage.mapped_matlab import read_mapped_matlab
 from ppafo.storage.mapped_text import read_mapped_text
-from ppafo.storage.matlab import MATLAB_SUFFIX, read_matlab
+from ppafo.storage.matlab import MATLAB_SUFFIX, MatlabFile, read_matlab
+
+# What a column map takes of a MATLAB file, by the names of its variables: ``M(:,3)``, ``log.pressure``.
+
+
+def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> MappedTable:
+    """Return what a map takes of a MATLAB file, numbers in the file's own units.
+
+    DataError names the key of a channel whose variable is not there or not usable, and the map where ``map_name`` says
+    which.
+    """
+    numbers: dict[str, Floats] = {}
+    clock: list[str] | None = None
+    dates: list[str] | None = None
+    with in_map(map_name):
+        for name, mapped in columns.channels.items():
+            if mapped.column is None:
+                continue
+            variable = _variable(f"channels.{name}.column", mapped.column, file)
+            if name == TIME and variable in file.texts:
+                clock = file.texts[variable]
+            else:
+                numbers[name] = file.columns[variable]
+        date = columns.channels[TIME].date
+        if date is not None:
+            dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))
+        size = _common_length(numbers, clock)
+        for name, values in numbers.items():
+            gaps = np.flatnonzero(~np.isfinite(values))
+            if gaps.size:
+                first = int(gaps[0])
+                raise DataError(f"channels.{name}.column: sample {first + 1} is {values[first]}, not a finite number")
+    return MappedTable(
+        size=size, numbers=numbers, clock=clock, dates=dates, rows=range(1, size + 1), noun="sample", kind="measured"
+    )
+
+
+def _variable(key: str, column: int | str, file: MatlabFile) -> str:
+    """Return the name of the variable that a map has at ``key``; a number is a column of the file's only matrix."""
+    if isinstance(column, int):
+        matrices = sorted({name.partition("(")[0] for name in file.columns if "(:," in name and "." not in name})
+        if len(matrices) != 1:
+            raise DataError(f"{key} = {column}: columns of a .mat file have names; it has {shown_names(file.columns)}")
+        column = f"{matrices[0]}(:,{column})"
+    name = re.sub(r"\s+", "", column) if "(" in column else column
+    if name not in file.columns and name not in file.texts:
+        known = (*file.columns, *file.texts)
+        raise DataError(
+            f"{key} = {column!r}: the file has no such column{nearest_name(name, known)}; it has {shown_names(known)}"
+            f"{file.said_of_objects()}"
+        )
+    return name
+
+
+def _common_length(numbers: dict[str, Floats], clock: list[str] | None) -> int:
+    """Return the number of samples that all columns have; DataError where they have several, or there is no column."""
+    lengths = {name: values.size for name, values in numbers.items()}
+    if clock:
+        lengths[TIME] = len(clock)
+    if len(set(lengths.values())) != 1:
+        listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
+        raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
+    return next(iter(lengths.values()))
+
+
+# The direction of a movement, up or down, from how fast a recorded channel moves, as a column map asks for it.
+
+_SHORTEST = 1e-12
+"""Time [s] between two means of samples below which their slope is not asked for: rounding."""
+
+
+def with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
+    """Return a recording with the channel ``direction``: 1 up, -1 down, 0 for slower than the threshold.
+
+    A channel ``repetition`` numbers the sweeps one way from 1, 0 where it is slower, unless the recording has its own.
+    DataError for a channel that is not there or never moves, a threshold or a window that cannot be read.
+    """
+    from ppafo.units import parse_quantity
+
+    with refused_as(DataError, f"direction.of = {wanted.of!r}", DataError):
+        unit = recording.unit(wanted.of)
+    rate_unit = "1/s" if unit == PLAIN_NUMBER else f"{unit.removesuffix('_d')}/s"
+    with refused_as(DataError, f"direction.threshold = {wanted.threshold!r}", UnitError):
+        threshold = parse_quantity(wanted.threshold, rate_unit)
+    with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):
+        window = parse_quantity(wanted.window, TIME_UNIT)
+    rate = wanted.sign * _smoothed_rate(recording.time, recording[wanted.of], window)
+    direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
+    moving = np.flatnonzero(direction)
+    if moving.size == 0:
+        raise DataError(f"direction.threshold: '{wanted.of}' never moves faster than {wanted.threshold}")
+    directed = recording.with_channel("direction", direction, PLAIN_NUMBER)
+    if "repetition" in recording:
+        return directed
+    sweeps = np.zeros(direction.size)
+    is_reversed = np.diff(direction[moving]) != 0.0
+    sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(is_reversed)))
+    return directed.with_channel("repetition", sweeps, PLAIN_NUMBER)
+
+
+def _smoothed_rate(time: Floats, values: Floats, window: float) -> Floats:
+    """Return the slope [1/s] between the means of the half windows [s] before and after each sample."""
+    sum_of_values = np.concatenate(([0.0], np.cumsum(values)))
+    sum_of_times = np.concatenate(([0.0], np.cumsum(time)))
+    here = np.arange(time.size)
+    # At least the sample itself on either side, where the window is shorter than a sample.
+    first = np.minimum(np.searchsorted(time, time - 0.5 * window), here)
+    end = np.maximum(np.searchsorted(time, time + 0.5 * window, side="right"), here + 1)
+    count_before, count_after = here - first + 1, end - here
+    mean_before = (sum_of_values[here + 1] - sum_of_values[first]) / count_before
+    mean_after = (sum_of_values[end] - sum_of_values[here]) / count_after
+    time_before = (sum_of_times[here + 1] - sum_of_times[first]) / count_before
+    time_after = (sum_of_times[end] - sum_of_times[here]) / count_after
+    return np.asarray((mean_after - mean_before) / np.maximum(time_after - time_before, _SHORTEST))
+
 
 _MASS_FLOW = "kg/s"
 

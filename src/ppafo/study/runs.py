@@ -15,8 +15,8 @@ from ppafo.progress import Progress, Report
 from ppafo.running import most_reversals
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.running import lacking
-from ppafo.simulation.oscillation import REVERSALS
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking import REVERSALS
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import check_metrics
 

@@ -18,7 +18,7 @@ from ppafo.running import most_reversals
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
-from ppafo.simulation.oscillation import REVERSALS
+from ppafo.simulation.tracking import REVERSALS
 from ppafo.storage.parquet import (
     TableColumn,
     encode_texts,

@@ -46,6 +46,8 @@ LEAST_NOISE = 1.0e-4
 """Noise of samples that is taken at least, over the full range [-]."""
 _UNMOVED = 1.0e-3
 """Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
+_USUAL_ZEROS = {"rad": math.radians(0.5), "Pa_d": 0.3 * 6894.757293168361}
+"""Zero by which a sensor of any bench is off: of a signal that does not move, nothing else could be seen."""
 _WITHIN_NOISE = 1.5
 """Size of white noise over its estimate up to which it may be noise."""
 _SHIFTS = 81
@@ -227,7 +229,8 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     away = curve.values - weights @ curve.values
     variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
     explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
-    usual = math.hypot(max(explained, _UNMOVED * curve.full_range), _WITHIN_NOISE * noise) / curve.full_range
+    zero = min(_USUAL_ZEROS.get(curve.unit, 0.0), ACCEPTABLE_FRACTION * curve.full_range)
+    usual = math.hypot(max(explained, _UNMOVED * curve.full_range, zero), _WITHIN_NOISE * noise) / curve.full_range
     return ChannelAgreement(
         channel=curve.channel,
         unit=curve.unit,

@@ -110,15 +110,15 @@ def causes_of(
     names = set.intersection(*(set(measured.recording.names) for measured in read))
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
     sized = [*sizes(device, names), *numbers(read[0], device, settings)]
-    without_size = [_samples(records), _motions(records, settings), list(exchanges(device, names))]
-    tried, explaining = _tried_in_turn(search, none, without_size)
+    tried, explaining = _tried_in_turn(search, none, [_samples(records), _motions(records, settings)])
     if not explaining:
-        # Errors that any bench has come before a fault: they need no cause.
+        # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
         usual = [candidate for candidate in sized if candidate.usual]
         errors = _usual_errors(search, none, usual)
         if errors is not None:
             return Causes(errors, None, len(usual))
-        tried_later, explaining = _tried_in_turn(search, none, [sized, list(effects(device))])
+        stages = [list(exchanges(device, names)), sized, list(effects(device))]
+        tried_later, explaining = _tried_in_turn(search, none, stages)
         tried += tried_later
     if explaining:
         return _explained(search, none, tried, explaining, sized)
@@ -142,11 +142,11 @@ def _tried_in_turn(
 
 def _usual_errors(search: Search, none: Left, usual: Sequence[Candidate]) -> Cause | None:
     """Return the error of sensors, as any bench has it, that explains the recordings: one, or else several together."""
-    together = search.compared(search.together(usual, none), none)
-    if not any(each.explains for each in together):
-        return None
+    # Beside pressures that are nearly equal a flow bends: what is small together may fail on straight lines, and not
+    # alone.
     alone = [each for each in search.compared(usual, none) if each.explains and each.is_usual]
-    return _cause_of(alone or together, search.penalty)
+    together = [each for each in search.compared(search.together(usual, none), none) if each.explains]
+    return _cause_of(alone or together, search.penalty) if alone or together else None
 
 
 def _explained(

@@ -250,7 +250,11 @@ def left_of(record: Record, replayed: Replayed, change: Change, longest_delay: f
     The delay that was found may be what a wrong model makes: it is sought from there and from none.
     """
     good = np.ones_like(record.good) if change.start is None else record.good
-    options = [_errors_from(record, replayed, change, good, first, longest_delay) for first in {0.0, record.delay}]
+    # What all sensors together are late by is their common delay: it is not taken out beside itself.
+    if all(change.sensors.get(name, Sensor()).delay for name in record.channels):
+        longest_delay = 0.0
+    firsts = {0.0, record.delay} if longest_delay > 0.0 else {0.0}
+    options = [_errors_from(record, replayed, change, good, first, longest_delay) for first in firsts]
     errors = min(options, key=lambda option: float(option @ option))
     squares = np.square(errors.reshape(good.shape)).sum(axis=1) / np.maximum(good.sum(axis=1), 1.0)
     return Left(squares, errors)
@@ -268,7 +272,8 @@ def _errors_from(
     errors = np.zeros(good.size)
     for _ in range(STEPS + 1):
         readings = readings_of(record, replayed, change, delay)
-        columns = (np.stack([np.gradient(readings, axis=1), *record.starts]) * good).reshape(-1, good.size)
+        late = np.gradient(readings, axis=1) * (longest_delay > 0.0)
+        columns = (np.stack([late, *record.starts]) * good).reshape(-1, good.size)
         errors = ((record.values - readings) * good).ravel()
         sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ errors)
         errors = errors - sizes @ columns

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.lanes import BatchResult, Floats
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, Walk, state_row_numbers
+from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import LaneResult
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
@@ -19,17 +20,25 @@ from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
 from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
-from ppafo.simulation.oscillation import Oscillation, oscillation_in
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
+from ppafo.simulation.tracking import Tracking, tracking_in
 from ppafo.simulation.vane_recording import gas_channels
 from ppafo.storage.opensim import write_opensim
 from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import UNITS, SupplyCourse
-from ppafo.walking.channels import Channels, actuator_channels, controller_channels, valve_and_ground_channels
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.events import SAFE_ROW, SafetyEvent, safety_events
+from ppafo.walking.events import (
+    EVENT_ROW,
+    FRACTION_ROW,
+    PHASE_ROW,
+    REQUEST_ROW,
+    SAFE_ROW,
+    SafetyEvent,
+    clock_row,
+    safety_events,
+)
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
@@ -52,6 +61,52 @@ from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+# Channels of a recorded walk that do not depend on who walks: what the device does, what its controller sees.
+
+Channels = dict[str, tuple[Any, str]]
+"""Values (samples,) and SI unit of channels by name."""
+
+
+def actuator_channels(run: Run, record: Mapping[str, Floats]) -> Channels:
+    """Pressures, torques and power, from rows (samples,) by path."""
+    angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
+    actuator, masses = run.program.actuator, (record["state.mass_1"], record["state.mass_2"])
+    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, *masses)
+    return {
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "torque": (np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2)), "N m"),
+        "external_torque": (external, "N m"),
+        "device_power": (external * rate, "W"),
+    }
+
+
+def valve_and_ground_channels(record: Mapping[str, Floats]) -> Channels:
+    """The command, how the foot meets the ground, and the gas taken and vented so far."""
+    return {
+        "command": (record["result.command"], "-"),
+        "contact": (record["walk.contact"], "-"),
+        "heel_force": (record["walk.heel_force"], "N"),
+        "toe_force": (record["walk.toe_force"], "N"),
+        "supplied_mass": (record["state.supplied_mass"], "kg"),
+        "vented_mass": (record["state.vented_mass"], "kg"),
+    }
+
+
+def controller_channels(record: Mapping[str, Floats]) -> Channels:
+    """What a controller keeps: phase of the gait, level of help, requested torque, where it is in the stride."""
+    channels: Channels = {}
+    if PHASE_ROW in record:
+        channels["controller_phase"] = (record[PHASE_ROW], "-")
+        channels["safe_state"] = (record[SAFE_ROW], "-")
+    if REQUEST_ROW in record:
+        channels["reference"] = (record[REQUEST_ROW], "N m")
+    fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
+    if fraction is not None and event is not None:
+        channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
+    return channels
+
 
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
@@ -213,10 +268,10 @@ class WalkResult:
         return np.maximum.reduceat(self.recording["torque"], self.starts)[:-1]
 
     @property
-    def oscillation(self) -> Oscillation | None:
-        """The verdict where the torque loop oscillates, None where it does not."""
+    def tracking(self) -> Tracking | None:
+        """The verdict where the torque does not follow what the controller requests, None where it does."""
         strides = self.metrics.get("strides")
-        return None if strides is None or strides.value == 0.0 else oscillation_in(self)
+        return None if strides is None or strides.value == 0.0 else tracking_in(self)
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""

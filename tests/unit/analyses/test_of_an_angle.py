@@ -50,7 +50,7 @@ def test_a_stiffness_is_tuned_for_the_error_of_an_angle() -> None:
     tuned = ppafo.tune(tuning).found
     before, after = (case.result.metrics["rms_angle_error"].value for case in (tuned.before, tuned.after))
     assert after <= before
-    assert tuned.after.result.oscillation is None
+    assert tuned.after.result.tracking is None
 
 
 def test_a_study_has_the_error_of_an_angle_in_its_rows(tmp_path: Path) -> None:

@@ -19,8 +19,7 @@ from ppafo.analyses.reproduce.claim import (
 from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.question import reproduce
-from ppafo.analyses.reproduce.solve import EXPERIMENTS, reproduce_paper
-from ppafo.analyses.reproduce.torque_task import torque_task_observations
+from ppafo.analyses.reproduce.solve import EXPERIMENTS, reproduce_paper, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
 from ppafo.simulation.simulate import Measuring, Result, Status, simulate

@@ -10,8 +10,7 @@ import pytest
 
 from ppafo import golden_bits
 from ppafo.cli import doctor
-from ppafo.cli.completion import completion_script
-from ppafo.cli.main import main
+from ppafo.cli.main import completion_script, main
 from ppafo.engine import loading
 from ppafo.engine.cache.programs import load_generated
 from ppafo.loading import load_scenario

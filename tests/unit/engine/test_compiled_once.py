@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.engine.cache import lock
+from ppafo.engine.cache import making as lock
 from ppafo.engine.cache.folder import LOCK
-from ppafo.engine.cache.lock import one_process
+from ppafo.engine.cache.making import one_process
 from ppafo.engine.cache.programs import load_generated
 from tests.compilers_here import ScriptCompiler
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from ppafo.control.binding import bind
 from ppafo.control.controllers import feedback
 from ppafo.control.walking import assistance
 from ppafo.engine.package_key import package_key
 from ppafo.golden_bits import plain_batch
+from ppafo.model.binding import bind
 
 FOLDERS = ("control", "model", "signals")
 """Without the engine, of which the tests replace a function to count what is compiled."""

@@ -13,7 +13,7 @@ from ppafo.gait import Gait
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.forms.c3d import open_c3d
 from ppafo.gait.recorded.mapping import AngleMap, ForceMap, GaitMap, KneeMap, ShankMap
-from ppafo.gait.recorded.reading import read_table
+from ppafo.gait.recorded.source import read_table
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 

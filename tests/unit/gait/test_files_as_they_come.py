@@ -11,7 +11,7 @@ from ppafo.gait.plausible import check_force_scale
 from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.footfalls import wrap_cycle
 from ppafo.gait.recorded.mapping import AngleMap, GaitMap, ShankMap, Side
-from ppafo.gait.recorded.reading import find_convention, read_table
+from ppafo.gait.recorded.source import find_convention, read_table
 from ppafo.gait.recorded.walk import Signal
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats

@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded import ImportedGait, ImportSettings, import_gait
-from ppafo.gait.recorded.reading import read_table
+from ppafo.gait.recorded.source import read_table
 from ppafo.signals.recording import Floats
 from tests.unit.gait.laboratory import GAIT, MASS, STRIDE, curve, force, markers, on_plate
 

@@ -54,8 +54,8 @@ def test_friction_never_adds_energy(angular_velocity: float, dynamic_torque: flo
 
 
 def test_friction_decelerates_a_vane_that_nothing_drives() -> None:
-    assert vane_acceleration(0.0, 1.0, sliding_friction(1.0, 0.011), 0.032, 8.4e-3) < 0.0
-    assert vane_acceleration(0.0, -1.0, sliding_friction(-1.0, 0.011), 0.032, 8.4e-3) > 0.0
+    assert vane_acceleration(0.0, sliding_friction(1.0, 0.011), 0.032, 8.4e-3, 1.0, 1.0) < 0.0
+    assert vane_acceleration(0.0, sliding_friction(-1.0, 0.011), 0.032, 8.4e-3, 1.0, -1.0) > 0.0
 
 
 def test_stop_holds_against_any_torque_towards_it_but_not_away_from_it() -> None:

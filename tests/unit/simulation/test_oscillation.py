@@ -31,15 +31,15 @@ def test_given_gains_and_computed_ones_are_told_apart() -> None:
 
 def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
     result = simulate(TASK, FAST)
-    verdict = result.oscillation
+    verdict = result.tracking
     assert verdict is not None
     assert verdict.reversals > 10.0
     assert verdict.sentence.startswith("the torque loop oscillates: ")
-    assert "`derivative_gain = 0`" in verdict.remedy
-    mended = float(verdict.remedy.partition(" = ")[2].partition(" ")[0])
+    assert "`derivative_gain = 0`" in verdict.sentence
+    mended = verdict.remedies[0].numbers["controller.proportional_gain"]
     given = [f"controller.proportional_gain={mended}", "controller.derivative_gain=0", FAST[-1]]
     again = simulate(TASK, given)
-    assert again.oscillation is None
+    assert again.tracking is not None and again.tracking.kind == "does not follow" and not again.tracking.is_useless
     assert again.metrics["rms_error"].value < result.metrics["rms_error"].value
 
 
@@ -47,13 +47,16 @@ def test_a_verdict_names_the_gain_that_mends_the_loop_and_it_does() -> None:
 def test_the_scenarios_of_the_package_do_not_oscillate_and_a_pair_that_only_switches_gives_no_alarm(
     scenario: str,
 ) -> None:
-    assert simulate(scenario).oscillation is None
+    verdict = simulate(scenario).tracking
+    assert verdict is not None
+    assert "the actuator gives 5 N m at most; the scenario says of its level: " in verdict.sentence
+    assert verdict.kind == "does not follow" and not verdict.is_useless
 
 
 def test_a_law_that_only_switches_may_turn_as_often_as_it_likes() -> None:
     result = simulate(TASK, ["controller.kind=on_off"])
     assert result.metrics["command_reversals"].value > 100.0
-    assert result.oscillation is None
+    assert result.tracking is not None and not result.tracking.is_useless
     assert most_reversals(result.scenario) == float("inf")
 
 
@@ -67,7 +70,7 @@ def test_simulate_says_it_first_in_text_page_and_data_and_a_check_ends_with_1(
     assert lines[2].startswith("gains: ")
     assert "oscillates: " in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
     assert main([*words, "--check", "--json"]) == 1
-    assert json.loads(capsys.readouterr().out)["oscillation"]["per"] == "second"
+    assert json.loads(capsys.readouterr().out)["tracking"]["per"] == "second"
 
 
 def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
@@ -80,11 +83,11 @@ def test_a_walk_says_it_and_meters_count_what_its_recording_shows() -> None:
         alone = walk(load_walk("proportional", ["run.duration=8 s", f"{gain}={value} 1/(N m)"]))
         for name, metered in together.items():
             assert metered[run] == pytest.approx(alone.metrics[name].value, rel=1e-9)
-        assert (alone.oscillation is not None) == (value > 10.0)
-    verdict = alone.oscillation
+        assert (alone.tracking is not None) == (value > 10.0)
+    verdict = alone.tracking
     assert verdict is not None
     assert verdict.per == "stride"
-    assert "for this device `torque_gain = " in verdict.remedy
+    assert "for this device `torque_gain = " in verdict.sentence
 
 
 def test_find_counts_what_oscillates_as_not_met() -> None:

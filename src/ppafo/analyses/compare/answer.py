@@ -16,9 +16,9 @@ from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
-from ppafo.simulation.oscillation import Oscillation
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
+from ppafo.simulation.tracking import Tracking
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units.shown import in_units
@@ -33,7 +33,7 @@ _ERROR, _GAS = "rms_error", "gas_supplied"
 class Case:
     """A configuration on a task: how the nominal run ended, its metrics, and how many draws failed and first why.
 
-    ``oscillation`` is the verdict on a nominal run whose torque loop oscillates.
+    ``tracking`` is the verdict on a nominal run that does not follow its reference.
 
     ``rows`` are its runs over the draws, ``renoised`` the first of them again with other noise; None where there are
     none.
@@ -42,7 +42,7 @@ class Case:
     configuration: str
     status: Status
     metrics: Mapping[str, Metric]
-    oscillation: Oscillation | None
+    tracking: Tracking | None
     failed_draws: int
     reason: str = field(compare=False)
     scenario: Scenario = field(compare=False, repr=False)
@@ -51,8 +51,13 @@ class Case:
 
     @property
     def word(self) -> str:
-        """How the nominal run ended, in a word: one whose torque loop oscillates is not recommended."""
-        return "oscillates" if self.status.is_completed and self.oscillation is not None else self.status.kind
+        """How the nominal run ended, in words: one that does not follow its reference is not recommended."""
+        return self.tracking.kind if self.tracking is not None and not self.follows else self.status.kind
+
+    @property
+    def follows(self) -> bool:
+        """Whether the nominal run follows its reference, or only lacks what its scenario says that it will."""
+        return self.tracking is None or not self.tracking.is_useless
 
     def value(self, metric: str) -> float:
         """Return a metric [SI] of the nominal run, nan where it has none."""
@@ -253,8 +258,8 @@ def remarks_of(comparison: Compared) -> list[str]:
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
             failed += [] if case.status.is_completed else [f"{where}: {case.status.message}"]
-            if case.oscillation is not None:
-                said.append(f"{where}: {case.oscillation.sentence}; it is not among the best")
+            if case.tracking is not None and not case.follows:
+                said.append(f"{where}: {case.tracking.sentence}; it is not among the best")
             if case.failed_draws:
                 failed.append(
                     f"{where}: {case.failed_draws:,} of {comparison.draws:,} draws failed and are left out of every "
@@ -272,8 +277,8 @@ def remarks_of(comparison: Compared) -> list[str]:
 
 
 def front_of(cases: Sequence[Case]) -> list[str]:
-    """Return the configurations that no other beats in both error and gas; none whose torque loop oscillates."""
-    judged = [case for case in cases if case.oscillation is None]
+    """Return the configurations that no other beats in both error and gas; none that does not follow its reference."""
+    judged = [case for case in cases if case.follows]
     points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in judged]).reshape(-1, 2)
     return [case.configuration for case, is_front in zip(judged, pareto_front(points), strict=True) if is_front]
 

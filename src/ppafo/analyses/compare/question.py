@@ -53,7 +53,7 @@ def compare(
         written
     baseline: configuration that all others are compared with; default: the first
     draws: draws of the uncertain values; default 4096
-    check: end with exit code 1 where the loop of a nominal run oscillates
+    check: end with exit code 1 where a nominal run does not follow its reference
     plugins: modules of your own, files or names, whose objects files may name
 
     >>> import ppafo
@@ -80,5 +80,5 @@ def compare(
     finding = finding_of(comparison)
     if not check:
         return finding
-    is_steady = all(case.oscillation is None for task in comparison.tasks for case in task.cases)
+    is_steady = all(case.follows for task in comparison.tasks for case in task.cases)
     return replace(finding, passed=finding.passed and is_steady)

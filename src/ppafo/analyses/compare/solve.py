@@ -171,7 +171,7 @@ def _cases(
                 configuration=name,
                 status=result.status,
                 metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
-                oscillation=result.oscillation if result.status.is_completed else None,
+                tracking=result.tracking,
                 failed_draws=0 if runs is None else failures_of(runs.rows),
                 reason="" if runs is None else runs.reason,
                 scenario=scenario,
@@ -229,9 +229,9 @@ def _pairs(baseline: Case, other: Case, metrics: Sequence[str], confidence: floa
 def _best(cases: Sequence[Case], metrics: Sequence[str], confidence: float) -> dict[str, dict[str, Interval]]:
     """Return the probability of each case to be the best, by metric and configuration; nothing without draws.
 
-    One whose torque loop oscillates is not among the best, and a metric may have no end that is better.
+    One that does not follow its reference is not among the best, and a metric may have no end that is better.
     """
-    judged = [case for case in cases if case.oscillation is None]
+    judged = [case for case in cases if case.follows]
     rows = [case.rows for case in judged if case.rows is not None]
     if not rows:
         return {}

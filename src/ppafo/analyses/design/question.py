@@ -1,30 +1,27 @@
-"""The device for what was given: a wearer, a torque profile, or tasks with what may be chosen for them."""
+"""The device for what was given: a wearer or a torque profile."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Seed, Threads, Torque, Word, checked
+from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Threads, Torque, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
 
 if TYPE_CHECKING:
-    from ppafo.analyses.design.front.answer import Design
-    from ppafo.analyses.design.front.problem import DesignProblem
     from ppafo.analyses.design.profile.answer import Sizing
     from ppafo.analyses.design.profile.problem import SizingProblem
     from ppafo.analyses.design.wearer.wish import WearerSizing
     from ppafo.report.finding import Finding
 
-DesignLike = Annotated["DesignProblem | SizingProblem | str | Path", Word("DESIGN")]
+DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
 
 
-@checked("problem", "seed", "threads")
+@checked("problem", "threads")
 def design(
     problem: DesignLike | None = None,
     *,
-    seed: Seed | None = None,
     threads: Threads | None = None,
     mass: Mass | None = None,
     stature: Length | None = None,
@@ -35,8 +32,8 @@ def design(
     catalogue: FileOrName | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
-) -> Finding[Design] | Finding[Sizing] | Finding[WearerSizing]:
-    """Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.
+) -> Finding[Sizing] | Finding[WearerSizing]:
+    """Find a device: for a wearer or for a torque profile.
 
     A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for,
     and the toes have to clear the ground.
@@ -53,19 +50,12 @@ def design(
     plugins: modules of your own, files or names, whose objects files may name
 
     >>> import ppafo
-    >>> from dataclasses import replace
-    >>> problem = ppafo.load_design("torque-task")
-    >>> search = problem.search.model_copy(update={"screening": 256, "population": 16, "generations": 2})
-    >>> print(ppafo.design(replace(problem, search=search)).said[0])
-    The paper's torque task with parts and settings free: error, gas per task and mass against each other.
+    >>> ppafo.design("push-off").passed
+    True
     """
     name_plugins(plugins)
-    from ppafo.analyses.design.front import answer as front
-    from ppafo.analyses.design.front.problem import with_seed
-    from ppafo.analyses.design.front.solve import find_front
     from ppafo.analyses.design.loading import load_design
     from ppafo.analyses.design.profile import answer as profile
-    from ppafo.analyses.design.profile.problem import SizingProblem
     from ppafo.analyses.design.profile.solve import size_for_profile
     from ppafo.analyses.design.solve import FOR_A_WEARER
     from ppafo.analyses.design.wearer import answer as wearer
@@ -83,18 +73,11 @@ def design(
             raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
         if mass is None or torque is None or pressure is None or minutes is None:
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
-        if seed is not None:
-            raise StudyError("--seed: nothing is drawn for a wearer; leave it out")
         wish = Wish(mass, stature, torque, pressure, 60.0 * minutes, toes)
         return wearer.finding_of(size_for_wearer(wish, report, DEFAULT if catalogue is None else catalogue))
     of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:
         raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
-    chosen = load_design(problem, seed=seed) if isinstance(problem, str | Path) else problem
-    if isinstance(chosen, SizingProblem):
-        return profile.finding_of(size_for_profile(chosen, threads, report))
-    # A file has taken the seed as it was loaded.
-    if seed is not None and chosen is problem:
-        chosen = with_seed(chosen, seed)
-    return front.finding_of(find_front(chosen, threads, report))
+    chosen = load_design(problem) if isinstance(problem, str | Path) else problem
+    return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -8,16 +8,15 @@ import numpy as np
 
 from ppafo.analyses.linearise.plant import VALVE, plant_of, valve_states, without_slew_limit
 from ppafo.control.profiles import CONSTANT
-from ppafo.engine.continuous_time import mode_at_rest
+from ppafo.engine.continuous_time import mode_at_rest, torque_at_rest
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.linking import python_place
 from ppafo.engine.rows import numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.controlled import TORQUE
-from ppafo.model.plant import ThermalParameters, gravity_torque, net_driving_torque
+from ppafo.model.plant import ThermalParameters
 from ppafo.model.ports import friction_at_rest
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.profiles import profile_values
@@ -92,10 +91,7 @@ def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
     pressures = values["pressure_1"], values["pressure_2"]
     if limit is not None:
         plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
-    added = 0.0 if run.leg is None else torque_of_leg(run.program, run.leg, time, angle)
-    weight = gravity_torque(angle, plant.gravity_torque)
-    torque = net_driving_torque(run.program.actuator.torque(plant, angle, *pressures), weight, plant.external_torque)
-    return mode_at_rest(plant, angle, torque + added)
+    return mode_at_rest(plant, angle, torque_at_rest(run)({}, time, angle, *pressures))
 
 
 def equilibrium(scenario: Scenario) -> Point:

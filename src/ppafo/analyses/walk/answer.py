@@ -1,5 +1,6 @@
 """A walk of one wearer with and without the device, in words, tables and figures."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -9,7 +10,6 @@ import numpy as np
 
 from ppafo.analyses.walk.bottle import bottle_data, bottle_files, bottle_parts, bottle_remark
 from ppafo.analyses.walk.document import ShownNumber, csv_of, metrics_table, toes, walk_data
-from ppafo.analyses.walk.safety import over_time_parts, safety_remarks
 from ppafo.analyses.walk.task_sequence import (
     task_sequence_data,
     task_sequence_files,
@@ -17,24 +17,91 @@ from ppafo.analyses.walk.task_sequence import (
     task_sequence_pictures,
     trust_remark,
 )
+from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
+from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Column, Finding, Part, columns_of
+from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
-from ppafo.simulation.oscillation import gains_of
+from ppafo.simulation.gains import gains_of
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
+from ppafo.walking.events import event_lines, failure_times
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
+from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import Comparison
+
+# What is said of a walk's safety: what is fitted, pressures far above the supply, less help over time.
+
+_OVER_TIME = (
+    "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
+    "the foot, pauses or has stopped. A red line is where there is less help, a dashed one where something fails."
+)
+_TORQUE = Kind("", "N m", "torque", ".3g")
+_FAR_ABOVE = 2.0
+"""Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
+
+
+def safety_remarks(worn: WalkResult) -> list[str]:
+    """Return what is fitted, torques above the limit, pressures far above the supply, pauses, stop, strides helped."""
+    scenario, supply = worn.scenario, worn.scenario.device.supply
+    remarks = []
+    fitted = walk_of(scenario).shut_off
+    if fitted:
+        mass, power = 1.0e3 * float(fitted["mass"]), float(fitted["power"])
+        remarks.append(
+            f"shut-off valve: {mass:.0f} g, {power:.2g} W as long as the device helps ({60.0 * power:.0f} J a minute)"
+        )
+    # Peaks of the desired torque above the limit of the controller, which requests no more.
+    settings = scenario.controller.settings
+    limit = settings.get("largest_torque", math.inf)
+    cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
+    if cut:
+        shown = _TORQUE.text(limit)
+        remarks.append(
+            f"{', '.join(cut)}: no more than controller.largest_torque = {shown} is requested; set that higher too"
+        )
+    # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
+    for channel, words, given in (
+        ("pressure_1", "chamber 1", supply.pressure),
+        ("pressure_2", "chamber 2", supply.dorsiflexion_pressure),
+    ):
+        largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
+        if largest > _FAR_ABOVE * given:
+            reached, fed = (
+                quantity_text(value, "pressure", ".3g", supply.atmospheric_pressure) for value in (largest, given)
+            )
+            remarks.append(
+                f"the pressure in {words} reaches {reached}, and its supply is set to {fed}: "
+                "actuator, valves and tubing must withstand that"
+            )
+    if not worn.events:
+        return remarks
+    helped, strides = int(worn.helped.sum()), worn.helped.size
+    remarks += event_lines(worn.events)
+    if strides:
+        enough = "" if worn.is_helped else ": fewer than half"
+        remarks.append(f"help in {helped} of {strides} strides{enough}")
+    return remarks
+
+
+def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
+    """Return the walk over time, where something happened in it."""
+    # A figure of an even walk shows nothing that the mean stride does not.
+    if not worn.events and not failure_times(worn.scenario):
+        return ()
+    draw = partial(whole_walk_figure, worn)
+    return (Part("The walk over time", name="over-time", caption=_OVER_TIME, draw=draw, is_detail=True),)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,10 +125,10 @@ class WalkPair:
 
 
 def torque_loop_data(worn: WalkResult) -> dict[str, Any]:
-    """Return the gains in force, and the verdict where the torque loop oscillates, as plain data in SI."""
-    verdict = worn.oscillation
+    """Return the gains in force, and the verdict where the torque does not follow, as plain data in SI."""
+    verdict = worn.tracking
     return {
-        "oscillation": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
+        "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
         "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
     }
 
@@ -244,9 +311,9 @@ def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
 
 
 def first_lines(worn: WalkResult) -> list[str]:
-    """Return that the torque loop oscillates, where it does, and the gains in force with where they come from."""
+    """Return that the torque does not follow, where it does not, and the gains in force with where they come from."""
     in_force = gains_of(worn.scenario, law_of(worn.scenario))
-    return [side.sentence for side in (worn.oscillation, in_force) if side is not None]
+    return [side.sentence for side in (worn.tracking, in_force) if side is not None]
 
 
 def strides_csv(result: WalkResult) -> bytes:

@@ -8,7 +8,6 @@ import functools
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-from ppafo.control.binding import bind
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance, phases, safety
 from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, TorqueRequest, assess
@@ -17,6 +16,7 @@ from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
 from ppafo.errors import ScenarioError
+from ppafo.model.binding import bind
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import row_with
 from ppafo.model.sensors import GaitMeasurement

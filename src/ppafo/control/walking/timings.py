@@ -3,13 +3,13 @@
 import functools
 from dataclasses import replace
 
-from ppafo.control.binding import bind
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking import assistance
 from ppafo.control.walking.estimated_timing import ESTIMATED
 from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, TimingKind
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
+from ppafo.model.binding import bind
 from ppafo.model.declaration import row_with
 
 TIMINGS: Kinds[TimingKind] = Kinds(

@@ -20,6 +20,10 @@ from ppafo.model.plant import (
     driving_torque,
     holds_still,
     joint_torque,
+    loaded,
+    net_torque,
+    undamped_torque,
+    vane_acceleration,
 )
 from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
 
@@ -171,7 +175,7 @@ def clamp_angle(plant: PlantParameters, angle: float) -> float:
 def next_velocity(
     plant: PlantParameters, angular_velocity: float, acceleration: float, torque: float, duration: float
 ) -> float:
-    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` at the end [N m], less friction."""
+    """Angular velocity [rad/s] after ``duration`` [s], trapezoidal rule; ``torque`` [N m] is undamped, at the end."""
     half = 0.5 * duration
     # Damping is implicit: a strongly damped vane settles instead of ringing.
     momentum = plant.inertia * (angular_velocity + half * acceleration)
@@ -216,9 +220,10 @@ def depart(
     duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
     per_inertia = 1.0 / plant.inertia
-    first = (start_torque - sliding - plant.viscous_damping * velocity) * per_inertia
-    last = (next_torque - sliding) * per_inertia
-    next_rate = next_velocity(plant, velocity, first, next_torque - sliding, duration)
+    first = net_torque(start_torque, sliding, plant.viscous_damping, departure.angle, velocity) * per_inertia
+    undamped = undamped_torque(next_torque, sliding, departure.angle, velocity + duration * first)
+    last = undamped * per_inertia
+    next_rate = next_velocity(plant, velocity, first, undamped, duration)
     # Exact for an acceleration that runs linearly from first to last.
     travel = duration * velocity + duration * duration * (first + first + last) * SIXTH
     goes = moving or leaves_at_once or leaves_later
@@ -246,7 +251,9 @@ def begin_part(
     stays = holds_still(torque, friction.at_rest, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
     leaving = 0.0 if stays else direction_of(torque)
     way = direction_of(velocity) if velocity != 0.0 else leaving
-    sliding = (torque - way * friction.in_motion - plant.viscous_damping * velocity) / plant.inertia
+    sliding = vane_acceleration(
+        torque, way * friction.in_motion, plant.viscous_damping, plant.inertia, state.angle, velocity
+    )
     acceleration = sliding if way != 0.0 else 0.0
     distance = plant.angle_max - state.angle if way > 0.0 else state.angle - plant.angle_min
     gets_there = velocity * velocity + 2.0 * acceleration * way * distance >= 0.0
@@ -273,8 +280,9 @@ def slide_part(
     velocity, way = state.angular_velocity, begun.way
     next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
     next_torque = driving_torque(plant, begun.next_angle, next_1, next_2) + added_torque
-    friction = friction_now(plant, velocity + begun.acceleration * length, next_1, next_2)
-    sliding_torque = next_torque - way * friction.in_motion
+    next_rate = velocity + begun.acceleration * length
+    friction = friction_now(plant, next_rate, next_1, next_2)
+    sliding_torque = undamped_torque(next_torque, way * friction.in_motion, begun.next_angle, next_rate)
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
     slides = way != 0.0 and full_velocity * way > 0.0
     thrown_back = rebound_velocity(plant, full_velocity, next_torque)
@@ -322,8 +330,8 @@ def depart_part(
 
 def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: float, length: float) -> float:
     """Error of the angle [rad] at which a part ends over what is allowed [-]."""
-    sliding_torque = slid.torque - begun.way * slid.friction.in_motion
-    last = (sliding_torque - plant.viscous_damping * slid.angular_velocity) * (1.0 / plant.inertia)
+    friction, rate = begun.way * slid.friction.in_motion, slid.angular_velocity
+    last = net_torque(slid.torque, friction, plant.viscous_damping, begun.next_angle, rate) * (1.0 / plant.inertia)
     # A change of acceleration over the part bends the path by a sixth of it times the length squared.
     bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
     # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
@@ -383,9 +391,11 @@ def begin_free(
     velocity = state.angular_velocity
     way = direction_of(velocity)
     pressure_1, pressure_2 = held_pressures(plant, held, state)
-    torque = joint_torque(plant, state.angle, pressure_1, pressure_2) + added_torque
+    torque = loaded(joint_torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
-    sliding = (torque - way * friction.in_motion - plant.viscous_damping * velocity) / plant.inertia
+    sliding = vane_acceleration(
+        torque, way * friction.in_motion, plant.viscous_damping, plant.inertia, state.angle, velocity
+    )
     acceleration = sliding if way != 0.0 else 0.0
     free_angle = state.angle + step * (velocity + 0.5 * step * acceleration)
     return FreeStep(free_angle, acceleration, torque)
@@ -408,9 +418,10 @@ def end_free(
     way = direction_of(velocity)
     predicted = clamp_angle(plant, begun.free_angle)
     next_1, next_2 = held_pressures(plant, ahead, state)
-    next_torque = joint_torque(plant, predicted, next_1, next_2) + added_torque
-    friction = friction_now(plant, velocity + begun.acceleration * step, next_1, next_2)
-    sliding_torque = next_torque - way * friction.in_motion
+    next_torque = loaded(joint_torque(plant, predicted, next_1, next_2), predicted) + added_torque
+    next_rate = velocity + begun.acceleration * step
+    friction = friction_now(plant, next_rate, next_1, next_2)
+    sliding_torque = undamped_torque(next_torque, way * friction.in_motion, predicted, next_rate)
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
     # '&' and no branch: the step of a walk runs on all lanes.
     slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)

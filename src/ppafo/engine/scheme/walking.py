@@ -22,7 +22,7 @@ from ppafo.model.gait import (
     GaitTiming,
 )
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.plant import PlantParameters, PlantState, joint_torque
+from ppafo.model.plant import PlantParameters, PlantState, joint_torque, loaded, net_torque
 from ppafo.model.ports import friction_in_motion
 
 
@@ -207,12 +207,11 @@ def external_torque(
     # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
     pressure_1, pressure_2 = held_pressures(plant, held, state)
-    actuator = joint_torque(plant, state.angle, pressure_1, pressure_2)
+    driving = loaded(joint_torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
-    moving = way * friction + share.viscous_damping * speed + share.inertia * led.acceleration
-    given = actuator + plate - moving
-    return needed if angle_is_free else given
+    net = net_torque(driving, way * friction, share.viscous_damping, state.angle, speed)
+    return needed if angle_is_free else net - share.inertia * led.acceleration
 
 
 def reach_end(

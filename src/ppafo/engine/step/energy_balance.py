@@ -3,15 +3,15 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import thermal_gas, warm_actuators
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
 from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 
-PARAMETERS: Mapping[str, type] = {"thermal": ThermalParameters}
-STATES: Mapping[str, type] = {"masses": ThermalState}
-CHANGE: Mapping[str, type] = {"thermal_change": ThermalFlows}
+IS_THERMAL = True
+HAS_TRUE_MASSES = True
 START = thermal_gas.masses_at_start
 IN_SHAPES: Mapping[Any, Any] = {
     thermal_gas.chambers_at_begin: warm_actuators.chambers_at_begin,
@@ -21,9 +21,14 @@ IN_SHAPES: Mapping[Any, Any] = {
 }
 
 
-def stage(parts: Program) -> Mapping[str, type]:
-    """Groups of a lane that the first stage sets for later phases, with their classes."""
-    return {"thermal_gas": ThermalGas}
+def groups(parts: Program) -> Groups:
+    """Groups of a lane: heat capacity and walls, true masses, the first stage, and what a step adds to the gas."""
+    return {
+        "thermal": given(ThermalParameters),
+        "masses": kept(ThermalState),
+        **({"thermal_gas": handed(ThermalGas)} if parts.feed is None else {}),
+        **({"thermal_change": handed(ThermalFlows)} if parts.angle is None else {}),
+    }
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:

@@ -1,8 +1,8 @@
 """A plant that may fail in a walk, or whose line has a shut-off valve, in a step and at a sample of the controller."""
 
-from collections.abc import Mapping
 from typing import Any
 
+from ppafo.engine.groups import Groups, given, kept
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.model import plant_faults, shut_off
@@ -12,8 +12,10 @@ from ppafo.model.plant_faults import PlantFaults
 from ppafo.model.shut_off import ShutOff, Unpowered
 from ppafo.model.valves.kind import VENT
 
-PARAMETERS: Mapping[str, type] = {"plant_faults": PlantFaults, "shut_off": ShutOff}
-STATES: Mapping[str, type] = {"unpowered": Unpowered}
+
+def groups(parts: Program) -> Groups:
+    """Groups of a lane: faults and shut-off valve, and whether that has shut."""
+    return {"plant_faults": given(PlantFaults), "shut_off": given(ShutOff), "unpowered": kept(Unpowered)}
 
 
 def failed_plant(parts: Program, lane: Lane, time: float) -> PlantParameters:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ppafo.engine.groups import Groups, handed
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import pneumatics
 from ppafo.engine.scheme.actuators import begin_shaped_gas
@@ -11,16 +12,19 @@ from ppafo.engine.scheme.pneumatics import GasChange, MovingGas, StillGas
 from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState
 
-PARAMETERS: Mapping[str, type] = {}
-STATES: Mapping[str, type] = {}
-CHANGE: Mapping[str, type] = {"change": GasChange}
+IS_THERMAL = False
+HAS_TRUE_MASSES = False
 START = None
 IN_SHAPES: Mapping[Any, Any] = {pneumatics.begin_moving_gas: begin_shaped_gas}
 
 
-def stage(parts: Program) -> Mapping[str, type]:
-    """Groups of a lane that the first stage sets for later phases, with their classes."""
-    return {"still_gas": StillGas} if parts.keeps_volumes else {"moving_gas": MovingGas}
+def groups(parts: Program) -> Groups:
+    """Groups of a lane: the first stage, and what a step adds to the gas."""
+    stage = {"still_gas": handed(StillGas)} if parts.keeps_volumes else {"moving_gas": handed(MovingGas)}
+    return {
+        **(stage if parts.feed is None else {}),
+        **({"change": handed(GasChange)} if parts.angle is None else {}),
+    }
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:

@@ -1,7 +1,6 @@
 """Lines behind regulators in a step: what feeds the valve, with a state that the stages solve together with the gas."""
 
-from collections.abc import Mapping
-
+from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import supply_lines
 from ppafo.engine.scheme.supply_lines import FedGas, FedThermalGas
@@ -9,14 +8,15 @@ from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantParameters
 from ppafo.model.regulator import LineState, SupplyLines
 
-PARAMETERS: Mapping[str, type] = {"lines": SupplyLines}
-STATES: Mapping[str, type] = {"line_state": LineState}
-NEXT: Mapping[str, type] = {"next_lines": LineState}
 
-
-def stage(parts: Program) -> Mapping[str, type]:
-    """What the first stage leaves for later phases, chambers and lines."""
-    return {"fed_thermal_gas": FedThermalGas} if parts.is_thermal else {"fed_gas": FedGas}
+def groups(parts: Program) -> Groups:
+    """Groups of a lane: lines and regulators, the first stage with that of the gas, and lines at the end of a part."""
+    return {
+        "lines": given(SupplyLines),
+        "line_state": kept(LineState),
+        **({"fed_thermal_gas": handed(FedThermalGas)} if parts.is_thermal else {"fed_gas": handed(FedGas)}),
+        **({"next_lines": handed(LineState)} if parts.is_parted else {}),
+    }
 
 
 def after_first(parts: Program, lane: Lane) -> LineState:

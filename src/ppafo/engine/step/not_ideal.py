@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ppafo.engine.groups import Groups, handed, kept
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import pneumatics, real_gas
 from ppafo.engine.scheme.real_gas import RealChange, RealGas
@@ -10,9 +11,8 @@ from ppafo.engine.step import isothermal
 from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState, TrueMasses
 
-PARAMETERS: Mapping[str, type] = {}
-STATES: Mapping[str, type] = {"masses": TrueMasses}
-CHANGE: Mapping[str, type] = {"real_change": RealChange}
+IS_THERMAL = False
+HAS_TRUE_MASSES = True
 START = real_gas.masses_at_start
 IN_SHAPES: Mapping[Any, Any] = {}
 
@@ -21,9 +21,13 @@ error, shift_error = isothermal.error, isothermal.shift_error
 """What the first stage leads to, and its errors, are as in an ideal gas."""
 
 
-def stage(parts: Program) -> Mapping[str, type]:
-    """Groups of a lane that the first stage sets for later phases, with their classes."""
-    return {"real_gas": RealGas}
+def groups(parts: Program) -> Groups:
+    """Groups of a lane: true masses, the first stage, and what a step adds to the gas."""
+    return {
+        "masses": kept(TrueMasses),
+        "real_gas": handed(RealGas),
+        **({"real_change": handed(RealChange)} if parts.angle is None else {}),
+    }
 
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
+from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import believed, walking
 from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
@@ -28,29 +29,27 @@ from ppafo.model.leg import LegParameters
 from ppafo.model.sensors import GaitSeen, GaitSensors
 
 
-def parameters(parts: Program) -> Mapping[str, type]:
-    """Groups of parameters of a leg that walks, and of what leads it, with their classes."""
-    return {
-        "leg": LegParameters,
-        "share": DeviceShare,
-        "gait": GaitSeries,
-        "gait_timing": GaitTiming,
-        "gait_sensors": GaitSensors,
-        **({"task_sequence": TimedSequence} if parts.takes_task_sequence else {}),
-    }
-
-
-STATES: Mapping[str, type] = {"walk": WalkState, "gait_seen": GaitSeen}
-CARRIED: Mapping[str, type] = {"carried": CarriedFoot}
-"""What a step is handed by the one before."""
-ENDED: Mapping[str, type] = {"walk_begun": WalkStep, "ahead": HeldChambers, "ended": WalkEnd}
-
-
-def led(parts: Program) -> Mapping[str, type]:
-    """What says where the gait is at the end of a step."""
+def groups(parts: Program) -> Groups:
+    """Groups of a lane: the leg that walks and what leads it, where it stands, and what phases hand on."""
     if parts.takes_task_sequence:
-        return {"next_gait": GaitNow, "marks": Marks}
-    return {"place": GaitPlace, "measured": GaitMeasured, "next_gait": GaitNow}
+        led = {"next_gait": handed(GaitNow), "marks": handed(Marks)}
+    else:
+        led = {"place": handed(GaitPlace), "measured": handed(GaitMeasured), "next_gait": handed(GaitNow)}
+    return {
+        "leg": given(LegParameters),
+        "share": given(DeviceShare),
+        "gait": given(GaitSeries),
+        "gait_timing": given(GaitTiming),
+        "gait_sensors": given(GaitSensors),
+        **({"task_sequence": given(TimedSequence)} if parts.takes_task_sequence else {}),
+        "walk": kept(WalkState),
+        "gait_seen": kept(GaitSeen),
+        **led,
+        "carried": handed(CarriedFoot),
+        "walk_begun": handed(WalkStep),
+        "ahead": handed(HeldChambers),
+        "ended": handed(WalkEnd),
+    }
 
 
 ASKED: Mapping[Any, tuple[str, ...]] = believed.ASKED

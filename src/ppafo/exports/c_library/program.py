@@ -15,6 +15,7 @@ from typing import Any
 
 from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
+from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
@@ -266,7 +267,8 @@ def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundar
     names = [kind.name for kind in program.meters]
     kind = totals_kind(program)
     parameters = program.parameter_rows()
-    groups_taken = ("plant", *program.gas.PARAMETERS, *(effect.name for effect in program.effects))
+    of_gas = rows_of(program.gas.groups(program), Role.PARAMETER)
+    groups_taken = ("plant", *of_gas, *(effect.name for effect in program.effects))
     lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in groups_taken]
     lines += [f"{name} = {boundary.taken('states', name, groups, collector.add)}" for name in program.effect_states]
     add = collector.add

@@ -6,11 +6,11 @@ A command goes from -1 to 1 as equation (8) says; one value stands for free moti
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_type_hints
 
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import Openings, PlantParameters, PortFlow, PortFlowSlopes
+from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, PortFlowSlopes, SinglePort
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,8 +32,8 @@ class ValveModel:
     ``parameters`` and ``state`` are NamedTuple classes of floats; ``prepare(settings)`` makes the first from
     the declared settings; ``initial()`` the second, as the class itself does whose fields have defaults.
     ``advance(parameters, state, command, time, step)`` returns what the valve shows the plant during the step, and the
-    next state. ``connect(plant, shown)`` turns that into ports (the engine reads its annotation of ``shown``, a float
-    or a NamedTuple); ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
+    next state. ``shown`` is the class of what it shows, a float or a NamedTuple; ``connect(plant, shown)`` turns that
+    into ports of the class ``port``; ``port_flow`` and ``port_flow_slopes`` are the functions of that kind of port.
     ``jumps`` is True for a valve that changes abruptly by itself inside a step, as ``next_event`` and ``settle`` say:
     the step is then done in parts between those changes. ``shift(state, next_state)`` is the relative
     change of the opening of a valve that moves inside a step, None for one that stands still between two changes.
@@ -50,6 +50,8 @@ class ValveModel:
     state: type
     prepare: Callable[[Any], Any]
     initial: Callable[[], Any]
+    shown: type
+    port: type[SinglePort] | type[BlendedPort]
     advance: Callable[[Any, Any, float, float, float], tuple[Any, Any]]
     connect: Callable[[PlantParameters, Any], tuple[Any, Any]]
     port_flow: Callable[[float, Any, FlowCurve], PortFlow]
@@ -62,6 +64,20 @@ class ValveModel:
     next_event: Callable[[Any, Any, float, float], float]
     settle: Callable[[Any, Any, float, float], Any]
     joint: Joint | None = None
+
+
+def valve_problem(valve: ValveModel) -> str:
+    """Return where a valve and its function ``connect`` say two things of what it shows or of its ports, else empty."""
+    hints = list(get_type_hints(valve.connect).values())
+    if len(hints) == 3 and hints[1] is not Any and hints[1] is not valve.shown:
+        return f"{valve.connect.__name__} takes a {_name(hints[1])}, and the valve shows a {_name(valve.shown)}"
+    if len(hints) == 3 and hints[2] != tuple[valve.port, valve.port]:  # type: ignore[name-defined]
+        return f"{valve.connect.__name__} makes {_name(hints[2])}, and the valve has ports {_name(valve.port)}"
+    return ""
+
+
+def _name(kind: Any) -> str:
+    return getattr(kind, "__name__", str(kind)) if isinstance(kind, type) else str(kind)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,9 @@ from typing import Annotated, NamedTuple
 from ppafo.model.declaration import Number
 from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
 from ppafo.model.plant import (
+    BlendedPort,
     Openings,
+    SinglePort,
     blended_port_flow,
     blended_port_flow_slopes,
     blended_ports,
@@ -295,6 +297,8 @@ IDEAL = ValveModel(
     state=NoValveState,
     prepare=prepare_ideal,
     initial=NoValveState,
+    shown=float,
+    port=SinglePort,
     advance=advance_ideal,
     connect=single_ports,
     port_flow=single_port_flow,
@@ -313,6 +317,8 @@ MOVING = ValveModel(
     state=SpoolState,
     prepare=prepare_moving,
     initial=SpoolState,
+    shown=Openings,
+    port=BlendedPort,
     advance=advance_moving,
     connect=blended_ports,
     port_flow=blended_port_flow,

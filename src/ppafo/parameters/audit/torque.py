@@ -3,11 +3,12 @@
 import math
 from collections.abc import Iterator
 
-from ppafo.errors import UnitError
+from ppafo.errors import ParameterError, UnitError
 from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters.audit.evidence import Evidence, Finding, Interval, Severity, Side
-from ppafo.parameters.device import Gas
+from ppafo.parameters.device import VANE, Gas
+from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
 
 # Do damping and dynamic friction agree with the inertia and the reported ratios they were computed from?
@@ -126,6 +127,8 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
     """Yield the ceiling for each supply: a note, a warning below the demand, an error below static friction."""
     constant = evidence.number(_TORQUE_CONSTANT)
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
+    if supplies and evidence.parameter_set.actuator_kind != VANE:
+        yield from _ceiling_by_angle(evidence)
     if constant is None or constant <= 0.0 or not supplies:
         return
     ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
@@ -146,6 +149,46 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
             f"the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
         ),
     )
+
+
+def _ceiling_by_angle(evidence: Evidence) -> Iterator[Finding]:
+    """Yield the ceiling of a kind whose torque depends on the angle: the most between the stops, and the least."""
+    from ppafo.parameters.building import build_device
+
+    try:
+        device = build_device(evidence.parameter_set)
+    except ParameterError:
+        return
+    stops = float(device.actuator.angle_min), float(device.actuator.angle_max)
+    angles = [stops[0] + (stops[1] - stops[0]) * number / _PLACES for number in range(_PLACES + 1)]
+    reaches = [torque_reach(device, angle) for angle in angles]
+    texts, sides, ceiling = [], [], 0.0
+    for way, place in (("up", 1), ("down", 0)):
+        torques = [reach[place] if place else -reach[place] for reach in reaches]
+        most, least = max(torques), min(torques)
+        at = math.degrees(angles[torques.index(most)])
+        texts.append(
+            f"{evidence.torque(most, '#.3g')} {way} at {at:.3g} deg, and {evidence.torque(least, '#.3g')} at least"
+        )
+        sides.append(Side(f"most {way}", most, "N m"))
+        ceiling = max(ceiling, most)
+    static = evidence.number(_STATIC)
+    holds = static is not None and static >= ceiling
+    yield Finding(
+        id="torque-ceiling",
+        severity="error" if holds else "note",
+        title=f"the supply allows at most {evidence.torque(ceiling, '#.3g')}",
+        values=evidence.values_of(*_SUPPLIES, _STATIC),
+        sides=tuple(sides),
+        paragraph=(
+            f"With one chamber at supply and the other at atmosphere the actuator gives {' and '.join(texts)}, before "
+            f"friction. {'Static friction is more: the joint cannot move.' if holds else _ABOVE}"
+        ),
+    )
+
+
+_PLACES = 40
+_ABOVE = "A reference above that cannot be followed by any valve or controller."
 
 
 def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:

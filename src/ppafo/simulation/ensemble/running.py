@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, load_programs, run_blocks
 from ppafo.engine.metering import add_meters, meters_of
 from ppafo.engine.program import Program
@@ -214,7 +215,9 @@ def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, 
     needed = {channel for kind in metrics.values() for channel in kind.channels}
     if ends_there or needed.isdisjoint(ThermalTotals._fields):
         return ()
-    of_gas = (path for name, row in program.gas.STATES.items() for path in leaf_paths(row, name))
+    of_gas = (
+        path for name, row in rows_of(program.gas.groups(program), Role.STATE).items() for path in leaf_paths(row, name)
+    )
     return (*_OF_STATE, *of_gas)
 
 

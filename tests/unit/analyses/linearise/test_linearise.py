@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.linearise.answer import finding_of
+from ppafo.analyses.linearise.answer import finding_of, steps_of
 from ppafo.analyses.linearise.model import LinearModel
 from ppafo.analyses.linearise.question import linearise
-from ppafo.analyses.linearise.steps import steps_of
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from ppafo.analyses.walk.safety import safety_remarks
+from ppafo.analyses.walk.answer import safety_remarks
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.signals import Channel
 from ppafo.walking import compare_walks, load_walk, walk

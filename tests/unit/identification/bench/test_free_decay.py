@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import Tolerances, free_decay
-from ppafo.identification.bench.slowing import Slowing, course
+from ppafo.identification.bench.free_decay import Slowing, course
 from ppafo.identification.source import Source
 from tests.unit.identification import planted
 

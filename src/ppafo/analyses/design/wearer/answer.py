@@ -18,7 +18,7 @@ from ppafo.analyses.parts.sections import part_titles, parts_to_check
 from ppafo.report import finding
 from ppafo.report.finding import Finding, columns_of, facts
 from ppafo.report.kind import Kind
-from ppafo.simulation.oscillation import gains_of
+from ppafo.simulation.gains import gains_of
 from ppafo.walking.bottle.course import minutes_text
 from ppafo.walking.figures.bottle import bottle_figure
 from ppafo.walking.motion import walk_of

@@ -75,7 +75,7 @@ def lasting_flow(pair: Tried, lasted: float, seconds: float) -> float:
 
 def keeps(walked: WalkResult, wish: Wish) -> bool:
     """Return whether the mean stride of a walk on a bottle has most of the torque, and the clearance."""
-    if not walked.averages or walked.oscillation:
+    if not walked.averages or walked.tracking:
         return False
     torque = walked.averages["torque"].mean.max()
     return bool(torque >= _KEPT * wish.torque and walked.metrics["lowest_toes"].value >= wish.clearance)

@@ -111,7 +111,7 @@ def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tupl
 def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
     """Return a few strides with some overrides; None where they lack help, or the torque loop oscillates."""
     result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
-    if not result.status.is_completed or not result.is_helped or not result.averages or result.oscillation:
+    if not result.status.is_completed or not result.is_helped or not result.averages or result.tracking:
         return None
     flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
     torque = float(result.averages["torque"].mean.max())

@@ -31,6 +31,23 @@ def bind(frame: PlainFunction, name: str, components: Mapping[str, Any]) -> Plai
     return _bound(frame, name, tuple(sorted(components.items())))
 
 
+def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFunction:
+    """Return the function of a frame whose last parameter ``*, parts`` is a NamedTuple of functions, with these parts.
+
+    The engine compiles it with each ``parts.NAME`` as the function that it is. Equal parts give the same function.
+    """
+    return _made_of(frame, name, parts)
+
+
+@lru_cache(maxsize=512)
+def _made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFunction:
+    made = types.FunctionType(frame.__code__, dict(frame.__globals__), name)
+    made.__kwdefaults__ = {"parts": parts}
+    made.__qualname__, made.__module__, made.__annotations__ = name, frame.__module__, frame.__annotations__
+    vars(made)["frame"] = Frame(frame, (("parts", parts),))
+    return made
+
+
 # Far more than the laws, valves and actuators of a process; a table is part of what its actuator is bound to.
 @lru_cache(maxsize=512)
 def _bound(frame: PlainFunction, name: str, components: tuple[tuple[str, Any], ...]) -> PlainFunction:

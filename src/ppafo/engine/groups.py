@@ -1,0 +1,115 @@
+"""Groups of numbers of a program: each is named once, with its class and its role, by the component that it belongs to.
+
+The rows of parameters, of states and of what a step hands on are these groups in their order.
+"""
+
+from collections.abc import Mapping
+from enum import Enum
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ppafo.engine.rows import leaf_paths, leaves
+from ppafo.errors import ProgramError
+
+
+class Role(Enum):
+    """What a group is to a run: given and unchanged, kept from step to step, or handed on inside a step."""
+
+    PARAMETER = "parameters"
+    STATE = "states"
+    STEP = "numbers of a step"
+
+
+class Group(NamedTuple):
+    """A group of numbers: the class of its row, a NamedTuple or float, and its role."""
+
+    row: Any
+    role: Role
+
+
+Groups = Mapping[str, Group]
+"""Groups by their names, in the order of their rows."""
+
+
+def given(row: Any) -> Group:
+    """A group that a run is given and that does not change."""
+    return Group(row, Role.PARAMETER)
+
+
+def kept(row: Any) -> Group:
+    """A group that a run keeps from step to step."""
+    return Group(row, Role.STATE)
+
+
+def handed(row: Any) -> Group:
+    """A group that a phase of a step hands to later ones."""
+    return Group(row, Role.STEP)
+
+
+def merged(*parts: Groups) -> dict[str, Group]:
+    """Groups of several components as one, in order. ProgramError where two have one name: a lane would mix them."""
+    found: dict[str, Group] = {}
+    for groups in parts:
+        for name, group in groups.items():
+            if name in found:
+                raise ProgramError(f"two components of a program have a group '{name}'; give one of them another name")
+            found[name] = group
+    return found
+
+
+def rows_of(groups: Groups, role: Role) -> dict[str, Any]:
+    """Classes of the groups of one role, in order."""
+    return {name: group.row for name, group in groups.items() if group.role is role}
+
+
+def filled(
+    rows: Mapping[str, Any], values: Mapping[str, Any], runs: int, role: Role
+) -> "np.ndarray[tuple[int, int], np.dtype[np.float64]]":
+    """Rows (numbers, runs) of groups by name, whose numbers are floats or arrays (runs,).
+
+    ProgramError for a group without value, for a value without group, and for one of another class.
+    """
+    for name, value in values.items():
+        if name not in rows and leaves(value):
+            raise ProgramError(
+                f"{role.value}: '{name}' is given ({_described(value)}), and no part of the program has it"
+            )
+    found: list[Any] = []
+    for name, row in rows.items():
+        numbers = leaves(values[name]) if name in values else []
+        paths = leaf_paths(row, name)
+        if len(numbers) != len(paths) or (numbers and getattr(values[name], "_fields", ()) != row._fields):
+            given = f"it is given {_described(values[name])}" if numbers else "nothing gives it"
+            raise ProgramError(
+                f"{role.value}: '{name}' is a {row.__name__}({', '.join(_own_names(paths))}), and {given}; "
+                "engine/run.py gives groups by their names"
+            )
+        found += numbers
+    table = np.empty((len(found), runs))
+    for line, number in zip(table, found, strict=True):
+        # Broadcast: a float fills the row of all runs.
+        line[:] = number
+    return table
+
+
+def check_rows(count: int, rows: Mapping[str, Any], role: Role) -> None:
+    """Refuse a table with another number of rows than its groups have: compiled code would read past it.
+
+    ProgramError names the last group.
+    """
+    sizes = {name: len(leaf_paths(row, name)) for name, row in rows.items()}
+    if count != sum(sizes.values()):
+        raise ProgramError(
+            f"{role.value}: a block has {count} rows, its program {sum(sizes.values())}: "
+            + ", ".join(f"{name} {size}" for name, size in sizes.items() if size)
+        )
+
+
+def _own_names(paths: list[str]) -> list[str]:
+    return [path.partition(".")[2] or path for path in paths]
+
+
+def _described(value: Any) -> str:
+    names = ", ".join(getattr(value, "_fields", ())) or f"{len(leaves(value))} numbers"
+    return f"a {type(value).__name__}({names})"

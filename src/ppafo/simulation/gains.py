@@ -1,0 +1,101 @@
+"""The gains in force of a run, and where they come from."""
+
+from dataclasses import dataclass
+
+from ppafo.control import angle_loop, torque_loop
+from ppafo.control.kind import ControllerKind
+from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.graph import Term
+from ppafo.simulation.declaration import law_settings
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
+
+_OF_LOOP = frozenset(
+    (
+        torque_loop.PROPORTIONAL_GAIN,
+        torque_loop.INTEGRAL_GAIN,
+        torque_loop.INTEGRAL_RATE,
+        torque_loop.BOUNDARY,
+        torque_loop.CONVERGENCE,
+        torque_loop.OPENING,
+        torque_loop.LEARNING_GAIN,
+        torque_loop.LEAD,
+        angle_loop.ANGLE_STIFFNESS,
+        angle_loop.ANGLE_DAMPING,
+        angle_loop.RATE_FILTER,
+        angle_loop.INNER_GAIN,
+        angle_loop.GRAVITY,
+        angle_loop.INERTIA,
+        angle_loop.FRICTION,
+    )
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """A gain in force [SI]: its name, unit and value, and whether it was computed from the device or given."""
+
+    name: str
+    unit: str
+    value: float
+    computed: bool
+
+    @property
+    def text(self) -> str:
+        """Name, value and unit."""
+        return f"{self.name} {self.value:.3g} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """The gains of a law, with the rate of what it controls at full opening, per ``unit``, and what comes late [s]."""
+
+    gains: tuple[Gain, ...]
+    torque_rate: float
+    dead_time: float
+    unit: str = "N m"
+
+    @property
+    def sentence(self) -> str:
+        """The gains in force and where they come from."""
+        loop = f"{self.torque_rate:.3g} {self.unit}/s at full opening, {1.0e3 * self.dead_time:.3g} ms late"
+        parts = [
+            f"{', '.join(gain.text for gain in self.gains if gain.computed == computed)} {origin}"
+            for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})"))
+            if any(gain.computed == computed for gain in self.gains)
+        ]
+        return f"gains: {'; '.join(parts)}"
+
+
+def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]:
+    """Return the settings of a law of a scenario, in units of what it controls."""
+    return law_settings(law, scenario.controlled)
+
+
+def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, Term]:
+    """Return what the gains of a law follow on the device of a scenario, by name."""
+    return loop_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
+
+
+def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
+    """Return the gains of a scenario's torque law in force; None for a law that has none."""
+    if scenario.controller.is_outside:
+        return None
+    items = [quantity for quantity in settings_of(scenario, law) if _OF_LOOP.intersection(quantity.follows)]
+    if not items:
+        return None
+    links, terms = scenario.links, terms_of(scenario, law)
+    gains = tuple(
+        Gain(
+            quantity.name,
+            quantity.unit,
+            float(scenario.controller.settings[quantity.name]),
+            f"controller.{quantity.name}" in links,
+        )
+        for quantity in items
+    )
+    rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
+    controlled = scenario.controlled if TORQUE in law.controls else TORQUE
+    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit)

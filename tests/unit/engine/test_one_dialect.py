@@ -1,0 +1,77 @@
+"""Python refuses what the compiler refuses: the same line, with file, line and what to do."""
+
+from typing import Any
+
+import pytest
+
+from ppafo.engine.program import Program
+from ppafo.engine.step import phases
+from ppafo.engine.step.lane import Lane, Now
+from ppafo.errors import ProgramError
+from ppafo.running import simulate
+from ppafo.simulation.loading import load_scenario
+
+begun, opened = phases.begin_step, phases.open_valve
+
+
+def keeps_unkept(parts: Program, lane: Lane) -> None:
+    """Set a group that no component hands on."""
+    begun(parts, lane)
+    lane.extra = 1.0  # type: ignore[attr-defined]
+
+
+def asks_unkept(parts: Program, lane: Lane, now: Now) -> None:
+    """Read it in a later phase."""
+    opened(parts, lane, now)
+    lane.length = lane.length + 0.0 * lane.extra  # type: ignore[attr-defined]
+
+
+def makes_a_list(parts: Program, lane: Lane) -> None:
+    """Put numbers into a list."""
+    begun(parts, lane)
+    lane.before = sum([lane.before, 0.0])
+
+
+def prints(parts: Program, lane: Lane) -> None:
+    """Call what gives nothing."""
+    begun(parts, lane)
+    print(lane.before)  # noqa: T201
+
+
+def counts_on(parts: Program, lane: Lane) -> None:
+    """Change a name by an amount, and give an argument by its name."""
+    begun(parts, lane=lane)
+    before = lane.before
+    before -= 0.0
+    lane.before = before
+
+
+@pytest.mark.parametrize("backend", ["", "python"])
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"begin_step": makes_a_list}, r"test_one_dialect\.py:\d+: a list cannot be compiled"),
+        ({"begin_step": prints}, r"test_one_dialect\.py:\d+: 'print\(lane.before\)' throws away"),
+        (
+            {"begin_step": keeps_unkept, "open_valve": asks_unkept},
+            r"test_one_dialect\.py:26: 'lane.extra', which \S+test_one_dialect\.py:20 sets, .*'extra': handed",
+        ),
+    ],
+)
+def test_what_cannot_be_compiled_is_refused_by_every_backend(
+    changed: dict[str, Any], message: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
+    for name, function in changed.items():
+        monkeypatch.setattr(phases, name, function)
+    with pytest.raises(ProgramError, match=message):
+        simulate(load_scenario("step-response", ("run.duration=2 ms",)))
+
+
+@pytest.mark.parametrize("backend", ["", "python"])
+def test_a_name_may_be_changed_by_an_amount_and_an_argument_given_by_name(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
+    monkeypatch.setattr(phases, "begin_step", counts_on)
+    assert simulate(load_scenario("step-response", ("run.duration=2 ms",))).status.kind == "completed"

@@ -1,0 +1,55 @@
+"""A run that does not follow its reference says so, with what hinders it; one that does is left alone."""
+
+import math
+
+import pytest
+
+from ppafo.loading import load_scenario
+from ppafo.parameters.reach import supply_for, torque_reach
+from ppafo.running import simulate
+from ppafo.simulation.tracking import tried
+
+TASK = "torque-task-proportional"
+
+
+def test_the_reach_of_a_cylinder_is_force_times_arm() -> None:
+    device = load_scenario("cylinder-servo").device
+    settings, angle = device.actuator.settings, 1.2
+    lever, base = settings["lever_length"], settings["base_distance"]
+    turned = angle + settings["lever_offset"]
+    length = math.sqrt(lever**2 + base**2 - 2.0 * lever * base * math.cos(turned))
+    gauge = device.supply.pressure - device.supply.atmospheric_pressure
+    force = math.pi / 4.0 * settings["bore"] ** 2 * gauge
+    most = force * lever * base * math.sin(turned) / length
+    assert torque_reach(device, angle)[1] == pytest.approx(most, rel=1e-9)
+    assert supply_for(device, angle, 2.0 * most) == pytest.approx(device.supply.pressure + gauge, rel=1e-6)
+
+
+def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it() -> None:
+    told = simulate(TASK).tracking
+    assert told is not None
+    assert told.sentence.startswith(
+        "the torque stays 1 N m below its reference, of 6 N m wanted; at 75 deg and 50 psi_g"
+    )
+    assert not told.is_useless
+    scenario = load_scenario(TASK, ["reference.level=9 N m"])
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None and verdict.is_useless
+    assert "with `supply.pressure = 94.5 psi_g` it does, as a further run shows" in verdict.sentence
+
+
+def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> None:
+    pair = simulate(
+        "torque-task-solenoid", ["valve.area=60 mm^2", "valve.opening_delay=20 ms", "reference.level=4 N m"]
+    )
+    assert pair.tracking is not None
+    assert pair.tracking.kind == "oscillates"
+    assert "in the 95 ms that they are late" in pair.tracking.sentence
+    pushed = simulate("cylinder-servo", ["motion.external_torque=14 N m"]).tracking
+    assert pushed is not None
+    assert "the joint lies on its lower stop: 14 N m work against it" in pushed.sentence
+
+
+def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
+    assert simulate(TASK, ["run.duration=0.3 s"]).tracking is None
+    assert simulate(TASK, ["reference.level=4 N m"]).tracking is None
