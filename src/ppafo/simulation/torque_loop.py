@@ -34,7 +34,9 @@ _OF_DEVICE = (
     "foot_plate.gravity_torque",
     "friction.viscous_damping",
     "friction.dynamic_torque",
+    "friction.static_torque",
 )
+_OF_ANGLE = ("sensors.angle_bandwidth", "sensors.angle_resolution", "sensors.angle_noise")
 LEG_PATHS = ("motion.foot_mass", "motion.foot_mass_centre", "motion.foot_inertia")
 """What the foot of a leg adds."""
 
@@ -54,6 +56,7 @@ _Hertz = Annotated[float, Number("Hz", "")]
 _Inertia = Annotated[float, Number("kg m^2", "")]
 _Torque = Annotated[float, Number("N m", "")]
 _Damping = Annotated[float, Number("N m s/rad", "")]
+_Angle = Annotated[float, Number("rad", "")]
 _Mass = Annotated[float, Number("kg", "")]
 _Length = Annotated[float, Number("m", "")]
 
@@ -73,11 +76,19 @@ class Signals(NamedTuple):
     delay: _Seconds
 
 
-_Joint = {"inertia": _Inertia, "gravity_torque": _Torque, "viscous_damping": _Damping, "dynamic_torque": _Torque}
-Locked: Any = row_with("Locked", Signals, locked_angle=Annotated[float, Number("rad", "")])
+_Joint = {
+    "angle_resolution": _Angle,
+    "angle_noise": _Angle,
+    "inertia": _Inertia,
+    "gravity_torque": _Torque,
+    "viscous_damping": _Damping,
+    "dynamic_torque": _Torque,
+    "static_torque": _Torque,
+}
+Locked: Any = row_with("Locked", Signals, locked_angle=_Angle)
 """Signals of a joint that is locked, with its angle [rad]."""
 OfJoint: Any = row_with("OfJoint", Signals, angle_bandwidth=_Hertz, **_Joint)
-"""Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
+"""Signals of a scenario, bandwidth [Hz], resolution and noise [rad] of its angle sensor; what turns, its friction."""
 OfLeg: Any = row_with("OfLeg", OfJoint, foot_mass=_Mass, foot_mass_centre=_Length, foot_inertia=_Inertia)
 """Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
 
@@ -267,8 +278,11 @@ def joint_of(
         stiffness=spring_1 + spring_2,
         damping=signals.viscous_damping,
         friction=signals.dynamic_torque,
+        static_friction=signals.static_torque,
         travel=travel,
         gravity=weight,
+        resolution=signals.angle_resolution,
+        noise=signals.angle_noise,
     )
 
 
@@ -368,6 +382,11 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.GRAVITY: angle_loop.gravity,
     angle_loop.INERTIA: angle_loop.inertia,
     angle_loop.FRICTION: angle_loop.friction,
+    angle_loop.STATIC_FRICTION: angle_loop.static_friction,
+    angle_loop.LOAD_TIME: angle_loop.load_time,
+    angle_loop.TORQUE_LAG: angle_loop.torque_lag,
+    angle_loop.TOLERANCE: angle_loop.tolerance,
+    angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
 """What follows the torque loop and the joint, and by which rule."""
 
@@ -393,7 +412,7 @@ class LoopFrames(NamedTuple):
 
 
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
-_ANGLE = (*_PRESSURES, "sensors.delay", "sensors.angle_bandwidth", *_OF_DEVICE)
+_ANGLE = (*_PRESSURES, "sensors.delay", *_OF_ANGLE, *_OF_DEVICE)
 IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES)
 """The torque in a walk."""
 IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"))
