@@ -10,7 +10,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt
 from ppafo.model.columns import Numeric, choose
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, EnergySample, GasSample, MeterKind, Sample
+from ppafo.signals.meter import NO_ENERGY, NO_GAS, Course, EnergySample, GasSample, MeterKind, Sample
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
@@ -71,7 +71,7 @@ class GasGains(NamedTuple):
 
 def start_gas(course: Course, sample: Sample) -> GasGains:
     """Nothing gained at the first sample."""
-    return GasGains(sample.gas, GasSample(0.0, 0.0, 0.0, 0.0, 0.0))
+    return GasGains(sample.gas, NO_GAS)
 
 
 def update_gas(state: GasGains, course: Course, sample: Sample) -> GasGains:
@@ -99,7 +99,7 @@ class EnergyGains(NamedTuple):
 
 def start_energy(course: Course, sample: Sample) -> EnergyGains:
     """Nothing gained at the first sample."""
-    return EnergyGains(sample.energy, EnergySample(0.0, 0.0, 0.0, 0.0, 0.0))
+    return EnergyGains(sample.energy, NO_ENERGY)
 
 
 def update_energy(state: EnergyGains, course: Course, sample: Sample) -> EnergyGains:

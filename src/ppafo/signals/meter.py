@@ -63,6 +63,11 @@ class EnergySample(NamedTuple):
     gas_work: float
 
 
+NO_GAS = GasSample(**dict.fromkeys(GasSample._fields, 0.0))
+NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
+"""Nothing gained yet, or energies of gas that has no balance of them."""
+
+
 class Sample(NamedTuple):
     """One sample of a recording: its number from 0, channels in SI units, and those of gas, foot and stride.
 

@@ -8,6 +8,7 @@ from ppafo.model.controlled import TORQUE, controlled
 from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import ThermalParameters, joint_torque
 from ppafo.signals.meter import (
+    NO_ENERGY,
     SAME_LEVEL,
     Course,
     EnergySample,
@@ -19,10 +20,9 @@ from ppafo.signals.meter import (
     is_away,
 )
 
-NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
 NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
 NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
-"""What a sample has where gas keeps no energy, there is no foot on the shank of a gait, or nothing walks."""
+"""What a sample has where there is no foot on the shank of a gait, or nothing walks."""
 
 
 def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
