@@ -124,10 +124,9 @@ def _load_beyond_reach(case: Case) -> Cause | None:
     reach, supply = (highest, "supply.pressure") if load > highest else (lowest, "supply.dorsiflexion_pressure")
     stop = _stop(scenario, angle)
     rests = f"the joint lies on its {stop} stop: " if stop else ""
-    text = (
-        f"{rests}{level_text('N m', abs(load), scenario)} work against it at {level_text('rad', wanted, scenario)}, where the actuator gives "
-        f"{level_text('N m', abs(reach), scenario)} at most"
-    )
+    works, gives = (level_text("N m", abs(torque), scenario) for torque in (load, reach))
+    there = level_text("rad", wanted, scenario)
+    text = f"{rests}{works} work against it at {there}, where the actuator gives {gives} at most"
     needed = supply_for(device, wanted, 1.3 * load)
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
     if outside:

@@ -1,8 +1,8 @@
 """Tracking rule: the numbers of the settled part of a run, the limits they are held to, and the kind of failure.
 
 The settled part is the second half of the hold, or of the run where the reference never rests. Errors count as a share
-of the change that is wanted: the largest reference from where the run starts, from 0 for a torque. Of a walk the samples count
-in which its controller requests a torque, and errors are a share of the RMS of that request.
+of the change that is wanted: the largest reference from where the run starts, from 0 for a torque. Of a walk the
+samples count in which its controller requests a torque, and errors are a share of the RMS of that request.
 """
 
 import math
