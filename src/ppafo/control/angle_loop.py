@@ -115,7 +115,7 @@ def tolerance(_loop: TorqueLoop, joint: Joint) -> float:
 
 
 def rest_distance(loop: TorqueLoop, joint: Joint) -> float:
-    """Turn [rad] that shows motion: more than a step of the sensor or its noise, and than a joint at rest in 2 theta."""
+    """Turn [rad] that shows motion: more than a step of the sensor or its noise, and than ``REST_RATE`` in 2 theta."""
     unseen = 1.5 * joint.resolution + 4.0 * joint.noise
     return max(REST_RATE * torque_lag(loop, joint), unseen)
 

@@ -19,7 +19,6 @@ from ppafo.model.elementary import QUARTER_TURN, TURN
 from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
 from ppafo.model.ports import exhaust_path, load_torque, supply_path
 
-
 HALF_TURN = 0.5 * TURN
 """rad."""
 
@@ -128,8 +127,8 @@ def gravity_torque(angle: float, largest_torque: float) -> float:
     """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
-    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 at every angle that
-    a set may state, because a call of a library cosine would keep the loop over runs from vector code.
+    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 at every angle
+    that a set may state, because a call of a library cosine would keep the loop over runs from vector code.
     """
     slope = abs(angle - QUARTER_TURN)
     # The cosine is even and periodic: a slope of up to 5 half turns comes within one half turn of level.

@@ -90,7 +90,8 @@ class CascadeState(NamedTuple):
     ``quickening`` is the filtered rate of the reference's rate [rad/s^2], ``started`` the number of samples, 2 at most.
     ``load`` is the observed load [N m] beside gravity and friction, ``breakaway`` the torque [N m] that grows while the
     joint rests, ``asked_torque`` the torque asked for and ``lagged_torque`` that behind the lag of the torque loop
-    [N m]. The joint has been near the angle ``place`` [rad] for the time ``still`` [s]. ``is_held`` is 1 while the joint rests within the tolerance, ``is_full`` while the valve is fully open.
+    [N m]. The joint has been near the angle ``place`` [rad] for the time ``still`` [s]. ``is_held`` is 1 while it rests
+    within the tolerance, ``is_full`` while the valve is fully open.
     """
 
     reference: float
@@ -165,10 +166,10 @@ def cascade_update(
     before = state.asked_torque if state.started > 0.5 else measurement.torque
     lagged = state.lagged_torque + (before - state.lagged_torque) * period / (period + parameters.torque_lag)
     lagged = measurement.torque if state.is_full > 0.5 or state.started < 0.5 else lagged
-    load = state.load if state.started > 0.5 else measurement.torque - gravity
+    load_before = state.load if state.started > 0.5 else measurement.torque - gravity
     is_observed = parameters.load_time > 0.0
     slowness = max(parameters.load_time, period)
-    learnt = (lagged - gravity - friction - state.breakaway - load) * period / slowness
+    learnt = (lagged - gravity - friction - state.breakaway - load_before) * period / slowness
     learnt = learnt - parameters.inertia * (rate - state.rate) / slowness
     speed = min(abs(error) / CREEP_ERROR, FASTEST_CREEP)
     creep = parameters.static_torque / (CREEP_LAGS * parameters.torque_lag) * speed * period
@@ -177,7 +178,7 @@ def cascade_update(
     is_beyond = abs(breakaway) > parameters.static_torque
     learnt = learnt + (creep if is_beyond and state.is_full < 0.5 else 0.0)
     breakaway = state.breakaway if is_beyond else breakaway
-    load = load + (learnt if is_observed else 0.0)
+    load = load_before + (learnt if is_observed else 0.0)
 
     own = parameters.angle_stiffness * acting + parameters.angle_damping * (asked - rate)
     needed = load + breakaway + own + gravity + parameters.inertia * quickening + friction
@@ -191,7 +192,7 @@ def cascade_update(
         asked=asked,
         quickening=quickening,
         started=min(state.started + 1.0, 2.0),
-        load=state.load if rests_within else load,
+        load=load_before if rests_within else load,
         breakaway=state.breakaway if rests_within else breakaway,
         asked_torque=wanted,
         lagged_torque=lagged,
