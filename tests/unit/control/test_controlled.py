@@ -142,7 +142,7 @@ def test_the_torque_that_breaks_friction_grows_while_the_joint_rests_away_from_i
 
 def test_a_load_observer_can_be_left_out() -> None:
     without = cascade(torque_gain=0.1, error_limit=0.1, angle_stiffness=5.0, rest_distance=1.0e-4)
-    assert last_command(without, 1.45, 400) == pytest.approx(0.1 * 5.0 * 0.05)
+    assert last_command(without, 1.45, 400) == pytest.approx(0.1 * (5.0 * 0.05 - 2.0))
 
 
 @pytest.mark.parametrize("command", [-1.0, -0.3, -0.02, 0.02, 0.6, 1.0])

@@ -166,8 +166,9 @@ def cascade_update(
     before = state.asked_torque if state.started > 0.5 else measurement.torque
     lagged = state.lagged_torque + (before - state.lagged_torque) * period / (period + parameters.torque_lag)
     lagged = measurement.torque if state.is_full > 0.5 or state.started < 0.5 else lagged
-    load_before = state.load if state.started > 0.5 else measurement.torque - gravity
     is_observed = parameters.load_time > 0.0
+    first_load = measurement.torque - gravity if is_observed else 0.0
+    load_before = state.load if state.started > 0.5 else first_load
     slowness = max(parameters.load_time, period)
     learnt = (lagged - gravity - friction - state.breakaway - load_before) * period / slowness
     learnt = learnt - parameters.inertia * (rate - state.rate) / slowness
