@@ -114,18 +114,18 @@ def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: flo
     Near a request that has arrived no slew limit is at work: a small command is followed in no time. SimulationError
     for an effect with a state of its own.
     """
-    for effect in run.program.effects:
-        if effect.state is not None:
-            raise SimulationError(
-                f"effect '{effect.name}' has a state of its own, which no linear model has: switch it off"
-            )
     limitless, functions = without_slew_limit(run), functions_in(run)
     has_arrived = valve_at(run, functions, values).state == valve_at(limitless, functions, values).state
     return Plant(limitless if has_arrived else run, way, time, functions)
 
 
 def functions_in(run: Run) -> PythonFunctions:
-    """Return the functions of the model as a run has them."""
+    """Return the functions of the model as a run has them; SimulationError for an effect with a state of its own."""
+    for effect in run.program.effects:
+        if effect.state is not None:
+            raise SimulationError(
+                f"effect '{effect.name}' has a state of its own, which no linear model has: switch it off"
+            )
     effects = zip(run.program.effects, run.effects, strict=True)
     return functions_of(run.program, {effect.name: row for effect, row in effects})
 
