@@ -107,7 +107,7 @@ def test_a_wrong_parameter_and_a_strict_threshold_give_exit_code_1(
     assert main([*SET, step, "--set", "valve.area=8 mm^2"]) == 1
     # Only the product of area and discharge coefficient acts.
     orifice = r"valve\.(area|discharge_coefficient)"
-    assert re.search(rf"does not agree: {orifice} seems to be 3\.9\d times", capsys.readouterr().out)
+    assert re.search(rf"does not agree: angle in .*; {orifice} seems to be 3\.9\d times", capsys.readouterr().out)
     assert main([*SET, step, "--threshold", "angle=10%", "--threshold", "pressure_1=0.01 psi_d"]) == 1
     printed = capsys.readouterr().out
     assert "does not agree: pressure_1 in" in printed
