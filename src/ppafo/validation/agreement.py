@@ -233,7 +233,7 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
     # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
     zero = min(max(curve.usual_zero, _UNMOVED * curve.full_range), ACCEPTABLE_FRACTION * curve.full_range)
-    usual = math.hypot(max(explained, zero), _WITHIN_NOISE * noise) / curve.full_range
+    usual = math.hypot(explained, zero, _WITHIN_NOISE * noise) / curve.full_range
     return ChannelAgreement(
         channel=curve.channel,
         unit=curve.unit,

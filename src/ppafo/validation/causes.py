@@ -117,7 +117,9 @@ def causes_of(
     if not explaining:
         # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
         of_bench = search.compared([candidate for candidate in sized if candidate.usual], none)
-        errors = _usual_errors(search, none, of_bench)
+        # A delay that ends at its limit is longer than that, and no error of any bench.
+        is_late = any(agreement.delay.is_at_limit for agreement in agreements)
+        errors = None if is_late else _usual_errors(search, none, of_bench)
         if errors is not None:
             return Causes(errors, None, len(tried) + len(of_bench))
 
@@ -169,11 +171,15 @@ def _usual_errors(search: Search, none: Left, of_bench: Sequence[Tried]) -> Caus
     """
     # Beside pressures that are nearly equal a flow bends: what is small together may fail on straight lines, and not
     # alone.
-    explaining = [each for each in of_bench if each.explains and each.is_usual]
-    if not explaining:
+    explaining = [each for each in of_bench if each.explains]
+    usual = [each for each in explaining if each.is_usual]
+    if not usual:
         candidates = [each.candidate for each in of_bench]
-        explaining = [each for each in search.compared(search.together(candidates, none), none) if each.explains]
-    return _cause_of(explaining, search.penalty) if explaining else None
+        # One error beyond its limit explains more than several that strain to add up to it.
+        least = max((each.gain for each in explaining), default=0.0) - search.penalty
+        together = search.compared(search.together(candidates, none), none)
+        usual = [each for each in together if each.explains and each.gain > least]
+    return _cause_of(usual, search.penalty) if usual else None
 
 
 def _explained(

@@ -214,13 +214,20 @@ class Search:
     def together(self, usual: Sequence[Candidate], none: Left) -> list[Candidate]:
         """Return the likeliest usual errors of all sensors as one change; none where together they are unusual.
 
-        Each error is one of one sensor, for what groups have together would add to it beyond its limit. The sum of
-        their squares, over their variances, is chi-square.
+        Each error is one of one sensor, for what groups have together would add to it beyond its limit. In each channel
+        the sum of what they explain is one number, whose square over its variance is chi-square: as many errors at
+        their limits at once, all one way, are one that is beyond its own.
         """
         slopes = self.slopes(Change(), none, [candidate for candidate in usual if candidate.is_of_bench])
-        sized = _bounded(slopes, none.errors) if slopes else []
-        squares = sum((each.size / deviation_of_limit(each.candidate.usual)) ** 2 for each in sized)
-        if not sized or float(chi2.sf(squares, len(sized))) < _UNUSUAL:
+        if not slopes:
+            return []
+        sized = _bounded(slopes, none.errors)
+        counts = [record.values.shape[1] for record in self.records for _ in record.channels]
+        sums = np.add.reduceat(np.stack([each.slope for each in sized], axis=1), np.cumsum([0, *counts[:-1]]))
+        deviations = [deviation_of_limit(each.candidate.usual) for each in sized]
+        found = np.square(sums @ [each.size for each in sized])
+        squares = found / np.maximum(np.square(sums * deviations).sum(axis=1), _SMALLEST)
+        if len(counts) * float(chi2.sf(squares.max(), 1)) < _UNUSUAL:
             return []
         change = reduce(joined, [each.change for each in sized])
         words = "zeros, gains and delays of several sensors seem to be off"

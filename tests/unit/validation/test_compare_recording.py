@@ -194,9 +194,9 @@ def test_the_four_errors_of_the_paper_are_within_its_ten_percent_and_not_within_
     found = {name: round(100 * share, 1) for name, share in shares(agreement).items()}
     assert found == {"angle": 1.9, "pressure_1": 6.7, "pressure_2": 2.0, "pressure_difference": 4.4}
     assert agreement.passes
-    exact = parse_thresholds(["angle=2.1001 deg", "pressure_1=3.7001 psi_d", "pressure_2=1.4 psi_d"])
+    exact = parse_thresholds(["10%", "angle=2.1001 deg", "pressure_1=3.7001 psi_d", "pressure_2=1.4 psi_d"])
     assert agree(moved, device, **settings, thresholds=exact).passes
-    strict = parse_thresholds(["angle=2.0999 deg"])
+    strict = parse_thresholds(["10%", "angle=2.0999 deg"])
     assert not agree(moved, device, **settings, thresholds=strict).passes
 
 

@@ -69,14 +69,14 @@ def verdict(validation: Validation) -> str:
         for channel, agreement in pairs
         if not channel.passes
     )
-    why = _why(validation.causes, worst.in_noise)
+    why = _why(validation.causes, worst.in_noise, validation.passes)
     rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
     if not validation.passes:
         return f"{name} does not agree: {failed}; {rest}"
     return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
-def _why(causes: Causes, without: float) -> str:
+def _why(causes: Causes, without: float, passes: bool) -> str:
     """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
 
     ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
@@ -84,7 +84,8 @@ def _why(causes: Causes, without: float) -> str:
     """
     if causes.found is not None:
         verdict = in_words(causes.found)
-        verdict += ", as on any bench" if causes.found.is_usual else ""
+        # What is beyond a limit is more than usual, of whatever kind it is.
+        verdict += ", as on any bench" if causes.found.is_usual and passes else ""
         same = ", ".join(cause.name for cause in causes.found.same)
         return f"{verdict} (or, the same for these recordings: {same})" if same else verdict
     if not causes.tried:
