@@ -15,7 +15,7 @@ import numpy as np
 from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
-from ppafo.progress import Progress, Report, report_nothing
+from ppafo.progress import Report, report_nothing
 from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
@@ -101,7 +101,6 @@ def causes_of(
     none = search.evaluated([Change()])[0]
     if none is None or none.is_noise:
         return Causes(is_noise=none is not None)
-    report(Progress("searching for causes"))
     if settings.motion == "measured":
         # A measured angle is an input, and a delay of the sensors would be one of an input: samples alone are searched.
         tried = search.compared(_samples(records), none)

@@ -107,8 +107,7 @@ class Search:
         """Return what each change leaves; None for one of a device that cannot have made such a recording."""
         left: list[Left | None] = []
         for first in range(0, len(changes), _TOGETHER):
-            if first:
-                self.report(Progress("searching for causes", first, len(changes)))
+            self.report(Progress("searching for causes", first, len(changes), noun="changes"))
             left += self._evaluated_together(changes[first : first + _TOGETHER])
         return left
 
