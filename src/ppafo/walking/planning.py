@@ -10,8 +10,8 @@ from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
+from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch
-from ppafo.engine.linking import python_place
 from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
 from ppafo.engine.run import Run, Walk, batches_of, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers
@@ -20,6 +20,7 @@ from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, truncated, whole
+from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import GaitNow, gait_at
 from ppafo.model.orifice import area_conductance
@@ -175,9 +176,8 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
 
     def growths(*rows: Any) -> tuple[float, float]:
         count = len(program.effects)
-        taken = python_place(load_torque, program.effects, rows[:count])
+        taken = in_program(load_torque, program, rows[:count])
         states = dict(zip(program.effect_states, rows[count:], strict=True))
-        assert taken is not None, "an effect acts there"
         at_rates = [taken(states, 0.0, QUARTER_TURN, share * FASTEST_FOOT) for share in (-1.0, -0.99, 0.99, 1.0)]
         at_angles = [taken(states, 0.0, QUARTER_TURN + turned, 0.0) for turned in (-SMALL_TURN, SMALL_TURN)]
         damping = max(at_rates[1] - at_rates[0], at_rates[3] - at_rates[2]) / (0.01 * FASTEST_FOOT)
