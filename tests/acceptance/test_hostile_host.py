@@ -25,9 +25,8 @@ run.plot()
 
 def printed(host: str) -> str:
     words = [sys.executable, "-c", PROGRAM, str(ROOT), host]
-    done = subprocess.run(words, capture_output=True, text=True, env={**os.environ, "MPLBACKEND": "agg"})
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    surroundings = {**os.environ, "MPLBACKEND": "agg"}
+    return subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True, env=surroundings).stdout
 
 
 def test_a_program_prints_the_same_in_a_hostile_host() -> None:

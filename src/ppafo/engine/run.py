@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.groups import Role, filled
-from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
-from ppafo.engine.linking import composed_with
+from ppafo.engine.in_python import functions_of
+from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
 from ppafo.engine.program import FaultPhases, LegPhases, Program
 from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
@@ -254,11 +254,16 @@ def gas_at_start(run: Run) -> Any:
     program, start = run.program, run.program.gas.START
     if start is None:
         return NoParameters()
-    composed = composed_with(start, program.effects)
-    if composed is None:
+    if not program.effects:
         return start(run.plant, run.initial)
-    rows = dict(zip((effect.name for effect in program.effects), run.effects, strict=True))
-    return of_each(composed.function, *(rows[name] for name in composed.needed), run.plant, run.initial)
+    rows: dict[str, Any] = {}
+    own = functions_of(program, rows).of(start)
+
+    def started(plant: Any, initial: Any, *effects: Any) -> Any:
+        rows.update(zip((effect.name for effect in program.effects), effects, strict=True))
+        return own(plant, initial)
+
+    return of_each(started, run.plant, run.initial, *run.effects)
 
 
 def states_at_start(run: Run) -> list[Any]:
@@ -301,15 +306,22 @@ def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchR
     for index, batch in enumerate(batches):
         groups.setdefault((batch.program, batch.clock), []).append(index)
     results: dict[int, BatchResult] = {}
-    load_programs(program for program, _ in groups)
-    for (program, clock), members in groups.items():
-        parameters = np.concatenate([batches[index].parameters for index in members], axis=1)
-        states = np.concatenate([batches[index].states for index in members], axis=1)
+    together = [
+        Batch(
+            program,
+            clock,
+            np.concatenate([batches[index].parameters for index in members], axis=1),
+            np.concatenate([batches[index].states for index in members], axis=1),
+        )
+        for (program, clock), members in groups.items()
+    ]
+    load_programs((batch.program, effort_for(batch)) for batch in together)
+    for batch, members in zip(together, groups.values(), strict=True):
 
         def take(block: slice, outcome: BatchResult, members: list[int] = members) -> None:
             for column, index in enumerate(members[block]):
                 one = slice(column, column + 1)
                 results[index] = BatchResult(outcome.states[:, one], outcome.record[:, :, one])
 
-        run_blocks(Batch(program, clock, parameters, states), take, threads)
+        run_blocks(batch, take, threads, effort_for(batch))
     return [results[index] for index in range(len(runs))]

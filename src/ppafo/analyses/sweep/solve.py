@@ -43,6 +43,7 @@ from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import Tally, joined
 from ppafo.study.sent_plugins import plugins_to_send
 from ppafo.study.store import (
+    FOLLOWS,
     OSCILLATES,
     STATUSES,
     Finished,
@@ -91,6 +92,14 @@ def _summary(study: Study, results: StudyResults) -> dict[str, Any]:
         "completed_by_configuration": completed,
         "oscillating": {
             name: int(sum(np.count_nonzero(part) for part in results.parts(name, OSCILLATES))) for name in completed
+        },
+        # A reference that lies beyond reach on purpose is followed by no run.
+        "not_following": {
+            configuration.name: int(
+                sum(np.count_nonzero(part == 0.0) for part in results.parts(configuration.name, FOLLOWS))
+            )
+            for configuration in study.configurations
+            if not configuration.scenario.beyond_reach
         },
         "failures": failures,
         "quantile_definition": QUANTILE_DEFINITION,
