@@ -26,11 +26,12 @@ from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import Source
-from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit
+from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances
 from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
