@@ -1,11 +1,11 @@
 """The compilers of this computer, for tests that compare what they make, and one that runs its text as it is."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import ModuleType
 
 from ppafo.engine.cache.programs import load_generated
-from ppafo.engine.compilers import OFFERED, Compiler
+from ppafo.engine.compilers import OFFERED, Compiler, Effort
 from ppafo.errors import SimulationError
 
 
@@ -39,7 +39,12 @@ class ScriptCompiler:
 
     says: bool = False
     name: str = "script"
+    effort: Effort = Effort.FULL
     seconds_per_byte: float = 2.5e-4
+
+    def with_effort(self, effort: Effort) -> "ScriptCompiler":
+        """Return the same compiler with another optimisation of its programs."""
+        return replace(self, effort=effort)
 
     def identity(self) -> str:
         """Always the same."""

@@ -2,17 +2,19 @@
 
 import shutil
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from ppafo.engine.lanes import BatchResult, run_batch
+from ppafo.engine.cache.programs import load_generated
+from ppafo.engine.compilers import Effort
+from ppafo.engine.lanes import Advancing, BatchResult, LaneBlock, run_batch, write_source
 from ppafo.golden_bits import digest, golden_hashes, names, plain_batch
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
 from scripts import bits, golden_bits
-from tests.compilers_here import compilers_here
+from tests.compilers_here import compilers_here, first_compiler
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 needs_zig = pytest.mark.skipif("zig" not in compilers_here(), reason="no zig on this machine")
@@ -41,6 +43,15 @@ def test_every_scenario_and_walk_has_golden_hashes() -> None:
 def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     assert golden_bits.hashes_of(name, lambda _batch: run_batch) == golden_hashes()[name]
+
+
+@pytest.mark.parametrize("name", [CHEAP, "off"])
+def test_a_quickly_compiled_program_has_the_golden_bits(name: str) -> None:
+    batch = plain_batch(name)
+    module = load_generated(write_source(batch.program)[1], first_compiler().with_effort(Effort.QUICK))
+    block = LaneBlock(cast(Advancing, module), batch.program, batch.clock, batch.parameters, batch.states)
+    block.advance(batch.clock.step_count)
+    assert digest(block.result()) == golden_hashes()[name]["run"]
 
 
 @pytest.mark.parametrize("name", [CHEAP, "solenoid"])

@@ -3,6 +3,8 @@
 import copy
 import inspect
 import pickle
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +19,7 @@ import ppafo.gym
 from ppafo.cli.new import new
 from ppafo.errors import DataError, UnitError
 from ppafo.report.finding import Finding
+from ppafo.simulation.scenario import Scenario
 
 TASK = "torque-task-proportional"
 STUDY = "torque-task-uncertainty"
@@ -108,6 +111,58 @@ def test_a_result_can_be_pickled_and_copied_and_still_prints_and_draws_itself(na
             assert other.plot().axes
         if isinstance(other, Finding):
             assert other.to_dict() == result.to_dict()
+
+
+def _files() -> dict[str, Any]:
+    """Every shipped scenario and walk, as files have them."""
+    return {
+        **{name: ppafo.load_scenario(name) for name in ppafo.list_scenarios()},
+        **{name: ppafo.load_walk(name) for name in ppafo.list_walks()},
+    }
+
+
+@pytest.mark.parametrize("way", COPIES)
+def test_every_scenario_and_walk_can_be_pickled_and_copied_whatever_its_gains_follow(way: str, tmp_path: Path) -> None:
+    new("scenario", "ramp", out=tmp_path / "ramp.toml")
+    given = _files() | {"template": ppafo.load_scenario(tmp_path / "ramp.toml")}
+    assert {name: COPIES[way](scenario) for name, scenario in given.items()} == given
+
+
+def test_a_pickled_scenario_runs_in_another_process_with_the_same_bits(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", "python")
+    # Its gains follow from numbers of the device by functions that no module has.
+    scenario = ppafo.load_scenario("swing-foot-angle", overrides={"run.duration": 0.02})
+    (tmp_path / "scenario").write_bytes(pickle.dumps(scenario))
+    program = (
+        "import pickle, pathlib, sys, ppafo\n"
+        "scenario = pickle.loads(pathlib.Path(sys.argv[1]).read_bytes())\n"
+        "result = ppafo.simulate(scenario)\n"
+        "sys.stdout.buffer.write(pickle.dumps((scenario, result.recording)))\n"
+    )
+    told = subprocess.run([sys.executable, "-c", program, tmp_path / "scenario"], capture_output=True, check=True)
+    returned, recording = pickle.loads(told.stdout)
+    assert returned == scenario
+    assert recording == ppafo.simulate(scenario).recording
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [*ppafo.list_scenarios(), *ppafo.list_walks()])
+def test_the_result_of_every_scenario_and_walk_can_be_pickled_and_copied_with_the_same_bits(name: str) -> None:
+    given = _files()[name]
+    result = ppafo.simulate(given) if isinstance(given, Scenario) else ppafo.walk(given, minutes=0.05)
+    for make in COPIES.values():
+        other = make(result)
+        assert str(other) == str(result)
+        assert other.recording == result.recording
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in ppafo.list_scenarios() if name != TASK])
+def test_a_comparison_with_any_scenario_can_be_pickled(name: str) -> None:
+    comparison = ppafo.compare([TASK, name])
+    assert pickle.loads(pickle.dumps(comparison)).to_dict() == comparison.to_dict()
 
 
 def test_every_public_function_has_its_result_tried() -> None:

@@ -5,15 +5,24 @@ and is offered by the package as a whole, where it is imported.
 """
 
 from collections.abc import Callable, Mapping
+from enum import StrEnum
 from types import ModuleType
 from typing import Protocol
 
 from ppafo.errors import ProgramError, SimulationError
 
-FLAGS = ("-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
-"""Flags of gcc and clang: strict arithmetic; without the third last gcc is up to 20 times slower."""
+FLAGS = ("-std=c99", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
+"""Flags of gcc and clang for strict arithmetic; without the second last gcc is up to 20 times slower."""
 LIBRARY = frozenset({"exp", "log", "pow"})
 """Functions that every C library has, with last bits of its own."""
+
+
+class Effort(StrEnum):
+    """Optimisation of a compiled program; the results have the same bits."""
+
+    QUICK = "-O1"
+    """Compiled in half the time, three times slower in a run: for a run that takes less than its compilation."""
+    FULL = "-O3"
 
 
 class CompilerError(SimulationError):
@@ -32,7 +41,7 @@ class UntranslatableError(ProgramError):
 
 
 class Compiler(Protocol):
-    """Makes a module that does what the composed text says; both ways fill ``module``.
+    """Compiler of a composed text into a module; both ways fill ``module``.
 
     They raise ProgramError for a mistake in the text, UntranslatableError where it has no form in the language of the
     compiler, and CompilerError where the compiler does not work.
@@ -41,14 +50,21 @@ class Compiler(Protocol):
 
     @property
     def name(self) -> str:
-        """A word of small letters, in the names of its programs."""
+        """Name of the compiler, in small letters."""
+
+    @property
+    def effort(self) -> Effort:
+        """Optimisation of its programs."""
+
+    def with_effort(self, effort: Effort) -> "Compiler":
+        """Return the same compiler with another optimisation of its programs."""
 
     @property
     def seconds_per_byte(self) -> float:
-        """What a common computer takes for a byte of the text, until this one has compiled something [s]."""
+        """Compile time per byte of the text on a common computer, until this one has compiled something [s]."""
 
     def identity(self) -> str:
-        """What a compiled program depends on beside its text: compiler, version, flags, processor."""
+        """Dependencies of a compiled program beside its text: compiler, version, flags, processor."""
 
     def described(self) -> str:
         """Name and version of the compiler, for people."""

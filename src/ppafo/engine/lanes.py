@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ppafo import interrupts
 from ppafo.engine.cache.texts import kept_bytes
+from ppafo.engine.compilers import Effort
 from ppafo.engine.entries import INLINE
 from ppafo.engine.groups import Role, check_rows
 from ppafo.engine.lane_rows import VECTOR, lanes_of
@@ -42,6 +43,9 @@ LONGEST_UNSAID = 120.0
 
 STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
+
+QUICK_STEPS = 200_000
+"""Steps of one run up to which a program that is compiled quickly ends sooner: a second of either."""
 
 SIGNAL_ROWS = 5
 """Readings that may come late: angle and pressures, and in a walk two forces."""
@@ -105,14 +109,20 @@ class Advancing(Protocol):
         """Take a block of lanes some steps further."""
 
 
-def load_program(program: Program) -> Advancing:
+def effort_for(batch: Batch) -> Effort:
+    """Optimisation with which a batch by itself ends soonest where its program has yet to be compiled."""
+    is_short = batch.states.shape[1] == 1 and batch.clock.step_count <= QUICK_STEPS
+    return Effort.QUICK if is_short else Effort.FULL
+
+
+def load_program(program: Program, effort: Effort = Effort.FULL) -> Advancing:
     """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
 
     A program is written anew where a number or function that it was made from stands for something else by now. It is
     written where Python runs it, too: what cannot be compiled is refused on every computer, in the same words.
     """
     source = _current_source(program)
-    module: Any = None if runs_by_python() else compiled(source)
+    module: Any = None if runs_by_python() else compiled(source, effort)
     if module is not None:
         return module  # type: ignore[no-any-return]
     from ppafo.engine.interpreter import PythonProgram  # most computers have a compiler
@@ -120,14 +130,14 @@ def load_program(program: Program) -> Advancing:
     return PythonProgram(program)
 
 
-def load_programs(programs: Iterable[Program]) -> None:
-    """Load the compiled modules of programs that are all needed, so that what is compiled can be counted."""
+def load_programs(programs: Iterable[tuple[Program, Effort]]) -> None:
+    """Load compiled programs with their optimisation; those to be compiled are announced and compiled together."""
     different = dict.fromkeys(programs)
     compilers = compilers_to_try() if len(different) > 1 else ()
     if compilers:
         from ppafo.engine.cache.making import load_all  # most runs have one program
 
-        load_all([_current_source(program) for program in different], compilers[0], compiled)
+        load_all([(_current_source(program), effort) for program, effort in different], compilers[0], compiled)
 
 
 def _current_source(program: Program) -> str:
@@ -175,12 +185,18 @@ def run_batch(batch: Batch, threads: int | None = None) -> BatchResult:
     return join_results([results[start] for start in sorted(results)])
 
 
-def run_blocks(batch: Batch, take: Callable[[slice, BatchResult], None], threads: int | None = None) -> None:
+def run_blocks(
+    batch: Batch,
+    take: Callable[[slice, BatchResult], None],
+    threads: int | None = None,
+    effort: Effort = Effort.FULL,
+) -> None:
     """Run a batch block by block on ``threads`` threads (all cores by default), and give each result away at once.
 
-    ``take(runs, result)`` is called from several threads.
+    ``take(runs, result)`` is called from several threads. ``effort`` is the optimisation of a program that has yet to
+    be compiled.
     """
-    module = load_program(batch.program)
+    module = load_program(batch.program, effort)
     runs = batch.states.shape[1]
     lanes = lanes_of(batch.program)
     starts = range(0, runs, lanes)
@@ -325,12 +341,13 @@ class LaneBlock:
         return BatchResult(self.states[:, : self._width].copy(), record)
 
 
-def begin_block(batch: Batch) -> LaneBlock:
+def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
     """One block of all runs of a batch, not begun; ValueError for more than its program takes at once."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     if runs > lanes:
         raise ValueError(f"{runs} runs do not fit a block of {lanes}; the others would stand still")
-    return LaneBlock(load_program(batch.program), batch.program, batch.clock, batch.parameters, batch.states)
+    module = load_program(batch.program, effort)
+    return LaneBlock(module, batch.program, batch.clock, batch.parameters, batch.states)
 
 
 def _pad_columns(columns: Floats) -> Floats:

@@ -17,8 +17,9 @@ from pathlib import Path
 from types import ModuleType
 
 from ppafo.engine.cache.folder import LEFT_OUT_FOR, cache_folder, refusal
+from ppafo.engine.cache.kept import is_kept
 from ppafo.engine.cache.programs import load_generated, note_name
-from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, UntranslatableError
+from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, Effort, UntranslatableError
 from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
 
 logger = logging.getLogger("ppafo")
@@ -88,12 +89,12 @@ def load_source(source: str) -> ModuleType:
     return interpreted(source)
 
 
-def compiled(source: str) -> ModuleType | None:
+def compiled(source: str, effort: Effort = Effort.FULL) -> ModuleType | None:
     """Return the module of a composed text by a compiler; None where Python has to run it, which a line has said.
 
-    As ``load_source``.
+    A quick program is not made where the full one is kept. Raises as ``load_source``.
     """
-    return None if runs_by_python() else _load_by(source, compilers_to_try())
+    return None if runs_by_python() else _load_by(source, compilers_to_try(), effort)
 
 
 def runs_by_python() -> bool:
@@ -106,7 +107,7 @@ def runs_by_python() -> bool:
 
 
 @lru_cache(maxsize=64)
-def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType | None:
+def _load_by(source: str, compilers: tuple[Compiler, ...], effort: Effort) -> ModuleType | None:
     """Return the module of a text by the first of some compilers that works; None where none does.
 
     SimulationError, or ProgramError for a law without C, where ``PPAFO_BACKEND`` names one that does not do.
@@ -115,7 +116,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType | None:
         return None
     compiler, *others = compilers
     try:
-        return load_generated(source, compiler)
+        return load_generated(source, compiler if is_kept(source, compiler) else compiler.with_effort(effort))
     except CompilerError as failure:
         # One reason, such as missing headers, often stops several compilers.
         failed = [other for other in compilers if other is compiler or other.name in failure.names]
@@ -129,7 +130,7 @@ def _load_by(source: str, compilers: tuple[Compiler, ...]) -> ModuleType | None:
                 instead = f"compiled by {left[0].name}" if left else "run by Python, some hundred times slower,"
                 logger.warning("ppafo: %s; models are %s instead %s", failure, instead, until)
             _leave_out(failed, failure)
-        return _load_by(source, left)
+        return _load_by(source, left, effort)
     except UntranslatableError as refused:
         if os.environ.get(BACKEND_VARIABLE):
             raise ProgramError(f"{refused}; {BACKEND_VARIABLE}={PYTHON} runs it") from refused

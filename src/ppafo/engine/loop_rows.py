@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from ppafo.engine.entries import indent, parse_expression
 from ppafo.engine.generator import Composed, StepText
 from ppafo.engine.lane_rows import HANDED, lanes_of
-from ppafo.engine.reduction import HISTORIES, NUMBER, Slot, with_arguments
+from ppafo.engine.reduction import HISTORIES, NUMBER, TRACE, Slot, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 
 
@@ -30,10 +30,21 @@ class Call(NamedTuple):
         own = [self.arguments[name] for name in self.phase.effects.takes]
         return f"{self.phase.name}({', '.join([*handed, *own])})"
 
-    def places(self, slot: Slot) -> list[str]:
-        """Where in its history the phase sets a number: all places as text, but that of the lane."""
+    @property
+    def returned(self) -> str:
+        """Name that the value of the call gets: its only result's, or one of its own for several results."""
+        results = self.phase.effects.results
+        return results[0] if len(results) == 1 else self.phase.own
+
+    def result(self, name: str) -> str:
+        """Expression of a result, once the value of the call has its name."""
+        return name if name == self.returned else f"{self.returned}.{name}"
+
+    def stored(self, slot: Slot, number: str) -> str:
+        """Element of a history that the phase sets, for the lane of a number."""
         arguments = {name: parse_expression(text) for name, text in self.arguments.items()}
-        return [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
+        places = [ast.unparse(with_arguments(index, arguments)) for index in slot.places]
+        return f"{slot.history}[{', '.join([*places, number])}]"
 
 
 class Question(NamedTuple):
@@ -103,19 +114,14 @@ class RowsOfLanes:
                 raise self.step.refuse_unkept(name, call.phase)
         if not effects.results:
             return []
-        is_one = len(effects.results) == 1
-        whole = effects.results[0] if is_one else call.phase.own
         lines = [self.load(name) for name in call.phase.handed if name in rows]
-        lines.append(f"{whole} = {call.text('lane')}")
+        lines.append(f"{call.returned} = {call.text('lane')}")
         for group, fields in effects.groups.items():
             for path in leaf_paths(rows[group], group):
                 changes = fields is None or path.split(".")[1].partition("[")[0] in fields
                 if changes and path in self.cells:
-                    lines.append(f"{self.cells[path]} = {path if is_one else f'{whole}.{path}'}")
-        for name, slot in effects.slots.items():
-            cell = f"{slot.history}[{', '.join(call.places(slot))}, lane]"
-            lines.append(f"{cell} = {name if is_one else f'{whole}.{name}'}")
-        return lines
+                    lines.append(f"{self.cells[path]} = {call.result(group)}{path.removeprefix(group)}")
+        return lines + [f"{call.stored(slot, 'lane')} = {call.result(name)}" for name, slot in effects.slots.items()]
 
     def any_of(self, condition: ast.expr, is_none: bool) -> Question:
         """A count of lanes: a sum of whole numbers is taken of several at once, a largest float is not."""
@@ -176,27 +182,20 @@ class RowsOfRun:
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """The bare calls, whose results get the names of their groups."""
-        lines: list[str] = []
-        for call in calls:
-            results, slots = call.phase.effects.results, call.phase.effects.slots
-            if not results:
-                continue
-            text = call.text("0")
-            if len(results) == 1:
-                lines.append(f"{results[0]} = {text}")
-                lines += [f"{slot.history}[{', '.join(call.places(slot))}, 0] = {name}" for name, slot in slots.items()]
-                continue
-            whole = call.phase.own
-            lines.append(f"{whole} = {text}")
-            traced = [f"{whole}.{name}" for name, slot in slots.items() if slot.history == "trace"]
-            if traced:
-                lines += ["samples.before = samples.last", f"samples.last = {self.outputs}(0.0, {', '.join(traced)})"]
-            else:
-                lines += [f"{name} = {whole}.{name}" for name in results]
-            for name, slot in slots.items():
-                if slot.history != "trace":
-                    lines.append(f"{slot.history}[{', '.join(call.places(slot))}, 0] = {name}")
-        return lines or ["pass"]
+        return [line for call in calls for line in self.for_run(call)] or ["pass"]
+
+    def for_run(self, call: Call) -> list[str]:
+        """Lines for one call: groups that it sets, numbers of histories, and of a trace the row of the sample."""
+        effects = call.phase.effects
+        if not effects.results:
+            return []
+        lines = [f"{call.returned} = {call.text('0')}"]
+        lines += [f"{group} = {call.result(group)}" for group in effects.groups if group != call.returned]
+        traced = [call.result(name) for name, slot in effects.slots.items() if slot.history == TRACE]
+        if traced:
+            lines += ["samples.before = samples.last", f"samples.last = {self.outputs}(0.0, {', '.join(traced)})"]
+        kept = {name: slot for name, slot in effects.slots.items() if slot.history != TRACE}
+        return lines + [f"{call.stored(slot, '0')} = {call.result(name)}" for name, slot in kept.items()]
 
     def any_of(self, condition: ast.expr, is_none: bool) -> Question:
         """The condition of the run itself."""

@@ -23,7 +23,9 @@ from ppafo.engine.rows import is_number, is_row, members
 from ppafo.engine.source_text import is_step_function
 from ppafo.errors import ProgramError
 
-HISTORIES = frozenset({"signal_history", "command_history", "trace"})
+TRACE = "trace"
+"""History of what is shown at samples."""
+HISTORIES = frozenset({"signal_history", "command_history", TRACE})
 """Arrays that a lane has a column of; the last of their places is the lane's number."""
 NUMBER = "lane_number"
 """Name of the number of a lane in a composed function."""
@@ -516,7 +518,7 @@ class Reduction:
             history, places = self.group(target.value), tuple(map(self.visit, _places(target)))
             known = [index.value for index in places if isinstance(index, ast.Constant)]
             # A trace has the names of its channels.
-            words = [self.collector.parts.traced[index] if history == "trace" else str(index) for index in known]
+            words = [self.collector.parts.traced[index] if history == TRACE else str(index) for index in known]
             name = "_".join(["new", history.removesuffix("_history"), *words]).replace(".", "_")
             self.note_slot(name, Slot(history, places), target)
             return ast.Name(_GROUP + name, ast.Store())

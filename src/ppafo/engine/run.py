@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.groups import Role, filled
-from ppafo.engine.lanes import Batch, BatchResult, Clock, load_programs, run_blocks
+from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
 from ppafo.engine.linking import composed_with
 from ppafo.engine.program import FaultPhases, LegPhases, Program
 from ppafo.engine.rows import of_each, row_numbers
@@ -301,15 +301,22 @@ def run_together(runs: Sequence[Run], threads: int | None = None) -> list[BatchR
     for index, batch in enumerate(batches):
         groups.setdefault((batch.program, batch.clock), []).append(index)
     results: dict[int, BatchResult] = {}
-    load_programs(program for program, _ in groups)
-    for (program, clock), members in groups.items():
-        parameters = np.concatenate([batches[index].parameters for index in members], axis=1)
-        states = np.concatenate([batches[index].states for index in members], axis=1)
+    together = [
+        Batch(
+            program,
+            clock,
+            np.concatenate([batches[index].parameters for index in members], axis=1),
+            np.concatenate([batches[index].states for index in members], axis=1),
+        )
+        for (program, clock), members in groups.items()
+    ]
+    load_programs((batch.program, effort_for(batch)) for batch in together)
+    for batch, members in zip(together, groups.values(), strict=True):
 
         def take(block: slice, outcome: BatchResult, members: list[int] = members) -> None:
             for column, index in enumerate(members[block]):
                 one = slice(column, column + 1)
                 results[index] = BatchResult(outcome.states[:, one], outcome.record[:, :, one])
 
-        run_blocks(Batch(program, clock, parameters, states), take, threads)
+        run_blocks(batch, take, threads, effort_for(batch))
     return [results[index] for index in range(len(runs))]

@@ -1,7 +1,7 @@
 """Frames: functions in which some names stand for components that are put in their place."""
 
 import types
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -13,6 +13,15 @@ class Frame(NamedTuple):
 
     function: PlainFunction
     components: tuple[tuple[str, Any], ...]
+
+
+class Recipe(NamedTuple):
+    """Picklable form of a function that no module has: ``maker`` makes it anew from frame, name and components."""
+
+    maker: Callable[[PlainFunction, str, Any], PlainFunction]
+    frame: Any
+    name: str
+    components: Any
 
 
 def frame_of(function: PlainFunction) -> Frame | None:
@@ -37,6 +46,32 @@ def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFun
     The engine compiles it with each ``parts.NAME`` as the function that it is. Equal parts give the same function.
     """
     return _made_of(frame, name, parts)
+
+
+def recipe_of(value: Any) -> Any:
+    """Picklable form of a value: recipes in the place of functions that were bound, also inside of tuples."""
+    frame = frame_of(value) if isinstance(value, types.FunctionType) else None
+    if frame is None:
+        return _item_by_item(recipe_of, value)
+    if value.__kwdefaults__ is not None:
+        maker, components = made_of, frame.components[0][1]
+    else:
+        maker, components = _bound, frame.components
+    return Recipe(maker, recipe_of(frame.function), value.__name__, recipe_of(components))
+
+
+def by_recipe(value: Any) -> Any:
+    """Value whose picklable form is given: in one process, the same functions as before."""
+    if isinstance(value, Recipe):
+        return value.maker(by_recipe(value.frame), value.name, by_recipe(value.components))
+    return _item_by_item(by_recipe, value)
+
+
+def _item_by_item(change: Callable[[Any], Any], value: Any) -> Any:
+    if not isinstance(value, tuple):
+        return value
+    items = map(change, value)
+    return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
 
 
 @lru_cache(maxsize=512)

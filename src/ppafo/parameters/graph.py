@@ -6,13 +6,12 @@ and units, episodes of agents. So a setting means the same at all of them.
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.model.binding import bind, frame_of
+from ppafo.model.binding import by_recipe, recipe_of
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.units import to_si
@@ -52,8 +51,8 @@ class Term:
     in_other_form: "Term | None" = None
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A bound function is pickled by what it was bound from."""
-        return _made_again, (self.sources, _by_frame(self.function), self.rows, self.orifice, self.in_other_form)
+        """Copy and pickle with the recipe of the function, which may be one that no module has."""
+        return _term, (self.sources, recipe_of(self.function), self.rows, self.orifice, self.in_other_form)
 
     def number(self, present: Callable[[str], Any]) -> Any:
         """Return what the function makes of what the sources are at ``present``."""
@@ -71,6 +70,10 @@ class Term:
             arguments.append(filled(row, rest[:size]))
             rest = rest[size:]
         return arguments + rest
+
+
+def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> Term:
+    return Term(sources, by_recipe(recipe), *others)
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,26 +221,3 @@ def joined(parts: Iterable[Graph]) -> dict[str, tuple[Follows, ...]]:
     for part in parts:
         links |= part
     return links
-
-
-class _Bound(NamedTuple):
-    frame: Any
-    name: str
-    components: tuple[Any, ...]
-
-
-def _by_frame(value: Any) -> Any:
-    frame = frame_of(value) if isinstance(value, FunctionType) else None
-    if frame is None:
-        return value
-    return _Bound(frame.function, value.__name__, tuple((name, _by_frame(item)) for name, item in frame.components))
-
-
-def _again(value: Any) -> Any:
-    if not isinstance(value, _Bound):
-        return value
-    return bind(_again(value.frame), value.name, {name: _again(item) for name, item in value.components})
-
-
-def _made_again(sources: Any, function: Any, rows: Any, orifice: str, other: Any) -> Term:
-    return Term(sources, _again(function), rows, orifice, other)

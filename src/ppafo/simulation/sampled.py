@@ -7,7 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
-from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, load_program, samples_in
+from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, effort_for, load_program, samples_in
 from ppafo.engine.linking import python_place
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
@@ -27,7 +27,7 @@ class SampledRun:
         self.taken = 0
         self._batch = batch
         self._block = LaneBlock(
-            load_program(program) if module is None else module,
+            load_program(program, effort_for(batch)) if module is None else module,
             program,
             clock,
             batch.parameters,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 
 from ppafo.documents.json_text import plain
+from ppafo.engine.compilers import Effort
 from ppafo.engine.lanes import BatchResult, Floats, load_program, load_programs
 from ppafo.engine.run import NEVER_FAILED, TOO_MANY_PARTS, Run, batch_of, run_together, state_row_numbers
 from ppafo.errors import SimulationError
@@ -279,6 +280,7 @@ def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: F
 def compile_models(scenarios: Iterable[Scenario]) -> None:
     """Compile the models of scenarios into the cache, unless they are there; nothing is run."""
     programs = [plan_run(scenario).program for scenario in scenarios]
-    load_programs(programs)
+    # Fully optimised ones serve single runs and ensembles.
+    load_programs((program, Effort.FULL) for program in programs)
     for program in programs:
         load_program(program)

@@ -8,13 +8,13 @@ import importlib.util
 import platform
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from shutil import which
 from types import ModuleType
 
-from ppafo.engine.compilers import FLAGS, LIBRARY, CompilerError
+from ppafo.engine.compilers import FLAGS, LIBRARY, CompilerError, Effort
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
 from ppafo.errors import SimulationError, reason
 from ppafo.translation.native_entries import fill_module, parameters_of
@@ -36,17 +36,23 @@ class CCompiler:
 
     name: str
     command: tuple[str, ...]
+    effort: Effort = Effort.FULL
+
+    def with_effort(self, effort: Effort) -> "CCompiler":
+        """Return the same compiler with another optimisation of its programs."""
+        return replace(self, effort=effort)
 
     @property
     def seconds_per_byte(self) -> float:
-        """What a common computer takes for a byte of the composed text [s]."""
-        return 2.0e-5
+        """Compile time per byte of the composed text on a common computer [s]."""
+        return 2.0e-5 if self.effort is Effort.FULL else 1.0e-5
 
     @property
     def flags(self) -> tuple[str, ...]:
         """Flags for the bits, and for this processor."""
         return (
             *FLAGS,
+            self.effort.value,
             *_LIBRARY_AS_IT_RUNS,
             _THIS_PROCESSOR,
             *_WIDEST_VECTORS,

@@ -13,7 +13,7 @@ from ppafo.arguments import Count, Minutes, Overrides, Seed, checked
 from ppafo.control.walking import event_on_off
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.engine.lane_rows import LANES
-from ppafo.engine.lanes import STEPS_PER_CALL, Batch, Floats, begin_block, run_batch
+from ppafo.engine.lanes import STEPS_PER_CALL, Batch, Floats, begin_block, effort_for, run_batch
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import NEVER_FAILED, batch_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -96,7 +96,8 @@ def walk(
         return result_of_walk(chosen, run, run_sampled(batch_of(run), custom), None)
     if carried is None:
         # In parts short enough for an interrupt to be seen and for progress to be reported.
-        block, count = begin_block(batch_of(run)), run.step_count
+        batch, count = batch_of(run), run.step_count
+        block = begin_block(batch, effort_for(batch))
         for done in range(0, count, STEPS_PER_CALL):
             block.advance(min(STEPS_PER_CALL, count - done))
             progress(min(done + STEPS_PER_CALL, count) * run.step / 60.0, count * run.step / 60.0)

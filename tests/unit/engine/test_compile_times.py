@@ -2,17 +2,23 @@
 
 import threading
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
+from ppafo.engine import loading
 from ppafo.engine.cache import announcing
-from ppafo.engine.cache.announcing import announce, compile_side_by_side, estimate_seconds
+from ppafo.engine.cache.announcing import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
 from ppafo.engine.cache.making import load_all
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
+from ppafo.engine.compilers import Effort
+from ppafo.engine.lanes import effort_for
 from ppafo.errors import ProgramError
+from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
 
 QUICK = "answer = {}\n"
@@ -64,14 +70,14 @@ def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_mess
     load_generated(sources[1], compiler)
     loaded = []
 
-    def load(source: str) -> ModuleType:
+    def load(source: str, _effort: Effort) -> ModuleType:
         with announce(1.0, "kept"):
             together.wait()
             time.sleep(0.2)
         loaded.append(source)
         return load_generated(source, compiler)
 
-    load_all([*sources, sources[0]], compiler, load)
+    load_all([(source, Effort.FULL) for source in (*sources, sources[0])], compiler, load)
     assert set(loaded) == {sources[0], sources[2]}
     assert [message.partition(", about")[0] for message in caplog.messages[:1]] == [
         "ppafo: compiling 2 models for this computer"
@@ -88,3 +94,33 @@ def test_a_model_that_cannot_be_compiled_beside_others_is_an_error() -> None:
 
     with pytest.raises(ProgramError, match="no"):
         compile_side_by_side([fail, lambda: None], 1.0, "not kept")
+
+
+def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(
+    fresh_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(loading, "compilers_to_try", lambda: (ScriptCompiler(),))
+    first, second = (QUICK.format(time.time() + number) for number in range(2))
+
+    def made() -> list[str]:
+        return sorted(kept.path.name.split("_")[2] for kept in list_programs(fresh_cache))
+
+    loading.compiled(first, Effort.QUICK)
+    assert made() == ["quick"]
+    loading.compiled(second)
+    loading.compiled(second, Effort.QUICK)
+    assert made() == ["full", "quick"]
+
+
+def test_a_run_of_seconds_is_compiled_quickly_and_many_runs_are_not() -> None:
+    batch = plain_batch("torque-task-proportional")
+    twice = replace(batch, parameters=np.repeat(batch.parameters, 2, 1), states=np.repeat(batch.states, 2, 1))
+    hours = replace(batch, clock=replace(batch.clock, step_count=10_000_000))
+    assert [effort_for(each) for each in (batch, twice, hours)] == [Effort.QUICK, Effort.FULL, Effort.FULL]
+
+
+def test_an_empty_program_in_the_cache_does_not_stop_an_estimate(tmp_path: Path) -> None:
+    (tmp_path / "one").mkdir()
+    (tmp_path / "one" / SECONDS_FILE).write_text("1.0")
+    (tmp_path / "one" / "program.py").write_text("")
+    assert estimate_seconds("y" * 1000, [tmp_path / "one"], 1.0e-3) == pytest.approx(1.0)

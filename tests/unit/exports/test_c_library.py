@@ -121,6 +121,17 @@ def test_the_example_prints_the_torque_task_with_the_bits_of_python(tmp_path: Pa
     assert done.stdout.splitlines() == lines
 
 
+def test_a_valve_that_gets_its_command_late_prints_the_bits_of_python(tmp_path: Path) -> None:
+    scenario = load_scenario("torque-task-slow-valve", ["run.duration=0.5 s"])
+    name = written(tmp_path, "torque-task-slow-valve", "run.duration=0.5 s")
+    # A history that is never written leaves a function without a caller.
+    subprocess.run(["make", "-s", "-C", str(tmp_path), "CFLAGS=-std=c99 -O1 -Wall -Werror", name], check=True)
+    done = subprocess.run([tmp_path / name], capture_output=True, text=True, check=True)
+    result = simulate(scenario)
+    assert result.metrics["gas_supplied"].value > 1e-5
+    assert done.stdout.splitlines() == printed(result, scenario_library(scenario).program.outputs)
+
+
 WARM = (
     *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
     "gas_model.wall_area_per_volume=100 1/m",

@@ -156,7 +156,7 @@ def test_a_walk_that_diverges_ends_so_and_says_what_was_let_through_before(
     chosen = load_walk(WALK, bottle=BOTTLE)
     run = plan_walk(with_duration(chosen, 12.0))
     rows = row_numbers(run.program.state_rows())
-    monkeypatch.setattr(coupling, "begin_block", lambda batch: Breaking(wrong, good, rows, batch.states))
+    monkeypatch.setattr(coupling, "begin_block", lambda batch, _effort: Breaking(wrong, good, rows, batch.states))
     assert walk_of(chosen).bottle is not None
     _, course = coupling.run_on_bottle(run, chosen.device, walk_of(chosen).bottle, 1.1, lambda *_: None)
     assert course.ending.kind == "diverged"

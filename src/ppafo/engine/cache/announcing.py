@@ -72,7 +72,8 @@ def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
 
     rates = []
     for folder in kept:
-        with contextlib.suppress(OSError, ValueError, StopIteration):
+        # A file that another process has removed or emptied says nothing.
+        with contextlib.suppress(OSError, ValueError, StopIteration, ZeroDivisionError):
             seconds = float((folder / SECONDS_FILE).read_text(encoding="ascii"))
             # Seconds per byte of text: programs of one kind differ in length more than in difficulty.
             rates.append(seconds / next(folder.glob("*.py")).stat().st_size)

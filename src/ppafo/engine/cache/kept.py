@@ -33,7 +33,8 @@ class Wanted:
     @property
     def name(self) -> str:
         """Name of its module."""
-        return f"ppafo_{self.compiler.name}_{hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]}"
+        digest = hashlib.sha256(without_origins(self.source).encode()).hexdigest()[:24]
+        return f"ppafo_{self.compiler.name}_{self.compiler.effort.name.lower()}_{digest}"
 
     def place(self, folder: Path) -> Path:
         """Where it is kept."""

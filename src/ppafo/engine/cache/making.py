@@ -18,7 +18,7 @@ from ppafo.engine.cache.announcing import SECONDS_FILE, announce, compile_side_b
 from ppafo.engine.cache.folder import LOCK, cache_folder, refusal
 from ppafo.engine.cache.kept import CHECKSUMS, Wanted, is_kept, load_kept_module, remove
 from ppafo.engine.cache.tidying import PROGRAM, entries_named, evict
-from ppafo.engine.compilers import Compiler
+from ppafo.engine.compilers import Compiler, Effort
 from ppafo.errors import reason
 
 # One process compiles a program while others wait for it.
@@ -90,17 +90,21 @@ def make(wanted: Wanted, kept: Path | None) -> ModuleType:
         return wanted.compile(Path(f"<{wanted.name}>"))
 
 
-def load_all(sources: Iterable[str], compiler: Compiler, load: Callable[[str], object]) -> None:
-    """Import the modules with these sources by ``load``; several that ``compiler`` must make are made side by side."""
-    missing = [source for source in dict.fromkeys(sources) if not is_kept(source, compiler)]
+def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: Callable[[str, Effort], object]) -> None:
+    """Import programs, given by source and effort, by ``load``; those to be compiled are compiled side by side."""
+    missing = [
+        (source, effort)
+        for source, effort in dict.fromkeys(programs)
+        if not (is_kept(source, compiler) or is_kept(source, compiler.with_effort(effort)))
+    ]
     # One alone is compiled where it is needed, with its own message.
     if len(missing) < 2:
         return
     folder = cache_folder()
     kept = [] if folder is None else entries_named(folder, PROGRAM)
-    expected = sum(_estimate(Wanted(source, compiler), kept) for source in missing)
+    expected = sum(_estimate(Wanted(source, compiler.with_effort(effort)), kept) for source, effort in missing)
     where = "not kept" if folder is None or refusal(folder) else f"kept in {folder}"
-    compile_side_by_side([partial(load, source) for source in missing], expected, where)
+    compile_side_by_side([partial(load, source, effort) for source, effort in missing], expected, where)
 
 
 def _compile_and_keep(kept: Path, wanted: Wanted) -> ModuleType:

@@ -19,8 +19,8 @@ LONGEST_UNUSED = 90.0 * 86400.0
 MAXIMUM_BYTES = 500_000_000
 """Size of all programs above which those that were not used for longest are removed; one has some 300 kB."""
 
-PROGRAM = re.compile(r"ppafo_[a-z]+_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
-"""Names of programs, ``ppafo_COMPILER_HASH-HASH``; also of an earlier release, whose programs lay in several files."""
+PROGRAM = re.compile(r"ppafo_[a-z]+(_[a-z]+)?_[0-9a-f]{24}(-[0-9a-f]{12}|\..+)?")
+"""Names of programs, ``ppafo_COMPILER_EFFORT_HASH-HASH``; also of earlier releases, in other forms."""
 _ASIDE = re.compile(rf"\.writing-[0-9a-f]{{16}}|{re.escape(LOCK)}{PROGRAM.pattern}|{NOTE}[a-z]+-[0-9a-f]{{12}}")
 """Names of what lies beside the programs: one that is being written, locks, and notes on compilers that do not work."""
 _TEXT = re.compile(r"[a-z]+-[0-9a-f]{32}|\.writing-[0-9a-f]{16}")

@@ -7,6 +7,7 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.compilers import Effort
 from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, load_programs, run_blocks
 from ppafo.engine.metering import add_meters, meters_of
@@ -64,7 +65,7 @@ class Outcome:
         """Run batches one after the other, whose runs have these places in the ensemble."""
         tasks = [_meter_batch(batch, members, self.request) for members, batch in batches]
         # Several programs are compiled side by side before the first batch runs.
-        load_programs(task.batch.program for task in tasks)
+        load_programs((task.batch.program, Effort.FULL) for task in tasks)
         for task in tasks:
             self._run(task, threads)
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.engine.lanes import BatchResult, Floats, begin_block
+from ppafo.engine.lanes import BatchResult, Floats, begin_block, effort_for
 from ppafo.engine.rows import leaf_paths, leaves, row_numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of
 from ppafo.model.cold_gas import SupplyNow, SupplyState, advance_supply, open_share
@@ -179,7 +179,7 @@ def _use_bottle(
     """Walk a run on a bottle in ``use``, which is brought up to date; return its rows and the steps that were done."""
     batch = batch_of(run)
     count = batch.clock.step_count
-    block = begin_block(batch)
+    block = begin_block(batch, effort_for(batch))
     states = row_numbers(batch.program.state_rows())
     regulated, lines = ([row for path, row in states.items() if path.endswith(end)] for end in (REGULATED, _LINE))
     every, walked_before = max(1, round(supply.coupling / run.step)), use.walked
