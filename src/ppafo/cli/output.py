@@ -61,10 +61,11 @@ def blame_out_option() -> Iterator[None]:
 
 @dataclass(frozen=True, slots=True)
 class Said:
-    """What a command that solves no question says: its text, its JSON document, and what else it leaves behind.
+    """Output of a command that solves no question: text, JSON document, files.
 
-    ``name`` is the stem of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``aside`` is a line
-    for standard error after the result.
+    ``name`` is the stem of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``finish`` draws and
+    writes after the text is printed, and returns the last lines of text. ``aside`` is a line for standard error after
+    the result.
     """
 
     text: str
@@ -73,6 +74,7 @@ class Said:
     exit_code: int = EXIT_GOOD
     aside: str = ""
     draw: "Callable[[], Figure] | None" = None
+    finish: Callable[[], str] | None = None
 
 
 def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_written: bool = False) -> int:
@@ -83,7 +85,15 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
     if isinstance(found, Said):
         if out is not None:
             write_files(out, said_files(found), command)
-        print_result(found.text, found.document, as_json)
+        if found.finish is None:
+            print_result(found.text, found.document, as_json)
+        elif as_json:
+            found.finish()
+            print_result("", found.document, as_json)
+        else:
+            print_result(found.text, {}, as_json)
+            _tell_drawing()
+            print_result(found.finish(), {}, as_json)
         if found.aside:
             print(f"ppafo: {found.aside}", file=sys.stderr)
         return found.exit_code
@@ -92,7 +102,11 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
     text, document = text_of(found), found.to_dict()
     folder = str(document["folder"]) if has_written else None
     made: list[str] = []
+    if not as_json:
+        # Numbers at once: drawing takes longer than most runs.
+        print_result(text, {}, as_json)
     if out is not None:
+        _tell_drawing()
         from ppafo.report.drawing import load_drawing
 
         # Before anything else imports Matplotlib, so that it comes without what it does for others.
@@ -103,9 +117,10 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
         folder = str(out)
         # What other commands take, such as the gait of 'ppafo walk --gait'.
         made = [f"file to use: {out / name}" for name in found.files if name.endswith(".toml")]
-    if folder is not None:
-        text += "\n".join(["\n", f"report: {folder}/{REPORT}", *made])
-    print_result(text, document if folder is None else {**document, "folder": folder}, as_json)
+    if as_json:
+        print_result("", document if folder is None else {**document, "folder": folder}, as_json)
+    elif folder is not None:
+        print_result("\n".join(["", f"report: {folder}/{REPORT}", *made]), {}, as_json)
     return EXIT_GOOD if found.passed else EXIT_CHECK_FAILED
 
 
@@ -225,6 +240,12 @@ def progress_line() -> Iterator[ProgressLine]:
     finally:
         logger.removeFilter(end_line)
         line.close()
+
+
+def _tell_drawing() -> None:
+    """Say at a terminal why the command has not ended although its numbers are there."""
+    if sys.stderr.isatty():
+        tell("drawing figures and page")
 
 
 def tell(text: str) -> None:

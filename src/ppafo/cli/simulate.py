@@ -1,6 +1,7 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -57,18 +58,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     error = None if checked is None else checked.error
     if checked is None and result.status.is_completed and chosen.motion.motion_kind.is_repeated_for_its_error:
         error = result.error()
-    # Before anything else imports Matplotlib, so that it comes without what it does for others.
-    from ppafo.report.drawing import load_drawing
-
-    load_drawing()
-    from ppafo.report.finding import REPORT, page_of
-    from ppafo.report.recording_figure import figure_files
-
-    figures = figure_files(result.plot())
     first = [item.sentence for item in (verdict, in_force) if item is not None]
-    report = page_of(_finding(result, checked, first), {FIGURE: figures[f"{FIGURE}.svg"]})
-    files = {} if checked is None else {CHECK_FILE: f"{json_text(checked.document())}\n".encode()}
-    result.save(folder, {**figures, REPORT: report, **files})
     from ppafo.documents.json_text import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
@@ -86,8 +76,9 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     is_useful = verdict is None or not verdict.is_useless
     is_good = result.status.is_completed and (checked is None or (checked.is_determined and is_useful))
     return Said(
-        _text(result, error, checked, folder, first),
+        _text(result, error, checked, first),
         document,
+        finish=partial(_write, result, checked, first, folder),
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
         aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
     )
@@ -132,14 +123,28 @@ def list_descriptions() -> list[dict[str, Any]]:
     return [{"name": name, "description": load_scenario(name).description} for name in list_all_scenarios()]
 
 
-def _text(
-    result: "Result", error: "ErrorEstimate | None", check: "Check | None", folder: Path, first: Sequence[str]
-) -> str:
-    checked = [repr(check), ""] if check is not None else [] if error is None else [error.sentence, ""]
+@in_units(lambda result, *_: result.scenario.device.shown)
+def _write(result: "Result", check: "Check | None", first: Sequence[str], folder: Path) -> str:
+    """Draw the figure and the page, write the result folder, and return the last lines of text."""
+    # Before anything else imports Matplotlib, so that it comes without what it does for others.
+    from ppafo.report.drawing import load_drawing
+
+    load_drawing()
+    from ppafo.report.finding import REPORT, page_of
+    from ppafo.report.recording_figure import figure_files
+
+    figures = figure_files(result.plot())
+    report = page_of(_finding(result, check, first), {FIGURE: figures[f"{FIGURE}.svg"]})
+    checks = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
+    result.save(folder, {**figures, REPORT: report, **checks})
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     further = result.scenario.motion.motion_kind.further_command(str(result.scenario.origin.file))
+    return "\n".join(["", *([further] if further else []), f"written: {folder} ({written})"])
+
+
+def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", first: Sequence[str]) -> str:
+    checked = ["", repr(check)] if check is not None else [] if error is None else ["", error.sentence]
     # The gains in force stand below the verdict, which knows more than the result's own: its remedies were tried.
     metrics = str(result).partition("\n\n")[2]
-    run = "\n".join([f"{result.scenario.name}: {result.status.kind}", *first, "", metrics])
-    return "\n".join([run, "", *checked, *([further] if further else []), f"written: {folder} ({written})"])
+    return "\n".join([f"{result.scenario.name}: {result.status.kind}", *first, "", metrics, *checked])

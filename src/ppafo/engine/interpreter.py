@@ -26,6 +26,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Lane
+from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
 
 Floats = NDArray[np.float64]
@@ -205,15 +206,23 @@ class Linked:
             code = going_on(function) if self._goes_on else function.__code__
             scope = dict(function.__globals__)
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
-            copied.__kwdefaults__ = function.__kwdefaults__
             rows = self._effects.get(function, ())
             self._made[function] = self._law(copied, rows) if rows else copied
             for name in _names_of(function.__code__):
                 if name in scope:
                     scope[name] = self.of(scope[name], function)
+            copied.__kwdefaults__ = self._named_defaults(function)
             if self._goes_on:
                 scope |= {"_quotient": quotient, "int": whole_part}
         return self._made[function]
+
+    def _named_defaults(self, function: FunctionType) -> dict[str, Any]:
+        """Defaults of the parameters by name, and in its parts what the program has in the place of functions."""
+
+        def linked(part: Any) -> Any:
+            return type(part)(*map(linked, part)) if is_made_of(part) else self.of(part, function)
+
+        return {name: linked(value) for name, value in (function.__kwdefaults__ or {}).items()}
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """The law of an effect, called as its port is; its own rows are those of the lane that is gone through."""

@@ -138,8 +138,7 @@ def _named(value: Any) -> str:
         return ".".join(names)
     frame = frame_of(value) if isinstance(value, FunctionType) else None
     if frame is not None:
-        components = ", ".join(f"{name}: {_described(component)}" for name, component in frame.components)
-        return f"{'.'.join(names)}({_named(frame.function)}; {components})"
+        return f"{'.'.join(names)}({_named(frame.function)}; {_described(frame.parts)})"
     if is_row(value):
         # Made of others, such as the settings of a law with those of its estimator: its fields are all of it.
         kinds = (_named(kind) if is_row(kind) else repr(kind) for kind in value.__annotations__.values())

@@ -27,6 +27,7 @@ from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError, nearest_name, one_line
+from ppafo.model.binding import is_made_of, made_of, parts_of
 from ppafo.model.declaration import PlainFunction
 
 COMPILED_BUILTINS = frozenset(
@@ -45,12 +46,6 @@ def each(convert: Callable[[float], float], row: Row) -> Row:
     make: Any = type(row)
     made_row: Row = make(*(each(convert, value) if isinstance(value, tuple) else convert(value) for value in row))
     return made_row
-
-
-def is_made_of(value: object) -> bool:
-    """True for the parts of a function: a NamedTuple of functions, each known while the function is composed."""
-    is_struct = isinstance(value, tuple) and hasattr(value, "_fields") and len(value) > 0
-    return is_struct and all(isinstance(part, FunctionType) for part in value)  # type: ignore[attr-defined]
 
 
 def is_step_function(function: object) -> bool:
@@ -154,6 +149,7 @@ class Composer(ast.NodeTransformer):
                 raise self.refuse(node, f"'{ast.unparse(node.func)}()' is a method, which is not compiled")
             self.generic_visit(node)
             return node
+        called, node = self.with_parts(called, node)
         own: list[ast.expr] = []
         if isinstance(called, types.FunctionType) or is_row(called):
             own = self.own_arguments(called, node)
@@ -163,6 +159,21 @@ class Composer(ast.NodeTransformer):
             named = [ast.keyword(keyword.arg, self.visit(keyword.value)) for keyword in node.keywords]
             return ast.Call(function, arguments, named)
         return ast.Call(function, [*arguments, *own], [])
+
+    def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
+        """A function that is called with ``parts=``, as the function with these parts, and the call without them.
+
+        ProgramError where they are not known before the function runs.
+        """
+        given = next((keyword for keyword in node.keywords if keyword.arg == "parts"), None)
+        if given is None or not isinstance(called, FunctionType):
+            return called, node
+        parts = self.value_of(given.value)
+        if not is_made_of(parts):
+            raise self.refuse(node, f"'parts={ast.unparse(given.value)}' must be parts of this function")
+        others = [keyword for keyword in node.keywords if keyword is not given]
+        name = f"{called.__name__}_of_{self.function.__name__}"
+        return made_of(called, name, parts), ast.copy_location(ast.Call(node.func, node.args, others), node)
 
     def rows_for(self, function: ast.expr, node: ast.AST) -> list[ast.expr]:
         """Rows of effects that a function of the module is handed first. ProgramError where a local name hides one."""
@@ -279,7 +290,8 @@ class Composer(ast.NodeTransformer):
             return _INSIDE
         owner = self.value_of(node.value)
         if not isinstance(owner, types.ModuleType):
-            return getattr(owner, node.attr, _INSIDE) if is_made_of(owner) else _INSIDE
+            is_known = is_made_of(owner) or owner is parts_of(self.function)
+            return getattr(owner, node.attr, _INSIDE) if is_known else _INSIDE
         if not hasattr(owner, node.attr):
             hint = nearest_name(node.attr, dir(owner))
             raise self.refuse(node, f"module '{owner.__name__}' has no '{node.attr}'{hint}")
@@ -478,7 +490,8 @@ class SourceCollector:
             lambda callee: self.needs.get(callee, ()),
             self.stands_for,
         )
-        composer.kept = {name: part for name, part in (function.__kwdefaults__ or {}).items() if is_made_of(part)}
+        parts = parts_of(function)
+        composer.kept = {} if parts is None else {"parts": parts}
         tree.args.kwonlyargs = [argument for argument in tree.args.kwonlyargs if argument.arg not in composer.kept]
         rows = self.effects.get(function, ())
         _compose_parameters(composer, tree, rows)

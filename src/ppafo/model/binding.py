@@ -1,7 +1,11 @@
-"""Frames: functions in which some names stand for components that are put in their place."""
+"""Functions with parts: one formula for many devices, which is given the functions that differ as an argument.
+
+A function of this kind takes ``*, parts: P``, where ``P`` is a NamedTuple of functions, of row classes, of constants or
+of further parts, and calls ``parts.NAME(...)``. ``made_of`` gives it its parts; the engine compiles each of them in.
+"""
 
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -9,61 +13,67 @@ from ppafo.model.declaration import PlainFunction
 
 
 class Frame(NamedTuple):
-    """What a function was bound from: the function, and what some names of its module stand for in it, by name."""
+    """Origin of a function that has been given its parts: the function as written, and the parts."""
 
     function: PlainFunction
-    components: tuple[tuple[str, Any], ...]
+    parts: Any
 
 
 class Recipe(NamedTuple):
-    """Picklable form of a function that no module has: ``maker`` makes it anew from frame, name and components."""
+    """Picklable form of a function that no module has: the frame, the name and the parts of which it is made anew."""
 
-    maker: Callable[[PlainFunction, str, Any], PlainFunction]
     frame: Any
     name: str
-    components: Any
+    parts: Any
+
+
+def is_made_of(value: object) -> bool:
+    """True for the parts of a function: a NamedTuple with a function, a class or further parts in it."""
+    if not isinstance(value, tuple) or not hasattr(value, "_fields"):
+        return False
+    return any(isinstance(part, types.FunctionType | type) or is_made_of(part) for part in value)
 
 
 def frame_of(function: PlainFunction) -> Frame | None:
-    """Return the frame of a function that ``bind`` made; None for any other."""
+    """Return what ``made_of`` made a function from; None for any other."""
     found: Frame | None = vars(function).get("frame")
     return found
 
 
-def bind(frame: PlainFunction, name: str, components: Mapping[str, Any]) -> PlainFunction:
-    """Return the function of a frame in which some names of its module stand for other components.
+def parts_of(function: PlainFunction) -> Any:
+    """Return the parts of a function with ``*, parts``, by its default or by ``made_of``; None where it has none."""
+    return (getattr(function, "__kwdefaults__", None) or {}).get("parts")
 
-    The code is the same and only those names differ, so that the engine compiles it as any other function. Equal
-    components give the same function, so that what has it is equal too: a scenario that is loaded twice, or in another
+
+# Far more than the laws, valves and actuators of a process; a table is among the parts of its actuator.
+@lru_cache(maxsize=1024)
+def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFunction:
+    """Return a function whose last parameter is ``*, parts``, with these parts as the default, under another name.
+
+    Equal parts give the same function, so that what has it is equal too: a scenario that is loaded twice, or in another
     order of its overrides.
     """
-    return _bound(frame, name, tuple(sorted(components.items())))
-
-
-def made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFunction:
-    """Return the function of a frame whose last parameter ``*, parts`` is a NamedTuple of functions, with these parts.
-
-    The engine compiles it with each ``parts.NAME`` as the function that it is. Equal parts give the same function.
-    """
-    return _made_of(frame, name, parts)
+    function: Any = frame
+    # The name and module decide the name in the composed text, where two laws must not share one.
+    made = types.FunctionType(function.__code__, function.__globals__, name, function.__defaults__)
+    made.__kwdefaults__ = {**(function.__kwdefaults__ or {}), "parts": parts}
+    made.__qualname__, made.__module__, made.__annotations__ = name, frame.__module__, function.__annotations__
+    vars(made)["frame"] = Frame(frame, parts)
+    return made
 
 
 def recipe_of(value: Any) -> Any:
-    """Picklable form of a value: recipes in the place of functions that were bound, also inside of tuples."""
+    """Picklable form of a value: recipes in the place of functions that were given parts, also inside of tuples."""
     frame = frame_of(value) if isinstance(value, types.FunctionType) else None
     if frame is None:
         return _item_by_item(recipe_of, value)
-    if value.__kwdefaults__ is not None:
-        maker, components = made_of, frame.components[0][1]
-    else:
-        maker, components = _bound, frame.components
-    return Recipe(maker, recipe_of(frame.function), value.__name__, recipe_of(components))
+    return Recipe(recipe_of(frame.function), value.__name__, recipe_of(frame.parts))
 
 
 def by_recipe(value: Any) -> Any:
     """Value whose picklable form is given: in one process, the same functions as before."""
     if isinstance(value, Recipe):
-        return value.maker(by_recipe(value.frame), value.name, by_recipe(value.components))
+        return made_of(by_recipe(value.frame), value.name, by_recipe(value.parts))
     return _item_by_item(by_recipe, value)
 
 
@@ -72,24 +82,3 @@ def _item_by_item(change: Callable[[Any], Any], value: Any) -> Any:
         return value
     items = map(change, value)
     return type(value)(*items) if hasattr(value, "_fields") else tuple(items)
-
-
-@lru_cache(maxsize=512)
-def _made_of(frame: PlainFunction, name: str, parts: tuple[Any, ...]) -> PlainFunction:
-    made = types.FunctionType(frame.__code__, dict(frame.__globals__), name)
-    made.__kwdefaults__ = {"parts": parts}
-    made.__qualname__, made.__module__, made.__annotations__ = name, frame.__module__, frame.__annotations__
-    vars(made)["frame"] = Frame(frame, (("parts", parts),))
-    return made
-
-
-# Far more than the laws, valves and actuators of a process; a table is part of what its actuator is bound to.
-@lru_cache(maxsize=512)
-def _bound(frame: PlainFunction, name: str, components: tuple[tuple[str, Any], ...]) -> PlainFunction:
-    made = types.FunctionType(frame.__code__, {**frame.__globals__, **dict(components)}, name)
-    made.__qualname__ = name
-    # The name and module decide the name in the composed text, where two laws must not share one.
-    made.__module__ = frame.__module__
-    made.__annotations__ = frame.__annotations__
-    vars(made)["frame"] = Frame(frame, components)
-    return made

@@ -3,13 +3,14 @@
 A vane is taken with the foot at a right angle, or 0.2 rad inside a stop where that comes first.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ppafo.model.actuators.kind import Range, mean_growth
+from ppafo.model.actuators.kind import Chambers, Range, mean_growth
 from ppafo.model.actuators.vane import VaneSettings
-from ppafo.model.binding import bind
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.declaration import Number, PlainFunction, quantities_of
+from ppafo.model.declaration import Number, quantities_of
 from ppafo.parameters.device import VANE, Device
 
 RIGHT_ANGLE = 1.5707963267948966
@@ -53,33 +54,31 @@ class StillPlant(NamedTuple):
     external_torque: float
 
 
-def prepared_shape(settings: Any, stops: Range) -> Any:
-    """Stand for the function that makes the shape of a kind."""
-    raise NotImplementedError
+class MeasuredParts(NamedTuple):
+    """Shape of an actuator that was measured: ``prepare`` of its kind, and the table that it takes third."""
+
+    prepare: Callable[[Any, Range, Any], Any]
+    table: Any
 
 
-def both_chambers(plant: Any, angle: float, pressure_1: float, pressure_2: float) -> Any:
-    """Stand for the function of a kind that gives both chambers."""
-    raise NotImplementedError
+class ShapedParts(NamedTuple):
+    """Actuator of another kind than the vane: its shape from settings and stops, both chambers, torque [N m]."""
+
+    shape: Callable[[Any, Range], Any]
+    chambers: Callable[[Any, float, float, float], Chambers]
+    torque: Callable[[Any, float, float, float], float]
 
 
-def shaft_torque(plant: Any, angle: float, pressure_1: float, pressure_2: float) -> float:
-    """Stand for the function of a kind that gives the torque [N m]."""
-    raise NotImplementedError
+class UsualParts(NamedTuple):
+    """Chambers of an actuator at an angle [rad], and the angle where nobody knows where the joint is [rad]."""
+
+    at: Callable[[Any, Range, Surroundings, float], MeanChambers]
+    place: Callable[[Range], float]
 
 
-TABLE = None
-"""Stands for what a kind has measured."""
-
-
-def shape_of(settings: Any, stops: Range) -> Any:
-    """The shape of an actuator from its settings and stops."""
-    return prepared_shape(settings, stops)
-
-
-def measured_shape_of(settings: Any, stops: Range) -> Any:
+def measured_shape_of(settings: Any, stops: Range, *, parts: MeasuredParts) -> Any:
     """The shape of an actuator that has a table."""
-    return prepared_shape(settings, stops, TABLE)  # type: ignore[call-arg]
+    return parts.prepare(settings, stops, parts.table)
 
 
 def inside_stops(lowest: float, highest: float) -> float:
@@ -102,11 +101,11 @@ def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: 
     )
 
 
-def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float) -> MeanChambers:
+def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *, parts: ShapedParts) -> MeanChambers:
     """Both chambers of another kind at an angle [rad], half filled."""
     room = around.atmospheric_pressure
     plant = StillPlant(
-        shape=shape_of(settings, stops),
+        shape=parts.shape(settings, stops),
         gas_product=1.0,
         supply_pressure=around.supply_pressure,
         dorsiflexion_pressure=around.dorsiflexion_pressure,
@@ -117,11 +116,11 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float) -
     gauge_1 = max(around.supply_pressure - room, LEAST_GAUGE)
     gauge_2 = max(around.dorsiflexion_pressure - room, LEAST_GAUGE)
     half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
-    filled = both_chambers(plant, angle, half_1, half_2)
-    vented = shaft_torque(plant, angle, room, room)
+    filled = parts.chambers(plant, angle, half_1, half_2)
+    vented = parts.torque(plant, angle, room, room)
     # By virtual work a chamber grows with the angle as its torque does with the pressure.
-    growth_1 = abs(shaft_torque(plant, angle, room + gauge_1, room) - vented) / gauge_1
-    growth_2 = abs(shaft_torque(plant, angle, room, room + gauge_2) - vented) / gauge_2
+    growth_1 = abs(parts.torque(plant, angle, room + gauge_1, room) - vented) / gauge_1
+    growth_2 = abs(parts.torque(plant, angle, room, room + gauge_2) - vented) / gauge_2
     return MeanChambers(
         torque_per_pressure_1=growth_1,
         torque_per_pressure_2=growth_2,
@@ -130,11 +129,6 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float) -
         growth_1=growth_1,
         growth_2=growth_2,
     )
-
-
-def chambers_at(settings: Any, stops: Range, around: Surroundings, angle: float) -> MeanChambers:
-    """Stand for the chambers at an angle [rad]."""
-    raise NotImplementedError
 
 
 def middle_of(stops: Range) -> float:
@@ -147,14 +141,9 @@ def right_angle_in(stops: Range) -> float:
     return inside_stops(stops.angle_min, stops.angle_max)
 
 
-def usual_place(stops: Range) -> float:
-    """Stand for the angle at which the gains take the chambers where nobody knows where the joint is [rad]."""
-    raise NotImplementedError
-
-
-def usual_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
+def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: UsualParts) -> MeanChambers:
     """Both chambers where nobody knows where the joint is."""
-    return chambers_at(settings, stops, around, usual_place(stops))
+    return parts.at(settings, stops, around, parts.place(stops))
 
 
 def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
@@ -162,10 +151,10 @@ def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) ->
     return settings.displacement_per_radian
 
 
-def shaped_growth(settings: Any, stops: Range, around: Surroundings) -> float:
+def shaped_growth(settings: Any, stops: Range, around: Surroundings, *, parts: ShapedParts) -> float:
     """Mean growth of chamber 1 of another kind [m^3/rad] between the stops, at the pressure of its supply."""
     gauge = around.supply_pressure - around.atmospheric_pressure
-    return mean_growth(shape_of(settings, stops), stops, gauge, both_chambers)
+    return mean_growth(parts.shape(settings, stops), stops, gauge, parts.chambers)
 
 
 class ChambersOf(NamedTuple):
@@ -194,19 +183,13 @@ def chambers_of(device: Device) -> ChambersOf:
         for quantity in quantities_of(row)
     )
     if actuator.kind == VANE:
-        own: dict[str, PlainFunction] = {"chambers_at": vane_at, "usual_place": right_angle_in}
-        usual = bind(usual_chambers, "usual_chambers_of_vane", own)
+        usual = made_of(usual_chambers, "usual_chambers_of_vane", UsualParts(vane_at, right_angle_in))
         return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
-    components = {
-        "prepared_shape": kind.model.prepare,
-        "both_chambers": kind.model.chambers,
-        "shaft_torque": kind.model.torque,
-        "TABLE": actuator.table,
-    }
-    prepared = shape_of if actuator.table is None else measured_shape_of
-    components["shape_of"] = bind(prepared, f"shape_of_{actuator.kind}", components)
-    there = bind(shaped_at, f"chambers_at_of_{actuator.kind}", components)
-    usual_parts: dict[str, PlainFunction] = {"chambers_at": there, "usual_place": middle_of}
-    middle = bind(usual_chambers, f"usual_chambers_of_{actuator.kind}", usual_parts)
-    growth = bind(shaped_growth, f"growth_of_{actuator.kind}", components)
-    return ChambersOf(function=middle, at=there, growth=growth, sources=sources, rows=rows)
+    name, model, shape = actuator.kind, kind.model, kind.model.prepare
+    if actuator.table is not None:
+        shape = made_of(measured_shape_of, f"shape_of_{name}", MeasuredParts(model.prepare, actuator.table))
+    shaped = ShapedParts(shape, model.chambers, model.torque)
+    at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
+    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", UsualParts(at, middle_of))
+    growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
+    return ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)

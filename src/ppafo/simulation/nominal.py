@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.kind import NOMINAL
 from ppafo.model.actuators.kind import Range
-from ppafo.model.binding import bind
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import first
 from ppafo.model.gas import critical_pressure_ratio, specific_gas_constant
@@ -100,25 +100,26 @@ def time_of_joint(joining: float, holding: float) -> float:
     return joining + holding
 
 
-def mean_chambers(settings: Any, stops: Range, around: Surroundings) -> MeanChambers:
-    """Stand for the chambers of the actuator."""
-    raise NotImplementedError
+class BelievedParts(NamedTuple):
+    """Chambers of the actuator in the middle of its range."""
+
+    mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
 
 
-def torque_per_pressure(settings: Any, stops: Range, around: Surroundings) -> float:
+def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: BelievedParts) -> float:
     """Torque per pressure of chamber 1 [m^3] in the middle of the range."""
-    return mean_chambers(settings, stops, around).torque_per_pressure_1
+    return parts.mean_chambers(settings, stops, around).torque_per_pressure_1
 
 
-def dead_volume_1(settings: Any, stops: Range, around: Surroundings) -> float:
+def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: BelievedParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 1 is as large in the middle of the range."""
-    mean = mean_chambers(settings, stops, around)
+    mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
 
 
-def dead_volume_2(settings: Any, stops: Range, around: Surroundings) -> float:
+def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: BelievedParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 2 is as large in the middle of the range."""
-    mean = mean_chambers(settings, stops, around)
+    mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
 
 
@@ -205,8 +206,8 @@ def _chamber_terms(device: Device) -> dict[str, Term]:
     chambers = chambers_of(device)
 
     def term(frame: Callable[..., float]) -> Term:
-        mean = {"mean_chambers": chambers.function}
-        return Term(chambers.sources, bind(frame, f"{frame.__name__}_of_device", mean), chambers.rows)
+        made = made_of(frame, f"{frame.__name__}_of_device", BelievedParts(chambers.function))
+        return Term(chambers.sources, made, chambers.rows)
 
     return own | {
         "chamber_growth": Term(chambers.sources, chambers.growth, chambers.rows),

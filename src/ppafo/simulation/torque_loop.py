@@ -96,7 +96,7 @@ class ChamberParts(NamedTuple):
 
 
 def chambers_of_moving_joint(
-    settings: Any, stops: Range, around: Surroundings, signals: Any, *, parts: ChamberParts
+    settings: Any, stops: Range, around: Surroundings, _signals: Any, *, parts: ChamberParts
 ) -> MeanChambers:
     """Chambers for the gains of a joint that moves."""
     return parts.usual(settings, stops, around)

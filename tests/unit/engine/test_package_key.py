@@ -1,12 +1,15 @@
 """Keys of texts that need not be composed again: what follows from the files of the package has one."""
 
+from typing import Any
+
 import pytest
 
 from ppafo.control.controllers import feedback
 from ppafo.control.walking import assistance
+from ppafo.control.walking.timing import TimingParts, threshold_time
 from ppafo.engine.package_key import package_key
 from ppafo.golden_bits import plain_batch
-from ppafo.model.binding import bind
+from ppafo.model.binding import made_of
 
 FOLDERS = ("control", "model", "signals")
 """Without the engine, of which the tests replace a function to count what is compiled."""
@@ -18,17 +21,19 @@ def test_every_scenario_of_the_package_has_a_key(name: str) -> None:
     assert package_key(plain_batch(name).program, FOLDERS) is not None
 
 
-def test_the_key_of_a_law_tells_what_it_is_bound_to() -> None:
+def test_the_key_of_a_law_tells_what_its_parts_are() -> None:
     frame = assistance.timed_phase
-    laws = [bind(frame, "timed", {"phase_of": part}) for part in (feedback.pid_update, feedback.sliding_update)]
-    other = bind(frame, "timed", {"state_of": feedback.pid_update})
+    follows: Any = (feedback.pid_update, feedback.sliding_update)
+    laws = [made_of(frame, "timed", TimingParts(part, threshold_time)) for part in follows]
+    other = made_of(frame, "timed", TimingParts(threshold_time, follows[0]))
     keys = [package_key(law, FOLDERS) for law in (*laws, other)]
     assert None not in keys
     assert len({key.words for key in keys if key is not None}) == 3
 
 
-def test_a_law_that_is_bound_to_a_function_from_elsewhere_has_no_key() -> None:
+def test_a_law_with_a_part_from_elsewhere_has_no_key() -> None:
     def elsewhere(value: float) -> float:
         return value
 
-    assert package_key(bind(assistance.timed_phase, "timed", {"phase_of": elsewhere}), FOLDERS) is None
+    made = made_of(assistance.timed_phase, "timed", TimingParts(elsewhere, threshold_time))  # type: ignore[arg-type]
+    assert package_key(made, FOLDERS) is None

@@ -13,7 +13,7 @@ from ppafo.control.walking import phases, safety
 from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import GaitTime, follow_thresholds, threshold_time
+from ppafo.control.walking.timing import GaitTime, TimingParts
 from ppafo.model.declaration import Quantity
 from ppafo.model.helping import MID_STANCE, PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement, Measurement
@@ -208,17 +208,20 @@ def same_task(before: float, after: float) -> bool:
 
 
 def timed_phase(
-    parameters: Any, phase: PhaseState, clock: Any, measurement: GaitMeasurement, period: float
+    parameters: Any,
+    phase: PhaseState,
+    clock: Any,
+    measurement: GaitMeasurement,
+    period: float,
+    *,
+    parts: TimingParts,
 ) -> tuple[PhaseState, Any, GaitTime]:
-    """Phase, clock and gait phase as a time after a sample, taken every ``period`` [s].
-
-    A timing replaces ``follow_thresholds`` and ``threshold_time`` by its own functions.
-    """
-    passed = threshold_time(parameters.timing, clock, phase).since_strike + period
+    """Phase, clock and gait phase as a time after a sample every ``period`` [s], by the functions of a timing."""
+    passed = parts.gait_time(parameters.timing, clock, phase).since_strike + period
     heel, toe = measurement.heel_force, measurement.toe_force
     after = phases.timed_phase_state(parameters.phases, phase, heel, toe, passed, period)
-    followed = follow_thresholds(parameters.timing, parameters.phases, clock, phase, after, measurement, period)
-    return after, followed, threshold_time(parameters.timing, followed, after)
+    followed = parts.follow(parameters.timing, parameters.phases, clock, phase, after, measurement, period)
+    return after, followed, parts.gait_time(parameters.timing, followed, after)
 
 
 def filtered_rate(last: TorqueRequest, angle: float, time_constant: float, period: float) -> float:
@@ -242,10 +245,15 @@ def is_eased(phase: PhaseState, torque: float) -> bool:
 
 
 def assess(
-    parameters: AssistingParameters, state: AssistingState, measurement: GaitMeasurement, period: float
+    parameters: AssistingParameters,
+    state: AssistingState,
+    measurement: GaitMeasurement,
+    period: float,
+    *,
+    parts: TimingParts,
 ) -> Assessment:
     """Phase, safety and requested torque [N m] after a sample, taken every ``period`` [s], and whether to act on it."""
-    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period)
+    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     rules = parameters.assistance
     rate = filtered_rate(state.request, measurement.angle, rules.hold.rate_filter, period)

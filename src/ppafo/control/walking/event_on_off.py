@@ -14,7 +14,7 @@ from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.observer import NOMINAL_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
+from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
@@ -60,15 +60,21 @@ def is_resting(largest_torque: float, before: float, torque: float) -> bool:
     return abs(torque) > (0.5 * largest_torque if before > 0.5 else largest_torque)
 
 
+USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventOnOffState)
+"""Parts of the law unless another timing is chosen."""
+
+
 def update(
     parameters: EventOnOffParameters,
     state: EventOnOffState,
     reference: float,
     measurement: GaitMeasurement,
     period: float,
+    *,
+    parts: ClockParts = USUAL_CLOCK,
 ) -> tuple[float, EventOnOffState]:
     """Command [-]: 1 plantarflexion, -1 dorsiflexion, ``VENT`` for free motion; the reference is not used."""
-    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period)
+    phase, clock, time = timed_phase(parameters, state.phase, state.clock, measurement, period, parts=parts.timing)
     watch = safety.monitor(parameters.safety, state.safety, state.phase, phase, measurement, period)
     above = measurement.angle > parameters.swing_angle + parameters.band
     below = measurement.angle < parameters.swing_angle - parameters.band
@@ -84,9 +90,10 @@ def update(
     rests = is_resting(parameters.largest_torque, state.resting, measurement.torque)
     command = VENT if rests and command * measurement.torque > 0.0 else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
-    return command, EventOnOffState(
+    following: EventOnOffState = parts.state(
         phase=phase, clock=clock, safety=watch, lifting=lifting if held else 0.0, resting=1.0 if rests else 0.0
     )
+    return command, following
 
 
 EVENT_ON_OFF = ControllerKind(

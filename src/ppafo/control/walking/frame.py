@@ -5,6 +5,7 @@ the law, and what it remembers where another task of the gait begins.
 """
 
 import functools
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -14,9 +15,9 @@ from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, T
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
+from ppafo.control.walking.timing import AT_THRESHOLDS, ThresholdClock, ThresholdRules, TimingParts
 from ppafo.errors import ScenarioError
-from ppafo.model.binding import bind
+from ppafo.model.binding import made_of
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import row_with
 from ppafo.model.sensors import GaitMeasurement
@@ -42,23 +43,28 @@ class LawState(NamedTuple):
     law: Any
 
 
-def law_update(parameters: Any, state: Any, reference: float, measurement: Any, period: float) -> tuple[float, Any]:
-    """Stand for the law, which ``bind`` puts here: command [-] and next state of a torque law."""
-    raise NotImplementedError
+class WalkingParts(NamedTuple):
+    """Parts of a torque law that walks: functions of its timing, the class of the state, and the law.
+
+    ``update`` gives command [-] and next state, ``restart(state, requested, continues)`` the state at a requested
+    torque [N m] where another task may begin (``continues`` 0).
+    """
+
+    timing: TimingParts
+    state: Callable[..., Any]
+    update: Callable[[Any, Any, float, Any, float], tuple[float, Any]]
+    restart: Callable[[Any, float, float], Any]
 
 
-def law_restart(state: Any, requested: float, continues: float) -> Any:
-    """Stand for what the law remembers, at a requested torque [N m], where another task may begin (``continues`` 0)."""
-    raise NotImplementedError
+class AnewParts(NamedTuple):
+    """State of a law at its start."""
+
+    start: Any
 
 
-LAW_START = None
-"""Stands for the start of the law's state."""
-
-
-def restart_anew(state: Any, requested: float, continues: float) -> Any:
+def restart_anew(state: Any, requested: float, continues: float, *, parts: AnewParts) -> Any:
     """The state of a law that starts again where another task begins (``continues`` 0, else 1)."""
-    return state if continues > 0.5 else LAW_START
+    return state if continues > 0.5 else parts.start
 
 
 def keep_state(state: Any, requested: float, continues: float) -> Any:
@@ -67,19 +73,26 @@ def keep_state(state: Any, requested: float, continues: float) -> Any:
 
 
 def law_that_walks_update(
-    parameters: Any, state: LawState, reference: float, measurement: GaitMeasurement, period: float
+    parameters: Any,
+    state: LawState,
+    reference: float,
+    measurement: GaitMeasurement,
+    period: float,
+    *,
+    parts: WalkingParts,
 ) -> tuple[float, LawState]:
     """Command from -1 to 1, or ``VENT``, and the next state; the reference is not used."""
-    assessment = assess(parameters, state, measurement, period)
+    assessment = assess(parameters, state, measurement, period, parts=parts.timing)
     requested = assessment.request.torque
     # Before the update: what the law remembers of another task must not act on this one.
-    law = law_restart(state.law, requested, assessment.continues)
+    law = parts.restart(state.law, requested, assessment.continues)
     sample = assistance.torque_measurement(measurement)
-    command, law = law_update(parameters.law, law, requested, sample, period)
+    command, law = parts.update(parameters.law, law, requested, sample, period)
     command, watch = assistance.valve_command(assessment, command, period)
-    return command, LawState(
+    following: LawState = parts.state(
         phase=assessment.phase, clock=assessment.clock, safety=watch, request=assessment.request, law=law
     )
+    return command, following
 
 
 def shared_settings(law: ControllerKind) -> set[str]:
@@ -105,8 +118,8 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
     parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
     state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
-    anew = bind(restart_anew, f"restart_{name}", {"LAW_START": law.initial}) if len(law.initial) else keep_state
-    components = {"law_update": law.update, "law_restart": law.restart or anew, "LawState": state}
+    anew = made_of(restart_anew, f"restart_{name}", AnewParts(law.initial)) if len(law.initial) else keep_state
+    parts = WalkingParts(AT_THRESHOLDS, state, law.update, law.restart or anew)
     return replace(
         law,
         name=name,
@@ -121,7 +134,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
             request=assistance.START,
             law=law.initial,
         ),
-        update=bind(law_that_walks_update, f"update_{name}", components),
+        update=made_of(law_that_walks_update, f"update_{name}", parts),
         restart=None,
         controls=(TORQUE,),
     )

@@ -27,7 +27,7 @@ from ppafo.control.walking.assistance import (
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import ThresholdClock, ThresholdRules
+from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
@@ -173,15 +173,21 @@ class EventDampedLearningState(NamedTuple):
     table: LearntTable
 
 
+USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventDampedLearningState)
+"""Parts of the law unless another timing is chosen."""
+
+
 def update(
     parameters: EventDampedLearningParameters,
     state: EventDampedLearningState,
     reference: float,
     measurement: GaitMeasurement,
     period: float,
+    *,
+    parts: ClockParts = USUAL_CLOCK,
 ) -> tuple[float, EventDampedLearningState]:
     """Command from -1 to 1, or ``VENT``; the reference is not used."""
-    assessment = assess(parameters, state, measurement, period)
+    assessment = assess(parameters, state, measurement, period, parts=parts.timing)
     phase, torque, profile = assessment.phase, measurement.torque, parameters.assistance.push_off
     since_strike = assessment.time.since_strike
     pushes = phase.phase == PUSH_OFF
@@ -201,7 +207,7 @@ def update(
     )
     command, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
     command, watch = assistance.valve_command(assessment, command, period)
-    return command, EventDampedLearningState(
+    following: EventDampedLearningState = parts.state(
         phase=phase,
         clock=assessment.clock,
         safety=watch,
@@ -209,6 +215,7 @@ def update(
         law=law,
         table=table,
     )
+    return command, following
 
 
 KIND = ControllerKind(

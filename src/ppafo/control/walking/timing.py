@@ -76,6 +76,22 @@ def threshold_time(rules: ThresholdRules, clock: ThresholdClock, phase: PhaseSta
     return GaitTime(phase.since_strike, 1.0 if phase.phase == LANDING else 0.0)
 
 
+class TimingParts(NamedTuple):
+    """Functions of a timing, as ``TimingKind`` has them."""
+
+    follow: Callable[[Any, PhaseRules, Any, PhaseState, PhaseState, GaitMeasurement, float], Any]
+    gait_time: Callable[[Any, Any, PhaseState], GaitTime]
+
+
+class ClockParts(NamedTuple):
+    """Parts of a walking law that follow its timing: functions, and the class of the law's state with its clock."""
+
+    timing: TimingParts
+    state: Callable[..., Any]
+
+
+AT_THRESHOLDS = TimingParts(follow_thresholds, threshold_time)
+
 THRESHOLDS = TimingKind(
     name="thresholds",
     summary="The stride begins when the heel force has passed its threshold; nothing is known before it is detected.",

@@ -4,12 +4,11 @@ import functools
 from dataclasses import replace
 
 from ppafo.control.kind import ControllerKind
-from ppafo.control.walking import assistance
 from ppafo.control.walking.estimated_timing import ESTIMATED
-from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, TimingKind
+from ppafo.control.walking.timing import FRACTIONAL, THRESHOLDS, TimingKind, TimingParts
 from ppafo.errors import ScenarioError
 from ppafo.kinds import Kinds
-from ppafo.model.binding import bind
+from ppafo.model.binding import frame_of, made_of, parts_of
 from ppafo.model.declaration import row_with
 
 TIMINGS: Kinds[TimingKind] = Kinds(
@@ -30,8 +29,8 @@ def keeps_time(kind: ControllerKind) -> bool:
 def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
     """Return a controller of walking that knows the gait phase in another way.
 
-    Its law is composed anew: where it asked for the phase of ``THRESHOLDS`` it asks for that of ``timing``, whose
-    settings and state its own then have. ScenarioError if it uses no gait phase.
+    Its law is given the functions of ``timing`` in the place of those of ``THRESHOLDS``, whose settings and state its
+    own then have. ScenarioError if it uses no gait phase.
     """
     if timing is THRESHOLDS:
         return kind
@@ -42,15 +41,12 @@ def with_timing(kind: ControllerKind, timing: TimingKind) -> ControllerKind:
     title = timing.name.capitalize()
     state = row_with(f"{usual_state.__name__}{title}", usual_state, clock=type(timing.initial))
     parameters = row_with(f"{kind.parameters.__name__}{title}", kind.parameters, timing=timing.parameters)
-    asked = {"follow_thresholds": timing.follow, "threshold_time": timing.gait_time}
-    timed_phase = {"timed_phase": bind(assistance.timed_phase, f"timed_phase_{timing.name}", asked)}
-    assess = {"assess": bind(assistance.assess, f"assess_{timing.name}", timed_phase)}
-    # Where the frame makes its state, it must make the class with the other clock.
-    states = {name: state for name, value in kind.update.__globals__.items() if value is usual_state}
+    frame = frame_of(kind.update)
+    parts = parts_of(kind.update)._replace(timing=TimingParts(timing.follow, timing.gait_time), state=state)
     return replace(
         kind,
         quantities=(*kind.quantities, *timing.quantities),
         parameters=parameters,
         initial=state(**kind.initial._asdict() | {"clock": timing.initial}),
-        update=bind(kind.update, f"update_{kind.name}_{timing.name}", timed_phase | assess | states),
+        update=made_of(frame.function if frame else kind.update, f"update_{kind.name}_{timing.name}", parts),
     )
