@@ -6,14 +6,15 @@ features are drawn for the thorough tests. ``tests/architecture/test_doors.py`` 
 catalogues that stands in no feature.
 """
 
+import math
 import random
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ppafo.loading import load_scenario
 from ppafo.simulation.loading import list_scenarios
-from ppafo.simulation.motion_kind import WALK
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import list_walks
 from ppafo.walking.motion import with_duration
@@ -33,7 +34,7 @@ BASES: dict[str, Texts] = {
     WALK_BASE: (),
 }
 """Overrides of each, with which a run of 100 steps moves all that is there."""
-WALKED = 0.8
+WALKED = 0.65
 """Seconds of a walk: from heel strike through push-off, with 800 samples of its controller."""
 TWO_STRIDES = 2.3
 """Seconds of a walk whose controller learns from the first stride."""
@@ -105,7 +106,7 @@ VANE_FEATURES: dict[str, Feature] = {
         "effects.coil_heating.pull_in_share=0.5",
         needs="valve law",
     ),
-    "parts of steps": _feature("run.step=5 ms", "run.output_interval=5 ms", "run.tolerance=1e-5"),
+    "parts of steps": _feature("valve.area=150 mm^2", "run.tolerance=1e-4", needs="area"),
     # Gas.
     "thermal gas": _feature(*_THERMAL),
     "supply lines": _feature(*_LINES),
@@ -202,7 +203,7 @@ VANE_FEATURES: dict[str, Feature] = {
     ),
     # Actuators.
     "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
-    "bladder": _feature(f"device.set={BLADDER}", needs="actuator"),
+    "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),
 }
 """Each is added to ``VANE_BASE``."""
@@ -246,7 +247,7 @@ WALK_FEATURES: dict[str, Feature] = {
         *(f"faults.controller.{text}" for text in ("kind=brown_out", "time=0.55 s", "duration=0.1 s")),
     ),
     "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
-    "bladder": _feature(f"device.set={BLADDER}", needs="actuator"),
+    "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),
     "off": _feature("controller.kind=off", needs="law"),
     "on_off law": _feature("controller.kind=event_on_off", needs="law"),
@@ -298,7 +299,8 @@ WALK_FEATURES: dict[str, Feature] = {
 class Case:
     """A scenario as the doors are given it: a shipped scenario or walk, and overrides.
 
-    ``seconds`` is how long it walks; ``suite`` is ``short``, ``long`` or ``thorough``.
+    ``seconds`` is how long it walks; ``suite`` is ``short``, ``long`` or ``thorough``. ``has_object`` puts an object of
+    Python in charge of the valve.
     """
 
     name: str
@@ -306,12 +308,40 @@ class Case:
     scenario: str
     texts: Texts = ()
     seconds: float = WALKED
+    has_object: bool = False
+
+    @property
+    def walks(self) -> bool:
+        """Whether it is a walk, and no vane alone."""
+        return self.scenario in list_walks()
+
+    @property
+    def leaves(self) -> bool:
+        """Whether a library can be made of it: of integer laws and of objects of Python there is none."""
+        return not self.has_object and not any("_fixed_point" in text for text in self.texts)
 
     def load(self) -> Scenario:
         """The scenario."""
         scenario = load_scenario(self.scenario, self.texts)
-        is_walk = scenario.motion.motion_kind.layout == WALK
-        return with_duration(scenario, self.seconds) if is_walk else scenario
+        scenario = with_duration(scenario, self.seconds) if self.walks else scenario
+        return scenario.controlled_by(Integrating()) if self.has_object else scenario
+
+
+class Integrating:
+    """A controller that is an object of Python, with a state of its own."""
+
+    def __init__(self) -> None:
+        self.sum = 0.0
+
+    def reset(self) -> None:
+        """Forget the run before."""
+        self.sum = 0.0
+
+    def update(self, time: float, reference: float, measurement: Any) -> float:
+        """Command [-] of a proportional and integral law."""
+        error = reference - measurement.torque
+        self.sum += 1.0e-3 * error
+        return 0.1 * error + 0.5 * self.sum + 0.1 * math.sin(20.0 * time)
 
 
 def _joined(suite: str, base: str, features: Mapping[str, Feature]) -> Case:
@@ -339,12 +369,12 @@ SHORT = (
     Case("torque-task-slow-valve", "short", "torque-task-slow-valve", ("run.duration=0.1 s",)),
     Case("late totals", "short", "step-response", ("run.duration=50 ms", "controller.rate=7 Hz")),
     _chosen(VANE_BASE, "cascade", "late sensors", "late command", "cylinder", "thermal gas"),
-    _chosen(VANE_BASE, "difference", "supply lines", "bandwidth", "samples between steps"),
+    _chosen(VANE_BASE, "difference", "supply lines", "bandwidth", "samples between steps", "parts of steps"),
     _chosen(VANE_BASE, "opening delays", "coil heating", "noise", "resolution"),
     _chosen(VANE_BASE, "joint load", "Stribeck", "seal friction", "play", "sensors late by parts of a step"),
     _chosen(VANE_BASE, "leg of a gait", "ice", "silencer"),
     _chosen(VANE_BASE, "prescribed", "second virial", "line resistance", "records between steps"),
-    _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "parts of steps"),
+    _chosen(VANE_BASE, "bladder", "slew", "dead band", "damped", "smooth"),
     _chosen(VANE_BASE, "muscle pair", "hysteresis", "leak that opens", "laminar leak", "relieving regulators"),
     _chosen(WALK_BASE, "late command", "noise", "lost samples", "ice"),
     _chosen(WALK_BASE, "recycling", "heel distorted", "angle distorted", "hose 1 kinked", "thermal gas"),
@@ -385,10 +415,40 @@ def _pairs(base: str, features: Mapping[str, Feature]) -> Iterator[Case]:
         yield _joined("thorough", base, {name: features[name] for name in pair})
 
 
+OBJECTS = (
+    Case("vane: an object of Python", "long", VANE_BASE, BASES[VANE_BASE], has_object=True),
+    Case("walk: an object of Python", "long", WALK_BASE, has_object=True),
+)
+
+REFUSED: tuple[tuple[str, float, str], ...] = (
+    ("valve.area", -1.0, "valve.area"),
+    ("valve.delay", -1.0, "valve.delay"),
+    ("gas.temperature", -5.0, "gas.temperature"),
+    ("sensors.delay", -1.0e-3, "sensors.delay"),
+    ("run.duration", 0.0, "run.duration"),
+    ("run.output_interval", 7.0e-3, "run.output_interval"),
+    ("controller.period", 1.0e-4, "run.step"),
+    ("friction.dynamic_torque", 1.0e3, "friction.dynamic_torque"),
+    ("actuator.angle_min", 3.0, "actuator.angle_min"),
+    ("supply.pressure", 5.0e4, "supply.pressure"),
+    ("motion.angle", 0.1, "motion.angle"),
+)
+"""Numbers [SI] that ``VANE_BASE`` cannot have, by path, and the path that every door names."""
+NOT_EXPORTED: dict[str, Case] = {
+    "an integer law": Case("integer", "short", VANE_BASE, ("controller.kind=pid_fixed_point",)),
+    "an object of Python": Case("object", "short", VANE_BASE, has_object=True),
+    "an object of Python in a walk": Case("walking object", "short", WALK_BASE, has_object=True),
+    "a person of the population": Case("person", "short", WALK_BASE, ("wearer.person=3",)),
+    "a bottle": Case("bottle", "short", WALK_BASE, ("bottle.name=paper-co2-9oz",)),
+}
+"""What no door leads out of Python."""
+
 _ALL = ((VANE_BASE, VANE_FEATURES), (WALK_BASE, WALK_FEATURES))
 GROUPS = tuple(case for base, features in _ALL for case in _groups(base, features))
 ALONE = tuple(
     _joined("thorough", base, {name: feature}) for base, features in _ALL for name, feature in features.items()
 )
 PAIRS = tuple(case for base, features in _ALL for case in _pairs(base, features))
-CASES = (*SHORT, *SHIPPED, *GROUPS, *ALONE, *PAIRS)
+CASES = (*SHORT, *SHIPPED, *OBJECTS, *GROUPS, *ALONE, *PAIRS)
+EXPORTED = tuple(case for case in CASES if case.leaves)
+"""Cases that leave Python."""

@@ -28,7 +28,7 @@ from tests.doors.of_python import (
     python_answer,
     scenario_of,
 )
-from tests.doors.table import Case
+from tests.doors.table import EXPORTED, Case
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Werror")
@@ -69,7 +69,7 @@ def printed(folder: Path, files: dict[str, bytes]) -> tuple[dict[str, Floats], d
 
 
 @needs_gcc
-@pytest.mark.parametrize("case", parameters())
+@pytest.mark.parametrize("case", parameters(EXPORTED))
 def test_a_program_in_c_has_the_bits_of_python(case: Case, tmp_path: Path) -> None:
     answer = python_answer(case)
     channels, metrics = printed(tmp_path, files_of(case))
@@ -104,7 +104,7 @@ def stepped(file: str, samples: Floats) -> tuple[dict[str, Floats], dict[str, fl
 @pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
 @pytest.mark.usefixtures("_quick_units")
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("case", parameters())
+@pytest.mark.parametrize("case", parameters(EXPORTED))
 def test_a_unit_has_the_bits_of_python(case: Case, fmi: int, tmp_path: Path) -> None:
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
     answer = python_answer(case)

@@ -44,7 +44,8 @@ def test_compiled_code_has_the_bits_of_python(case: Case) -> None:
 def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
     """Among others, of which one has another supply; those of short cases are run by Python, which is quick enough."""
     answer, scenario = python_answer(case), scenario_of(case)
-    metrics = list(offered(scenario))
+    # What follows torques is measured of a walk too, but is not among the metrics of one.
+    metrics = [name for name in offered(scenario) if name in answer.metrics or not case.walks]
     bands = [name for name in TRACED if name in answer.channels]
     pressure = scenario.device.supply.pressure
     with run_by(PYTHON if case.suite == "short" else ""):
@@ -67,7 +68,8 @@ def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Pa
     document = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     written = {name: metric["value"] for name, metric in document["metrics"].items()}
     assert written == {name: None if math.isnan(value) else value for name, value in answer.metrics.items()}
-    assert_near_metrics({name: metric.value for name, metric in evaluate(folder).items()}, answer)
+    measured = {name: metric.value for name, metric in evaluate(folder).items()}
+    assert_near_metrics({name: measured[name] for name in measured if name in answer.metrics or not case.walks}, answer)
 
 
 @pytest.mark.parametrize("case", parameters())
