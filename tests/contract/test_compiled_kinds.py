@@ -31,7 +31,7 @@ from ppafo.model.sensors import (
 )
 from ppafo.parameters.loading import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.signals.meter import Course, FootSample, MeterKind, Sample, StrideSample
+from ppafo.signals.meter import Course, EnergySample, FootSample, GasSample, MeterKind, Sample, StrideSample
 from tests.compilers_here import first_compiler
 
 ROUNDING = 1.0e-12
@@ -178,7 +178,9 @@ def meters(draw: random.Random) -> Iterator[Entry]:
             time=0.01 * number,
         )
         foot = FootSample(drawn[0] + 0.1, 0.9 * drawn[0], 0.01 * drawn[5])
-        samples.append(Sample(float(number), *drawn, min(0.1 * number, 2.0), *temperatures, foot, stride))
+        gas = GasSample(*(1.0e-6 * number * place for place in range(1, 6)))
+        energy = EnergySample(*(0.3 * number * place for place in range(1, 6)))
+        samples.append(Sample(float(number), *drawn, min(0.1 * number, 2.0), *temperatures, gas, energy, foot, stride))
     kinds: dict[str, MeterKind] = {meter.name: meter for kind in METRICS.values() for meter in kind.meters}
     for name, kind in kinds.items():
         state = kind.start(course, samples[0])

@@ -7,9 +7,9 @@ from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import Sample
 
 TRACED: dict[str, str] = {
-    **{name: f"sample.{name}" for name in Sample._fields if name not in ("number", "foot", "stride")},
+    **{name: f"sample.{name}" for name in Sample._fields if name not in ("number", "gas", "energy", "foot", "stride")},
     **{kind.reference: "sample.reference" for kind in CONTROLLED.values()},
-    **{name: f"state.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
+    **{name: f"sample.gas.{name}" for name in ("mass_1", "mass_2", "supplied_mass", "vented_mass", "leaked_mass")},
 }
 """Channels that can be traced, and where a lane has them."""
 TRACED_IN_WALKS: dict[str, str] = {
@@ -30,8 +30,6 @@ TRACED_IN_WALKS: dict[str, str] = {
 """Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
 REQUEST = "controller_state.request.torque"
 """Where a controller of walking keeps the torque that it wants, if it wants one."""
-TRUE_MASSES = {name: f"masses.{name}" for name in ("mass_1", "mass_2")}
-"""Paths of the true masses, which a recording shows for gas with an energy balance or that is not ideal."""
 
 
 def walk_traces(states: Mapping[str, type]) -> dict[str, str]:
@@ -43,6 +41,6 @@ def walk_traces(states: Mapping[str, type]) -> dict[str, str]:
     return {name: path for name, path in found.items() if path}
 
 
-def paths_of_traces(states: Mapping[str, type], walks: bool, has_true_masses: bool) -> dict[str, str]:
+def paths_of_traces(states: Mapping[str, type], walks: bool) -> dict[str, str]:
     """Where a lane has each channel that is no number of the state by its own path."""
-    return TRACED | (walk_traces(states) if walks else {}) | (TRUE_MASSES if has_true_masses else {})
+    return TRACED | (walk_traces(states) if walks else {})

@@ -318,7 +318,7 @@ class Program:
     @property
     def traces(self) -> dict[str, str]:
         """Where a lane has each channel that can be traced and is no number of the state by its own path."""
-        return paths_of_traces(self.state_rows(), self.walks, self.has_true_masses)
+        return paths_of_traces(self.state_rows(), self.walks)
 
     @property
     def traced_paths(self) -> dict[int, str]:

@@ -3,12 +3,17 @@
 To add a metric: a function and its MetricKind in a module of this folder, listed in its METRICS.
 """
 
+from typing import TYPE_CHECKING
+
 from ppafo.kinds import Kinds
 from ppafo.metrics import command, gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
 from ppafo.signals import Recording
 
-__all__ = ["METRICS", "Metric", "MetricKind", "evaluate"]
+if TYPE_CHECKING:
+    from ppafo.engine.program import Program
+
+__all__ = ["METRICS", "Metric", "MetricKind", "evaluate", "has_channels", "missing_channels"]
 
 
 METRICS: Kinds[MetricKind] = Kinds(
@@ -40,3 +45,17 @@ def evaluate(recording: Recording) -> dict[str, Metric]:
         if value is not None:
             metrics[kind.name] = Metric(value, kind.unit, kind.summary)
     return metrics
+
+
+def missing_channels(program: "Program") -> frozenset[str]:
+    """Return channels that runs of a program do not have: those of an energy balance where its gas has none."""
+    return frozenset() if program.is_thermal else gas.WITH_ENERGY_BALANCE
+
+
+def has_channels(program: "Program", kind: MetricKind) -> bool:
+    """True where runs of a program have the channels of a metric, and what else it needs."""
+    return (
+        missing_channels(program).isdisjoint(kind.channels)
+        and kind.of_reference in ("", program.followed)
+        and program.offers.issuperset(kind.needs)
+    )

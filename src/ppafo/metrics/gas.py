@@ -10,7 +10,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt
 from ppafo.model.columns import Numeric, choose
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import NO_ENERGY, NO_GAS, Course, EnergySample, GasSample, MeterKind, Sample
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
@@ -60,6 +60,61 @@ def gas_per_work(recording: Recording) -> float | None:
     # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
     return gained(recording, ("supplied_mass",)) / work if work > 0.0 else None
+
+
+class GasGains(NamedTuple):
+    """Gas at the first sample [kg], and what masses and totals have gained since, up to the last sample."""
+
+    first: GasSample
+    gained: GasSample
+
+
+def start_gas(course: Course, sample: Sample) -> GasGains:
+    """Nothing gained at the first sample."""
+    return GasGains(sample.gas, NO_GAS)
+
+
+def update_gas(state: GasGains, course: Course, sample: Sample) -> GasGains:
+    """Gains up to the next sample."""
+    # A run may go on after its last sample, to the end of a step: what passes there is in no recording.
+    gained = GasSample(
+        supplied_mass=sample.gas.supplied_mass - state.first.supplied_mass,
+        vented_mass=sample.gas.vented_mass - state.first.vented_mass,
+        leaked_mass=sample.gas.leaked_mass - state.first.leaked_mass,
+        mass_1=sample.gas.mass_1 - state.first.mass_1,
+        mass_2=sample.gas.mass_2 - state.first.mass_2,
+    )
+    return GasGains(state.first, gained)
+
+
+GAS = MeterKind("gas", GasGains, start_gas, update_gas)
+
+
+class EnergyGains(NamedTuple):
+    """Energies of the gas at the first sample [J], and what they have gained since, up to the last sample."""
+
+    first: EnergySample
+    gained: EnergySample
+
+
+def start_energy(course: Course, sample: Sample) -> EnergyGains:
+    """Nothing gained at the first sample."""
+    return EnergyGains(sample.energy, NO_ENERGY)
+
+
+def update_energy(state: EnergyGains, course: Course, sample: Sample) -> EnergyGains:
+    """Gains up to the next sample."""
+    gained = EnergySample(
+        gas_energy=sample.energy.gas_energy - state.first.gas_energy,
+        supplied_enthalpy=sample.energy.supplied_enthalpy - state.first.supplied_enthalpy,
+        vented_enthalpy=sample.energy.vented_enthalpy - state.first.vented_enthalpy,
+        wall_heat=sample.energy.wall_heat - state.first.wall_heat,
+        gas_work=sample.energy.gas_work - state.first.gas_work,
+    )
+    return EnergyGains(state.first, gained)
+
+
+ENERGY = MeterKind("energy", EnergyGains, start_energy, update_energy)
 
 
 class LargestPressure(NamedTuple):
@@ -134,17 +189,23 @@ def ratio(above: Floats, below: Floats) -> Floats:
 
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
 ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
+WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
+"""Channels that only runs of a gas with an energy balance have."""
 _EFFORT = ("torque", "angle", "supplied_mass")
 
 
 def _of_gains(
-    name: str, unit: str, summary: str, channels: tuple[str, ...], function: PlainFunction | None = None
+    name: str,
+    unit: str,
+    summary: str,
+    channels: tuple[str, ...],
+    function: PlainFunction | None = None,
+    meter: MeterKind = GAS,
 ) -> MetricKind:
     """What a total has grown by, or a function of what several have."""
     compute = partial(gained, channels=channels, function=function)
-    return MetricKind(
-        name, unit, summary, channels, compute, ReadAt(tuple(f"gains.{channel}" for channel in channels), function)
-    )
+    places = tuple(f"meters.{meter.name}.gained.{channel}" for channel in channels)
+    return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,))
 
 
 METRICS = (
@@ -158,6 +219,7 @@ METRICS = (
         "enthalpy supplied less vented, and heat, less work and stored energy of the gas",
         ENERGIES,
         energy_imbalance,
+        ENERGY,
     ),
     MetricKind(
         "largest_pressure",
@@ -192,8 +254,8 @@ METRICS = (
         "work per supplied gas",
         _EFFORT,
         work_per_gas,
-        ReadAt(("meters.work.work", "gains.supplied_mass"), ratio),
-        (WORK,),
+        ReadAt(("meters.work.work", "meters.gas.gained.supplied_mass"), ratio),
+        (WORK, GAS),
     ),
     MetricKind(
         "gas_per_work",
@@ -201,7 +263,7 @@ METRICS = (
         "supplied gas per work",
         _EFFORT,
         gas_per_work,
-        ReadAt(("gains.supplied_mass", "meters.work.work"), ratio),
-        (WORK,),
+        ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), ratio),
+        (WORK, GAS),
     ),
 )

@@ -60,21 +60,20 @@ class Readings:
     """What is left of runs that were metered and not recorded; every number is an array (runs,), or a float of one run.
 
     ``meters`` has the last state of each meter by its name; ``course`` the reference's, () where none needs it;
-    ``interval`` is the time between two samples [s] and ``samples`` their number; ``gains`` has the last less the first
-    value of channels; ``traces`` has channels sample by sample (samples, runs).
+    ``interval`` is the time between two samples [s] and ``samples`` their number; ``traces`` has channels sample by
+    sample (samples, runs).
     """
 
     meters: Mapping[str, Any]
     course: Any
     interval: Floats
     samples: int
-    gains: Mapping[str, Floats]
     traces: Mapping[str, Floats]
 
 
 @dataclass(frozen=True, slots=True)
 class ReadAt:
-    """Reads a metric that is a number at a place of the readings, ``gains.supplied_mass``, or a function of several.
+    """Reads a metric that is a number at a place of the readings, ``meters.work.work``, or a function of several.
 
     Declared, so that an exported library has one expression for it and no function of its own.
     """

@@ -1,102 +1,58 @@
-"""Which torque an actuator of any kind reaches at an angle, by the kind's own functions.
+"""Static torque limits of an actuator of any kind at an angle, from the torque function of the kind itself.
 
-One chamber is at its supply then and the other one at the atmosphere.
+At the upper limit chamber 1 is at its supply pressure and chamber 2 vented, at the lower limit the other way round.
 """
 
-from typing import Any, NamedTuple
+from collections.abc import Callable
 
-from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.declaration import quantities_of
-from ppafo.parameters.device import Actuator, Device
+from ppafo.parameters.device import Device
+from ppafo.parameters.plant import plant_parameters
 
-MOST_PRESSURE = 1.0e8
-"""Pa: beyond it no supply is looked for."""
+HIGHEST_PRESSURE = 1.0e8
+"""Supply pressure [Pa gauge] above which no larger one is tried."""
+_HALVINGS = 60
+"""Bisection steps, which bring any bracket down to rounding."""
 
-
-class Still(NamedTuple):
-    """A kind's functions of one actuator that stands still, ``torque(angle, p_1, p_2)`` and ``chambers`` of the same."""
-
-    torque: Any
-    chambers: Any
+StaticTorque = Callable[[float, float, float], float]
+"""Torque [N m] of an angle [rad] and the absolute pressures [Pa] of chambers 1 and 2."""
 
 
-class _StillShape(NamedTuple):
-    """What the functions of a kind may ask of their plant (``ShapedPlant``), for an actuator that stands still."""
-
-    shape: Any
-    atmospheric_pressure: float
-    supply_pressure: float
-    dorsiflexion_pressure: float
-    gas_product: float = 1.0
-    gravity_torque: float = 0.0
-    external_torque: float = 0.0
+def static_torque(device: Device) -> StaticTorque:
+    """Torque function of the actuator of a device, whose numbers are those of one run."""
+    torque, plant = ACTUATORS[device.actuator.kind].model.torque, plant_parameters(device)
+    return lambda angle, pressure_1, pressure_2: float(torque(plant, angle, pressure_1, pressure_2))
 
 
-class _StillVane(NamedTuple):
-    """What a vane's functions ask of their plant."""
+def torque_reach(device: Device, angle: float, torque: StaticTorque | None = None) -> tuple[float, float]:
+    """Lowest and highest static torque [N m] of a device at an angle [rad].
 
-    torque_constant: float
-    displacement_per_radian: float
-    angle_min: float
-    angle_max: float
-    dead_volume_1: float
-    dead_volume_2: float
-    atmospheric_pressure: float
-    gas_product: float = 1.0
-
-
-def still(actuator: Actuator, atmosphere: float) -> Still:
-    """Return the functions of an actuator in an atmosphere [Pa absolute]."""
-    kind = ACTUATORS[actuator.kind]
-    model = kind.model
-    row: Any
-    if model.shape is None:
-        names = _StillVane._fields[:6]
-        row = _StillVane(**{name: float(getattr(actuator, name)) for name in names}, atmospheric_pressure=atmosphere)
-    else:
-        settings = kind.settings(*(float(getattr(actuator, item.name)) for item in quantities_of(kind.settings)))
-        ends = Range(*(float(getattr(actuator, name)) for name in Range._fields))
-        table = () if actuator.table is None else (actuator.table,)
-        row = _StillShape(model.prepare(settings, ends, *table), atmosphere, atmosphere, atmosphere)
-    return Still(
-        lambda angle, p_1, p_2: float(model.torque(row, angle, p_1, p_2)),
-        lambda angle, p_1, p_2: model.chambers(row, angle, p_1, p_2),
-    )
-
-
-def torque_reach(device: Device, angle: float) -> tuple[float, float]:
-    """Return the lowest and the highest torque [N m] of a device at an angle [rad]: one chamber full, one vented."""
-    supply = device.supply
-    room = supply.atmospheric_pressure
-    own = still(device.actuator, room)
-    return own.torque(angle, room, supply.dorsiflexion_pressure), own.torque(angle, supply.pressure, room)
+    ``torque`` is the device's ``static_torque``, where a caller asks for many angles.
+    """
+    own, supply = torque or static_torque(device), device.supply
+    vented = float(supply.atmospheric_pressure)
+    return own(angle, vented, float(supply.dorsiflexion_pressure)), own(angle, float(supply.pressure), vented)
 
 
 def supply_for(device: Device, angle: float, torque: float) -> float | None:
-    """Return the pressure [Pa absolute] of the chamber's supply with which a torque [N m] is reached at an angle.
+    """Supply pressure [Pa absolute] with which a device gives a static torque [N m] at an angle [rad].
 
-    None where no pressure reaches it. Chamber 1 raises the torque, chamber 2 lowers it.
+    Chamber 1 raises the torque above that of the vented actuator, chamber 2 lowers it. None where no supply up to
+    ``HIGHEST_PRESSURE`` gives it.
     """
-    room = device.supply.atmospheric_pressure
-    own, sign = still(device.actuator, room), 1.0 if torque > own_rest(device, angle) else -1.0
+    own, vented = static_torque(device), float(device.supply.atmospheric_pressure)
+    sign = 1.0 if torque > own(angle, vented, vented) else -1.0
 
-    def reached(gauge: float) -> float:
-        full = room + gauge
-        return sign * own.torque(angle, *((full, room) if sign > 0.0 else (room, full)))
+    def is_enough(gauge: float) -> bool:
+        full = vented + gauge
+        return sign * own(angle, *((full, vented) if sign > 0.0 else (vented, full))) >= sign * torque
 
     low, high = 0.0, 1.0e5
-    while reached(high) < sign * torque:
+    while not is_enough(high):
         low, high = high, 2.0 * high
-        if high > MOST_PRESSURE:
+        if high > HIGHEST_PRESSURE:
             return None
-    for _ in range(60):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if reached(middle) >= sign * torque else (middle, high)
-    return room + high
-
-
-def own_rest(device: Device, angle: float) -> float:
-    """Return the torque [N m] of an actuator whose chambers are vented, at an angle [rad]."""
-    room = device.supply.atmospheric_pressure
-    return still(device.actuator, room).torque(angle, room, room)
+        low, high = (low, middle) if is_enough(middle) else (middle, high)
+    return vented + high

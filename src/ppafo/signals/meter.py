@@ -43,12 +43,37 @@ class StrideSample(NamedTuple):
     time: float
 
 
-class Sample(NamedTuple):
-    """One sample of a recording: its number from 0, channels in SI units, and the channels of a foot and of a stride.
+class GasSample(NamedTuple):
+    """Gas at a sample [kg]: totals since the start of the run, and true masses in the chambers."""
 
-    ``reference`` is in the unit of what is controlled. What a run does not have is 0: reference, temperatures of gas
-    without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in a walk. In a walk ``reference`` is
-    the torque that the controller requests.
+    supplied_mass: float
+    vented_mass: float
+    leaked_mass: float
+    mass_1: float
+    mass_2: float
+
+
+class EnergySample(NamedTuple):
+    """Energies of the gas at a sample [J]: internal energy now, the others totals since the start of the run."""
+
+    gas_energy: float
+    supplied_enthalpy: float
+    vented_enthalpy: float
+    wall_heat: float
+    gas_work: float
+
+
+NO_GAS = GasSample(**dict.fromkeys(GasSample._fields, 0.0))
+NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
+"""Nothing gained yet, or energies of gas that has no balance of them."""
+
+
+class Sample(NamedTuple):
+    """One sample of a recording: its number from 0, channels in SI units, and those of gas, foot and stride.
+
+    ``reference`` is in the unit of what is controlled. What a run does not have is 0: reference, temperatures and
+    ``energy`` of gas without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in a walk. There
+    ``reference`` is the torque that the controller requests.
     """
 
     number: float
@@ -61,6 +86,8 @@ class Sample(NamedTuple):
     reference: float
     temperature_1: float
     temperature_2: float
+    gas: GasSample
+    energy: EnergySample
     foot: FootSample
     stride: StrideSample
 

@@ -74,6 +74,17 @@ ARITHMETIC = "controller.arithmetic"
 """What integer controllers were once chosen by."""
 
 REFERENCE_OF = "reference.of"
+PURPOSE = "reference.beyond_reach"
+"""Where a file says why its reference lies beyond the reach of the device."""
+_OF_REACH = ("reference.", "supply.", "actuator.", "motion.", "device.")
+"""Beginnings of the paths of a reference, and of what decides how far a device reaches."""
+
+
+def changes_reach(paths: Iterable[str]) -> bool:
+    """True where a path is of a reference, or of what decides how far a device reaches."""
+    return any(path.startswith(_OF_REACH) for path in paths)
+
+
 """What the reference is a value of, by a word of ``CONTROLLED``."""
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 

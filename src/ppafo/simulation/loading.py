@@ -39,6 +39,7 @@ from ppafo.simulation.declaration import (
     LOCKED_ANGLE,
     OF_A_VANE,
     PRESSURE_WORDS,
+    PURPOSE,
     REFERENCE_OF,
     SEED,
     SENSORS,
@@ -48,6 +49,7 @@ from ppafo.simulation.declaration import (
     THERMAL_GAS,
     Declared,
     Reading,
+    changes_reach,
     controlled_in,
     controller_settings,
     kind_at,
@@ -151,6 +153,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         supply_line=lines,
         links={**links, **of_reference, **of_control},
         controlled=controlled,
+        beyond_reach=_purpose(reading, request.overrides),
     )
     problem = reference_problem(scenario)
     if problem:
@@ -314,6 +317,12 @@ def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[Pr
     links = {path: gauge_link(path, *split_quantity(str(text))) for path, text in written.items() if text is not None}
     choice = ProfileChoice(kind, reading.section("reference", settings, atmosphere))
     return choice, {path: follow for path, follow in links.items() if follow}
+
+
+def _purpose(reading: Reading, overrides: Iterable[Override]) -> str:
+    """Return why a file asks for a reference beyond reach; "" where an override makes it another reference or reach."""
+    purpose = "" if changes_reach(override.typed for override in overrides) else value_at(reading.document, PURPOSE)
+    return str(purpose or "")
 
 
 def _sensors(reading: Reading, clock: Clock) -> Sensors:

@@ -12,7 +12,7 @@ from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path
 from ppafo.parameters.plant import number_under, part_of
-from ppafo.simulation.declaration import LOCKED_ANGLE
+from ppafo.simulation.declaration import LOCKED_ANGLE, changes_reach
 from ppafo.simulation.scenario import Scenario
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
@@ -56,7 +56,8 @@ def with_numbers(scenario: Scenario, numbers: Mapping[str, Any]) -> Scenario:
     if replaced:
         device = replace(scenario.device, links={})
         links = left(in_other_forms(scenario.graph, changing), replaced)
-        scenario = replace(scenario, device=device, links=links)
+        purpose = "" if changes_reach(replaced) else scenario.beyond_reach
+        scenario = replace(scenario, device=device, links=links, beyond_reach=purpose)
     for section in changing:
         form = other_form(scenario.device, section)
         in_form = {name: moved.pop(f"{section}.{name}") for name in form}

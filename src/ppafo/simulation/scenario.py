@@ -339,7 +339,8 @@ class Scenario:
     """A device in one experiment.
 
     The reference is a torque [N m], or of what else is ``controlled``: an angle [rad], or pressures [Pa] (
-    ``model.controlled``). Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
+    ``model.controlled``); ``beyond_reach`` is why it lies beyond the reach of the device, "" where it does not on
+    purpose. Without ``gas_model`` the gas keeps its temperature, without ``supply_line`` the
     supply pressures are constant, both as in the paper. ``links`` say which numbers follow others that are varied,
     beside the device's.
     """
@@ -359,6 +360,7 @@ class Scenario:
     supply_line: SupplyLine | None = None
     links: Graph = field(default_factory=dict, compare=False)
     controlled: str = TORQUE
+    beyond_reach: str = ""
 
     def __repr__(self) -> str:
         """Return name, device, valve, motion, controller and duration, a line each."""

@@ -223,7 +223,9 @@ def _scenario_file(sections: tuple[str, ...], kinds: tuple[tuple[str, str], ...]
     if "reference" in sections:
         controlled = optional(Literal[tuple(CONTROLLED)], "what it is a value of; torque unless given")
         named_kind = named.get("reference", "")
-        reference = profile_table(CONTROLLED[TORQUE].level, "Reference", named_kind, {"of": controlled})
+        on_purpose = optional(str, "why it lies beyond the reach of the device, where it does so on purpose")
+        further = {"of": controlled, "beyond_reach": on_purpose}
+        reference = profile_table(CONTROLLED[TORQUE].level, "Reference", named_kind, further)
         what = "what the controller follows, a torque unless it says of what; one that follows none may leave it out"
         own["reference"] = optional(reference, what)
     if "sensors" in sections:

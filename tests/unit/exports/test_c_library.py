@@ -23,7 +23,16 @@ from ppafo.metrics import METRICS
 from ppafo.metrics.metric import Readings
 from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
-from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course
+from ppafo.signals.meter import (
+    SAME_LEVEL,
+    Course,
+    EnergySample,
+    FootSample,
+    GasSample,
+    Sample,
+    StrideSample,
+    advance_course,
+)
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import with_numbers
@@ -50,7 +59,11 @@ EVERYTHING = (
 )
 """What makes a program of every feature of a scenario."""
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
-NO_FOOT, NO_STRIDE = FootSample(0.0, 0.0, 0.0), StrideSample(*[0.0] * len(StrideSample._fields))
+NOTHING = {
+    "energy": EnergySample(*[0.0] * len(EnergySample._fields)),
+    "foot": FootSample(0.0, 0.0, 0.0),
+    "stride": StrideSample(*[0.0] * len(StrideSample._fields)),
+}
 
 
 def written(folder: Path, name: str, *overrides: str) -> str:
@@ -76,15 +89,13 @@ def metrics_of(result: Result) -> dict[str, float]:
     states: dict[str, Any] = {}
     for number in range(len(recording)):
         given = {name: float(recording[name][number]) for name in Sample._fields if name in recording.names}
-        nothing = {"temperature_1": 0.0, "temperature_2": 0.0, "foot": NO_FOOT, "stride": NO_STRIDE}
-        sample = Sample(number=float(number), **given, **nothing)
+        gas = GasSample(*(float(recording[name][number]) for name in GasSample._fields))
+        sample = Sample(number=float(number), **given, temperature_1=0.0, temperature_2=0.0, gas=gas, **NOTHING)
         course = advance_course(course, sample)
         for name, meter in meters.items():
             states[name] = meter.update(states[name], course, sample) if number else meter.start(course, sample)
-    totals = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2")
-    gains: Any = {name: recording[name][-1] - recording[name][0] for name in totals}
     interval: Any = recording.time[1]
-    readings = Readings(states, course, interval, len(recording), gains, {})
+    readings = Readings(states, course, interval, len(recording), {})
     return {kind.name: float(kind.read(readings)) for kind in kinds}
 
 
@@ -130,6 +141,17 @@ def test_a_valve_that_gets_its_command_late_prints_the_bits_of_python(tmp_path: 
     result = simulate(scenario)
     assert result.metrics["gas_supplied"].value > 1e-5
     assert done.stdout.splitlines() == printed(result, scenario_library(scenario).program.outputs)
+
+
+@pytest.mark.parametrize("rate", ["7 Hz", "13 Hz"])
+def test_gas_in_c_is_counted_to_the_last_sample_where_the_steps_go_on_after_it(rate: str, tmp_path: Path) -> None:
+    overrides = ("run.duration=0.05 s", f"controller.rate={rate}")
+    name = written(tmp_path, "step-response", *overrides)
+    subprocess.run(["make", "-s", "-C", str(tmp_path), "CFLAGS=-std=c99 -O1", name], check=True)
+    done = subprocess.run([tmp_path / name], capture_output=True, text=True, check=True)
+    result = simulate("step-response", overrides)
+    for metric in ("gas_supplied", "gas_vented", "gas_leaked"):
+        assert f"# {metric} = {result.metrics[metric].value:.17g} kg" in done.stdout
 
 
 WARM = (

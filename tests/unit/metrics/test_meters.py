@@ -14,7 +14,17 @@ from ppafo.metrics.gas import ENERGIES
 from ppafo.metrics.metric import Readings
 from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reversals
 from ppafo.signals import Channel, Recording
-from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, MeterKind, Sample, StrideSample, advance_course
+from ppafo.signals.meter import (
+    SAME_LEVEL,
+    Course,
+    EnergySample,
+    FootSample,
+    GasSample,
+    MeterKind,
+    Sample,
+    StrideSample,
+    advance_course,
+)
 
 Floats = NDArray[np.float64]
 
@@ -24,10 +34,18 @@ INTERVAL = 0.01
 def samples_of(recording: Recording) -> list[Sample]:
     names = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "command", "reference")
     names += ("temperature_1", "temperature_2", "foot_angle", "measured_foot_angle", "toe_difference")
+    names += (*GasSample._fields, *EnergySample._fields)
     columns = zip(*(recording[name].tolist() for name in names), strict=True)
     stride = StrideSample(*[0.0] * len(StrideSample._fields))
     return [
-        Sample(float(number), *values[:9], foot=FootSample(*values[9:]), stride=stride)
+        Sample(
+            float(number),
+            *values[:9],
+            gas=GasSample(*values[12:17]),
+            energy=EnergySample(*values[17:]),
+            foot=FootSample(*values[9:12]),
+            stride=stride,
+        )
         for number, values in enumerate(columns)
     ]
 
@@ -55,13 +73,11 @@ def read(recording: Recording) -> dict[str, float]:
     of_recordings = {name: kind for name, kind in of_torque.items() if kind.compute is not None}
     meters = {meter.name: metered(meter, samples, course) for kind in of_recordings.values() for meter in kind.meters}
     ended = next(iter(meters.values()))[1]
-    totals = ("supplied_mass", "vented_mass", "leaked_mass", "mass_1", "mass_2", *ENERGIES)
     readings = Readings(
         meters={name: columns_of(state) for name, (state, _) in meters.items()},
         course=columns_of(ended),
         interval=np.array([INTERVAL]),
         samples=len(samples),
-        gains={name: recording[name][-1:] - recording[name][:1] for name in totals},
         traces={"angle": recording["angle"][:, None]},
     )
     with np.errstate(all="ignore"):

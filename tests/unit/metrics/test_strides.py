@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.metrics.strides import METER, PER_STRIDE, SETTLING, Strides
-from ppafo.signals.meter import Course, FootSample, Sample, StrideSample
+from ppafo.signals.meter import Course, EnergySample, FootSample, GasSample, Sample, StrideSample
 from ppafo.walking.strides import per_stride, stride_starts
 
 NO_COURSE = Course(*[0.0] * len(Course._fields))
@@ -37,7 +37,8 @@ def metered(columns: dict[str, np.ndarray], first: int = 0) -> Strides:
         blank._replace(time=0.01 * at, **{name: float(column[at]) for name, column in columns.items()})
         for at in range(first, SAMPLES)
     ]
-    rows = [Sample(*[0.0] * 10, foot=FootSample(0.0, 0.0, 0.0), stride=stride) for stride in strides]
+    nothing = GasSample(*[0.0] * 5), EnergySample(*[0.0] * 5), FootSample(0.0, 0.0, 0.0)
+    rows = [Sample(*[0.0] * 10, *nothing, stride=stride) for stride in strides]
     state: Strides = METER.start(NO_COURSE, rows[0])
     for row in rows[1:]:
         state = METER.update(state, NO_COURSE, row)

@@ -49,7 +49,7 @@ def test_the_scenarios_of_the_package_do_not_oscillate_and_a_pair_that_only_swit
 ) -> None:
     verdict = simulate(scenario).tracking
     assert verdict is not None
-    assert "the actuator gives 5 N m at most; the scenario says of its level: " in verdict.sentence
+    assert "the actuator gives 5 N m at most; on purpose: " in verdict.sentence
     assert verdict.kind == "does not follow" and not verdict.is_useless
 
 

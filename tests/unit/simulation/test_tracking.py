@@ -7,6 +7,7 @@ import pytest
 from ppafo.loading import load_scenario
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import simulate
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tried
 
 TASK = "torque-task-proportional"
@@ -32,6 +33,11 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
         "the torque stays 1 N m below its reference, of 6 N m wanted; at 75 deg and 50 psi_g"
     )
     assert not told.is_useless
+    assert told.accepted.startswith("above the 5.0 N m that 50 psi_g can hold")
+    for changed in ("reference.level=6.1 N m", "supply.pressure=49 psi_g", "actuator.torque_constant=14 cm^3"):
+        assert load_scenario(TASK, [changed]).beyond_reach == ""
+    assert load_scenario(TASK, ["valve.area=12 mm^2"]).beyond_reach == told.accepted
+    assert with_numbers(load_scenario(TASK), {"supply.pressure": 3.0e5}).beyond_reach == ""
     scenario = load_scenario(TASK, ["reference.level=9 N m"])
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None and verdict.is_useless

@@ -5,8 +5,20 @@ from ppafo.engine.step.lane import Lane
 from ppafo.engine.step.phases import present_pressures
 from ppafo.engine.step.sample import reference_at
 from ppafo.model.controlled import TORQUE, controlled
+from ppafo.model.gas import energy_per_content
 from ppafo.model.plant import ThermalParameters, joint_torque
-from ppafo.signals.meter import SAME_LEVEL, Course, FootSample, Sample, StrideSample, advance_course, is_away
+from ppafo.signals.meter import (
+    NO_ENERGY,
+    SAME_LEVEL,
+    Course,
+    EnergySample,
+    FootSample,
+    GasSample,
+    Sample,
+    StrideSample,
+    advance_course,
+    is_away,
+)
 
 NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
 NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
@@ -28,6 +40,8 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
         reference=wanted_at(parts, lane, time),
         temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
         temperature_2=temperature(lane.thermal, lane.state.mass_2, lane.masses.mass_2) if parts.is_thermal else 0.0,
+        gas=gas_of(parts, lane),
+        energy=energy_of(parts, lane),
         foot=foot_of(parts, lane, time),
         stride=stride_of(parts, lane, number, interval),
     )
@@ -36,6 +50,31 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
 def temperature(thermal: ThermalParameters, content: float, mass: float) -> float:
     """Temperature of the gas in a chamber [K], of its energy content and its true mass [kg]."""
     return thermal.temperature * (content / mass)
+
+
+def gas_of(parts: Program, lane: Lane) -> GasSample:
+    """Gas in the chambers and totals of it [kg]; true masses where the gas is not ideal or has an energy balance."""
+    return GasSample(
+        supplied_mass=lane.state.supplied_mass,
+        vented_mass=lane.state.vented_mass,
+        leaked_mass=lane.state.leaked_mass,
+        mass_1=lane.masses.mass_1 if parts.has_true_masses else lane.state.mass_1,
+        mass_2=lane.masses.mass_2 if parts.has_true_masses else lane.state.mass_2,
+    )
+
+
+def energy_of(parts: Program, lane: Lane) -> EnergySample:
+    """Energies of the gas [J]; zeros for gas without an energy balance."""
+    if not parts.is_thermal:
+        return NO_ENERGY
+    per_content = energy_per_content(lane.plant.gas_product, lane.thermal.heat_capacity_ratio)
+    return EnergySample(
+        gas_energy=per_content * (lane.state.mass_1 + lane.state.mass_2),
+        supplied_enthalpy=per_content * lane.masses.supplied_content,
+        vented_enthalpy=per_content * lane.masses.vented_content,
+        wall_heat=per_content * lane.masses.heat_content,
+        gas_work=lane.masses.gas_work,
+    )
 
 
 def wanted_at(parts: Program, lane: Lane, time: float) -> float:

@@ -8,9 +8,8 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.boundary import Boundary
-from ppafo.metrics import METRICS
+from ppafo.metrics import METRICS, has_channels, missing_channels
 from ppafo.metrics.metric import MetricKind
-from ppafo.metrics.readable import has_channels, totals_kind
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import WALK
 
@@ -53,7 +52,7 @@ class ExportedProgram:
 
 def exported(program: Program) -> ExportedProgram:
     """The program as it is exported; a metric that needs all samples of a channel is left out."""
-    missing = totals_kind(program).missing | {
+    missing = missing_channels(program) | {
         kind.reference for name, kind in CONTROLLED.items() if name != program.wanted
     }
     offered = (kind for kind in METRICS.values() if has_channels(program, kind) and not kind.traced)

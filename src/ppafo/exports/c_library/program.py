@@ -15,7 +15,6 @@ from typing import Any
 
 from ppafo.engine.entries import HEADER, INLINE, indent
 from ppafo.engine.generator import StepText
-from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, HANDED
 from ppafo.engine.linking import link_program
 from ppafo.engine.loop_text import LOOP_ARRAYS, LOOP_NUMBERS, lane_loop, run_loop
@@ -24,7 +23,6 @@ from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.exports.c_library.boundary import Arrays, Boundary, Structs, struct_of, struct_of_numbers
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, Further, places_of
 from ppafo.metrics.metric import ReadAt, Readings
-from ppafo.metrics.readable import totals_kind
 from ppafo.model.columns import over_runs
 from ppafo.model.one_run import FOR_ONE_RUN
 from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
@@ -111,7 +109,7 @@ def c_text_of_run(
     metrics_row = struct_of_numbers(f"{name}_metrics", [kind.name for kind in exported.metrics])
     types: dict[str, tuple[Type, ...]] = {
         WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if exported.program.chooses_parts else [])),
-        "metrics": (states, states, parameters, INT, metrics_row),
+        "metrics": (states, INT, metrics_row),
         "prepare": (settings_row, parameters, states, struct_of_numbers("run_counts", COUNTS)),
         "follow": (settings_row, settings_row),
     }
@@ -139,7 +137,7 @@ _DOCUMENTS = {
     "run_counts": "Numbers of the steps; times in steps of the engine.",
     "advance": "Take a run some steps further, with the samples that are due.",
     "run_samples": "The last sample, and the one before.",
-    "metrics": "The metrics of a run, from its first and its last states.",
+    "metrics": "The metrics of a run, from its last states.",
     "prepare": "From the settings, in SI units, to the numbers of a run.",
     "follow": "Let settings that still have their default follow others.",
 }
@@ -190,7 +188,6 @@ def c_text(
             for ending in ("", TOGETHER)
         },
         "states": state,
-        "first": state,
         "parameters": alone,
         "counts": [f"COUNT_{name.upper()}" for name in COUNTS],
         "settings": [f"SETTING_{name.upper()}" for name in settings],
@@ -262,41 +259,26 @@ def _read_expression(read: Callable[[Readings], Any], add: Callable[[Any], str])
 
 
 def metrics_entry(exported: ExportedProgram, collector: SourceCollector, boundary: Boundary) -> str:
-    """The metrics of a run, from its first and its last states."""
-    program, groups = exported.program, exported.program.state_rows()
+    """The metrics of a run, from its last states."""
+    program, groups, add = exported.program, exported.program.state_rows(), collector.add
     names = [kind.name for kind in program.meters]
-    kind = totals_kind(program)
-    parameters = program.parameter_rows()
-    of_gas = rows_of(program.gas.groups(program), Role.PARAMETER)
-    groups_taken = ("plant", *of_gas, *(effect.name for effect in program.effects))
-    lines = [f"{name} = {boundary.taken('parameters', name, parameters, collector.add)}" for name in groups_taken]
-    lines += [f"{name} = {boundary.taken('states', name, groups, collector.add)}" for name in program.effect_states]
-    add = collector.add
-    for array in ("first", "states"):
-        states = [boundary.taken(array, group, groups, add) for group in ("state", *kind.states)]
-        # Before and after: metrics are what a run added to its totals.
-        lines.append(f"{array}_total = {add(kind.function)}({', '.join((*states, *kind.parameters))})")
-    # What a run gained: metrics need differences, since a state may begin with gas in it.
-    gains = ", ".join(f"{name}=states_total.{name} - first_total.{name}" for name in kind.row._fields)
     meters = ", ".join(
-        f"{name}={boundary.taken('states', group, groups, collector.add)}"
+        f"{name}={boundary.taken('states', group, groups, add)}"
         for name, group in zip(names, program.meter_groups, strict=True)
     )
-    course = boundary.taken("states", "course", groups, collector.add)
-    lines += [
-        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples, "
-        f"gains={add(kind.row)}({gains}))",
+    course = boundary.taken("states", "course", groups, add)
+    lines = [
+        f"readings = Readings(meters=Meters({meters}), course={course}, samples=samples)",
         *(
             f"{boundary.cell('found', index, metric.name)} = {_read_expression(metric.read, add)}"
             for index, metric in enumerate(exported.metrics)
         ),
     ]
     numbers = "float64[::1]"
-    parameters_of_metrics = dict.fromkeys(("first", "states", "parameters"), numbers)
-    parameters_of_metrics |= {"samples": "int64", "found": numbers}
+    parameters_of_metrics = {"states": numbers, "samples": "int64", "found": numbers}
     rows = [
         f"Meters = namedtuple('Meters', {names!r})",
-        "Readings = namedtuple('Readings', ['meters', 'course', 'samples', 'gains'])",
+        "Readings = namedtuple('Readings', ['meters', 'course', 'samples'])",
     ]
     return "\n".join(
         [

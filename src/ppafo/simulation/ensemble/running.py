@@ -2,37 +2,24 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.compilers import Effort
-from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.lanes import Batch, BatchResult, Floats, load_programs, run_blocks
 from ppafo.engine.metering import add_meters, meters_of
-from ppafo.engine.program import Program
-from ppafo.engine.rows import group_of, leaf_paths, row_numbers
+from ppafo.engine.rows import group_of
 from ppafo.engine.run import NEVER_FAILED, Members
-from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.errors import ScenarioError
-from ppafo.metrics import METRICS
+from ppafo.metrics import METRICS, has_channels
+from ppafo.metrics.gas import WITH_ENERGY_BALANCE
 from ppafo.metrics.metric import MetricKind, Readings
-from ppafo.metrics.readable import (
-    WITH_ENERGY_BALANCE,
-    ThermalTotals,
-    Totals,
-    has_channels,
-    totals_kind,
-)
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Scenario
 
 _SAME = 1.0e-6
-
-
-_OF_STATE = tuple(f"state.{name}" for name in Totals._fields)
-"""Paths of the numbers that totals are made of, beside the true masses where there are any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,14 +60,12 @@ class Outcome:
         """Run a batch and write what its runs come to at their places in the ensemble."""
         batch, members = task.batch, task.members
         states = np.empty_like(batch.states)
-        # A run that ends at its last sample has there the states with which it ends.
-        ends = np.empty_like(states) if task.late_totals else states
         read_from_traces = {name: np.full(members.size, np.nan) for name, kind in task.metrics.items() if kind.traced}
 
         def take(runs: slice, result: BatchResult) -> None:
-            states[:, runs], ends[:, runs] = result.states, task.at_last_sample(result)
+            states[:, runs] = result.states
             for name, values in read_from_traces.items():
-                values[runs] = _read(task, name, task.readings(ends[:, runs], runs, result.record))
+                values[runs] = _read(task, name, task.readings(states[:, runs], runs, result.record))
             for name in self.request.bands:
                 trace = result.record[:: task.band_stride, batch.program.traced.index(name)]
                 self.traces[name][: len(trace), members[runs]] = trace
@@ -94,7 +79,7 @@ class Outcome:
                 alone = Batch(batch.program, batch.clock, batch.parameters[:, one], batch.states[:, one])
                 take(one, run_sampled(alone, self.request.custom))
         self._judge(task, states)
-        readings = task.readings(ends, slice(None), None)
+        readings = task.readings(states, slice(None), None)
         for name in task.metrics:
             values = read_from_traces[name] if name in read_from_traces else _read(task, name, readings)
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
@@ -122,8 +107,6 @@ class _MeteredBatch:
     """A batch with its meters, its runs' places in the ensemble, its metrics, and the interval of its samples.
 
     The first ``physical`` rows of its states are no meters.
-
-    ``late_totals`` are paths of the state, traced where a run goes on after the last sample that counts.
     """
 
     batch: Batch
@@ -133,41 +116,19 @@ class _MeteredBatch:
     interval: Floats
     samples: int
     band_stride: int
-    late_totals: tuple[str, ...]
-
-    def at_last_sample(self, result: BatchResult) -> Floats:
-        """The last states of some runs, with the gas that there was at the last sample."""
-        if not self.late_totals:
-            return result.states
-        program, states = self.batch.program, result.states.copy()
-        rows = row_numbers(program.state_rows())
-        for path in self.late_totals:
-            states[rows[path]] = result.record[-1, program.traced.index(path)]
-        return states
 
     def readings(self, states: Floats, runs: slice, record: Floats | None) -> Readings:
-        """The readings of some runs from their states at the last sample and, if there are, their traces."""
+        """The readings of some runs from their last states and, if there are, their traces."""
         program = self.batch.program
         groups = program.state_rows()
-        parameters = self.batch.parameters[:, runs]
-        first, last = (_totals(program, parameters, rows) for rows in (self.batch.states[:, runs], states))
         traces = {} if record is None else {name: record[:, row] for row, name in enumerate(program.traced)}
         return Readings(
             meters=meters_of(program, states),
             course=group_of("course", groups, states) if program.follows_reference else (),
             interval=self.interval[runs],
             samples=self.samples,
-            gains={name: last[name] - first[name] for name in last},
             traces=traces,
         )
-
-
-def _totals(program: Program, parameters: Floats, states: Floats) -> dict[str, Floats]:
-    """Gas in the chambers and totals of each run, by channel."""
-    kind, groups, own = totals_kind(program), program.state_rows(), program.parameter_rows()
-    rows = [group_of(name, groups, states) for name in ("state", *kind.states)]
-    counted: Any = kind.function(*rows, *(group_of(name, own, parameters) for name in kind.parameters))
-    return dict(counted._asdict())
 
 
 def lacking(scenario: Scenario, kind: MetricKind) -> str:
@@ -199,27 +160,12 @@ def _meter_batch(plain: Batch, members: Members, request: Request) -> _MeteredBa
             f"traces every {request.every:.6g} s need an output interval that divides it in every run, not "
             f"{interval.max():.6g} s; give run.output_interval a value that does"
         )
-    late = _late_totals(plain, available)
-    traced = sorted({*read_from_traces, *request.bands, *late})
-    every_sample = bool(read_from_traces or (late and request.bands))
-    # Totals alone need no more than the first sample and the last.
-    trace_every = 1 if every_sample else stride if request.bands else max(1, plain.clock.samples - 1)
+    traced = sorted({*read_from_traces, *request.bands})
+    # Bands alone need the samples at which they are shown, metrics of traces every one.
+    trace_every = 1 if read_from_traces else stride
     batch = add_meters(plain, [meter for _, meter in meters], traced, trace_every if traced else 0)
-    band_stride = stride if every_sample else 1
-    return _MeteredBatch(batch, members, len(plain.states), available, interval, plain.clock.samples, band_stride, late)
-
-
-def _late_totals(plain: Batch, metrics: Mapping[str, MetricKind]) -> tuple[str, ...]:
-    """Paths of what totals are made of, where metrics need them and a run goes on after the last sample that counts."""
-    clock, program = plain.clock, plain.program
-    ends_there = clock.record_every * (clock.samples - 1) >= clock.step_count - SAME_MOMENT
-    needed = {channel for kind in metrics.values() for channel in kind.channels}
-    if ends_there or needed.isdisjoint(ThermalTotals._fields):
-        return ()
-    of_gas = (
-        path for name, row in rows_of(program.gas.groups(program), Role.STATE).items() for path in leaf_paths(row, name)
-    )
-    return (*_OF_STATE, *of_gas)
+    band_stride = stride if read_from_traces else 1
+    return _MeteredBatch(batch, members, len(plain.states), available, interval, plain.clock.samples, band_stride)
 
 
 def intervals(batch: Batch) -> Floats:

@@ -149,6 +149,15 @@ def test_gas_is_counted_to_the_last_sample_where_the_steps_go_on_after_it(
             )
 
 
+def test_gas_is_the_same_whatever_else_is_asked_for_where_samples_lie_inside_steps() -> None:
+    overrides = ("run.duration=0.048 s", "run.output_interval=0.8 ms", "run.step=0.7 ms")
+    base = load_scenario("step-response", overrides)
+    columns = {"supply.pressure": np.array([4e5, 4.5e5])}
+    alone_asked, with_others = (run_ensemble(base, columns, names) for names in (GAS[:1], (*GAS[:1], *METERS[:1])))
+    assert np.array_equal(alone_asked.metrics[GAS[0]], with_others.metrics[GAS[0]])
+    assert alone_asked.metrics[GAS[0]][1] == alone("step-response", overrides, columns, 1).metrics[GAS[0]].value
+
+
 SINE = ("reference.kind=sine", "reference.level=1 N m", "reference.frequency=1 Hz")
 
 

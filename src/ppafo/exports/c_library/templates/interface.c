@@ -32,7 +32,6 @@ static const struct {
 struct @name@_run {
     run_parameters parameters;
     run_states states;
-    run_states first;
     run_samples samples;
     double interval;       /* steps from one sample to the next */
     int64_t bytes;
@@ -168,7 +167,6 @@ static @name@_status begin_run(@name@_run *run, const @name@_settings *settings)
     memset(run, 0, sizeof(*run));
     run->parameters = prepared.parameters;
     run->states = prepared.states;
-    run->first = prepared.states;
     run->interval = prepared.counts.interval;
     run->steps = (int64_t)prepared.counts.steps;
     run->steps_per_sample = (int64_t)prepared.counts.steps_per_sample;

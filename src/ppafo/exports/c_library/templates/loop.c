@@ -53,5 +53,5 @@ void @name@_read_outputs(const @name@_run *run, @name@_outputs *outputs)
 
 void @name@_read_metrics(const @name@_run *run, @name@_metrics *given)
 {
-    metrics(&run->first, &run->states, &run->parameters, run->samples_taken, given);
+    metrics(&run->states, run->samples_taken, given);
 }

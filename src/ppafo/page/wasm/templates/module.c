@@ -181,11 +181,9 @@ static bool is_finite(const double *states, int64_t stride)
     return found;
 }
 
-static void read_metrics(const prepared_run *begun, double *states, int64_t samples, double *found)
+static void read_metrics(double *states, int64_t samples, double *found)
 {
-    prepared_run first = *begun;
-    metrics(array_of(first.states, STATES, 0, 0), array_of(states, STATES, 0, 0),
-        array_of(first.parameters, PARAMETERS, 0, 0), samples, array_of(found, METRICS, 0, 0));
+    metrics(array_of(states, STATES, 0, 0), samples, array_of(found, METRICS, 0, 0));
 }
 
 /* Run to the end or to where it fails, with the samples in columns ``count`` long. */
@@ -241,7 +239,7 @@ int32_t SHOWN(run)(const run_settings *settings, double *columns, double *found,
     const int32_t ended = status_of(run.prepared.states, 1);
     if (ended == COMPLETED) {
         *good = (int32_t)count;
-        read_metrics(&begun, run.prepared.states, count, found);
+        read_metrics(run.prepared.states, count, found);
         return COMPLETED;
     }
     const double failed = run.prepared.states[AT_RESULT_FAILURE_TIME];
@@ -316,7 +314,7 @@ static void judge_block(run_block *block, const run_clock *clock, const double *
         for (int64_t place = 0; place < STATES; ++place) {
             states[place] = block->states[place][lane];
         }
-        read_metrics(&block->prepared[lane], states, clock->samples, &wanted->metrics[member * METRICS]);
+        read_metrics(states, clock->samples, &wanted->metrics[member * METRICS]);
         for (int64_t channel = 0; channel < wanted->channels; ++channel) {
             double *own = &wanted->traces[(member * wanted->channels + channel) * wanted->places];
             for (int64_t place = 0; place < wanted->places && place * wanted->every < clock->samples; ++place) {

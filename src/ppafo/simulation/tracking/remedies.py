@@ -1,0 +1,188 @@
+"""Remedies of a loop that does not follow: changed numbers of its scenario, the likeliest first."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from ppafo.control import angle_loop, torque_loop
+from ppafo.control.kind import ControllerKind
+from ppafo.model.controlled import ANGLE, CONTROLLED
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import SonicOrifice
+from ppafo.report.display_units import metric_change, metric_level
+from ppafo.simulation.gains import settings_of, terms_of
+from ppafo.simulation.numbers import declared_numbers, number_at
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.rule import LARGEST_SHARE, SettledPart
+
+FASTEST_FIRST = (
+    torque_loop.PROPORTIONAL_GAIN,
+    torque_loop.BOUNDARY,
+    torque_loop.CONVERGENCE,
+    angle_loop.INNER_GAIN,
+    angle_loop.ANGLE_STIFFNESS,
+)
+"""Settings that set the speed of a loop; of a cascade the inner one first, on which the outer one relies."""
+SLOWER_ABOVE = frozenset((torque_loop.BOUNDARY,))
+"""Settings of which a larger value makes the loop slower."""
+_SAME_GAIN = 0.02
+"""Relative difference up to which two gains count as the same [-]."""
+_SLOPES = ("derivative_gain", "damping")
+"""Gains on the slope of the error, which the rules for a device leave at 0."""
+_STEP_OF_PAIR = 0.2
+"""Change of a pair during its dead time over the wanted change, which a smaller orifice aims at [-]."""
+_INTEGRAL_RATES = (0.1, 0.3)
+"""Rate of an integral of the angle error over the bandwidth of the angle loop [-]."""
+_TORQUE_OVER_FRICTION = 1.5
+"""Torque that a law should be able to request over the static friction that holds the joint [-]."""
+_KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
+"""Second number of an orifice, which a remedy hands on unchanged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Remedy:
+    """Numbers of a scenario [SI] by path with which the run might follow, and the text that names them."""
+
+    numbers: Mapping[str, float]
+    text: str
+
+
+def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
+    """Remedy with its text in the units of the device."""
+    declared = declared_numbers(scenario)
+    texts = (
+        f"`{path} = {level_text(declared[path].unit, number, scenario)}`"
+        for path, number in numbers.items()
+        if not path.endswith(_KEPT_OF_ORIFICE)
+    )
+    return Remedy(dict(numbers), " and ".join(texts))
+
+
+def level_text(unit: str, number: float, scenario: Scenario) -> str:
+    """Value in the unit a person is shown, for a number in a unit in SI; pressures count from the atmosphere."""
+    value, shown = metric_level(float(number), unit, float(scenario.device.supply.atmospheric_pressure))
+    return f"{value:.3g} {shown}".rstrip()
+
+
+def change_text(controlled: str, number: float) -> str:
+    """Difference of two values of what is controlled, in the unit a person is shown."""
+    value, unit = metric_change(number, CONTROLLED[controlled].difference)
+    return f"{value:.3g} {unit}"
+
+
+def speed_settings(scenario: Scenario, law: ControllerKind | None) -> dict[str, Quantity]:
+    """Settings of a law that set the speed of its loops, by the term they follow, the innermost loop first."""
+    if law is None:
+        return {}
+    items = {
+        term: quantity
+        for quantity in settings_of(scenario, law)
+        for term in FASTEST_FIRST
+        if term in quantity.follows and f"controller.{quantity.name}" in declared_numbers(scenario)
+    }
+    return {term: items[term] for term in FASTEST_FIRST if term in items}
+
+
+def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | None:
+    """Remedy that gives the first gain which is not the device's the device's value; None where all are."""
+    if law is None:
+        return None
+    terms, settings = terms_of(scenario, law), scenario.controller.settings
+    for term, quantity in speed_settings(scenario, law).items():
+        right = float(terms[term].number(lambda path: number_at(scenario, path)))
+        if abs(float(settings[quantity.name]) - right) <= _SAME_GAIN * right:
+            continue
+        slopes = {f"controller.{name}": 0.0 for name in _SLOPES if settings.get(name, 0.0) > 0.0}
+        rest = "".join(f" and `{path.rpartition('.')[2]} = 0`" for path in slopes)
+        text = f"for this device `{quantity.name} = {right:.3g} {quantity.unit}`{rest}"
+        return Remedy({f"controller.{quantity.name}": right, **slopes}, text)
+    return None
+
+
+def slower_loops(scenario: Scenario, law: ControllerKind, factors: Iterable[float]) -> tuple[Remedy, ...]:
+    """Remedies that make the innermost loop slower by each of some factors; none for a law without such a setting."""
+    first = speed_settings(scenario, law)
+    if not first:
+        return ()
+    term, quantity = next(iter(first.items()))
+    path, own = f"controller.{quantity.name}", float(scenario.controller.settings[quantity.name])
+    return tuple(remedy(scenario, {path: own * factor if term in SLOWER_ABOVE else own / factor}) for factor in factors)
+
+
+def larger_gains(scenario: Scenario, law: ControllerKind | None, factors: Iterable[float]) -> list[Remedy]:
+    """Remedies that make the innermost loop faster by each of some factors."""
+    first = list(speed_settings(scenario, law).values())[:1]
+    return [
+        remedy(scenario, {f"controller.{item.name}": float(scenario.controller.settings[item.name]) * factor})
+        for item in first
+        for factor in factors
+    ]
+
+
+def sized_valves(scenario: Scenario, factors: Iterable[float]) -> tuple[Remedy, ...]:
+    """Remedies with the orifice of the valve times each of some factors, in the form that it has."""
+    orifice = scenario.device.valve.orifice
+    if isinstance(orifice, SonicOrifice):
+        size, kept = ("sonic_conductance", orifice.sonic_conductance), ("critical_ratio", orifice.critical_ratio)
+    else:
+        size, kept = ("area", orifice.area), ("discharge_coefficient", orifice.discharge_coefficient)
+    return tuple(
+        remedy(scenario, {f"valve.{size[0]}": float(size[1]) * factor, f"valve.{kept[0]}": float(kept[1])})
+        for factor in factors
+    )
+
+
+def smaller_pair(scenario: Scenario, step: float) -> tuple[Remedy, ...]:
+    """Smaller orifices of a pair that changes what is controlled by a multiple of the wanted change at each switch."""
+    return sized_valves(scenario, (share / step for share in (_STEP_OF_PAIR, 0.5 * _STEP_OF_PAIR) if share < step))
+
+
+def torque_asked(scenario: Scenario, law: ControllerKind | None, error: float) -> float | None:
+    """Torque [N m] that a law with a stiffness requests at an angle error [rad]; None for another law."""
+    if scenario.controlled != ANGLE or law is None:
+        return None
+    if not any(angle_loop.ANGLE_STIFFNESS in quantity.follows for quantity in settings_of(scenario, law)):
+        return None
+    settings = scenario.controller.settings
+    return float(settings["angle_stiffness"]) * min(float(settings["error_limit"]), error)
+
+
+def stiffer_laws(
+    scenario: Scenario, holding: float, settled: SettledPart, others: Mapping[str, float] | None = None
+) -> list[Remedy]:
+    """Larger angle stiffnesses against a torque [N m] that works against the law, alone and with their damping.
+
+    ``others`` are numbers that change with them. Where the valve has a dead band, the last of them also come with a
+    torque gain that opens the valve beyond it.
+    """
+    settings = scenario.controller.settings
+    own, limit = float(settings["angle_stiffness"]), float(settings["error_limit"])
+    damping, band = float(settings.get("angle_damping", 0.0)), dead_band(scenario)
+    allowed = LARGEST_SHARE * settled.wanted
+    enough = (_TORQUE_OVER_FRICTION * holding / limit, 3.0 * holding / limit, holding / (0.8 * allowed))
+    found: list[dict[str, float]] = []
+    for stiffness in sorted(value for value in enough if value > own > 0.0):
+        given = {**(others or {}), "controller.angle_stiffness": stiffness}
+        found += [given, {**given, "controller.angle_damping": damping * math.sqrt(stiffness / own)}]
+    gain = float(settings.get("torque_gain", 0.0))
+    if band > 0.0 and gain > 0.0:
+        for numbers in found[-2:]:
+            needed = band / max(numbers["controller.angle_stiffness"] * allowed, 1.0e-9)
+            larger = (times * needed for times in (1.0, 2.0) if times * needed > gain)
+            found += [{**numbers, "controller.torque_gain": number} for number in larger]
+    return [remedy(scenario, numbers) for numbers in found]
+
+
+def integrals(scenario: Scenario) -> list[dict[str, float]]:
+    """Integral gains [N m/(rad s)] that take up a constant load within some periods of the angle loop."""
+    settings = scenario.controller.settings
+    if settings.get("angle_integral", math.nan) != 0.0 or settings.get("angle_damping", 0.0) <= 0.0:
+        return []
+    stiffness = float(settings["angle_stiffness"])
+    bandwidth = 2.0 * stiffness / float(settings["angle_damping"])
+    return [{"controller.angle_integral": rate * stiffness * bandwidth} for rate in _INTEGRAL_RATES]
+
+
+def dead_band(scenario: Scenario) -> float:
+    """Dead band of the valve [-], 0 for a valve without."""
+    return float(scenario.device.valve.settings.get("dead_band", 0.0))

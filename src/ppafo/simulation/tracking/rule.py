@@ -1,0 +1,210 @@
+"""Tracking rule: the numbers of the settled part of a run, the limits they are held to, and the kind of failure.
+
+The settled part is the second half of the hold, or of the run where the reference never rests. Errors count as a share
+of the change that is wanted: the largest reference from where the run starts, from 0 for a torque. Of a walk the
+samples count in which its controller requests a torque, and errors are a share of the RMS of that request.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ppafo.control.kind import ControllerKind
+from ppafo.metrics.command import asked_samples
+from ppafo.metrics.metric import Floats, extent, followed, hold_start
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
+from ppafo.metrics.tracking import SUSTAINED
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
+from ppafo.parameters.reach import torque_reach
+from ppafo.signals import Recording
+from ppafo.simulation.profiles import limits_of
+from ppafo.simulation.scenario import Scenario
+
+LARGEST_SHARE = 0.05
+"""Share of RMS error in the wanted change above which a law that opens the valve gradually does not follow [-]."""
+LARGEST_SHARE_SWITCHED = 0.25
+"""The same for a law that only switches, which swings about its reference by design [-]."""
+LARGEST_SHARE_MOVING = 0.2
+"""The same where the reference never rests or the joint is moved: every loop follows late [-]."""
+LARGEST_SHARE_WALK = 0.5
+"""RMS error of a walk over the RMS of the torque its controller requests [-]."""
+LARGEST_PEAK = 1.5
+"""Peak of the value over the wanted change [-]."""
+LARGEST_PEAK_WALK = 1.5
+"""Peak torque of a walk over the torque limit of its controller [-]."""
+MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
+"""Reversals of the command above which a loop oscillates."""
+SMALLEST_MOVE = 0.01
+"""Share of the wanted change below which the value does not move [-]."""
+SMALLEST_CHANGE = 0.05
+"""Smallest wanted change over the whole range of what is controlled [-]: smaller ones are judged as if so large."""
+SMALLEST_SIZE = 5.0e-4
+"""The same where the range is 0, in sizes of what is controlled (``Controlled.size``)."""
+
+REVERSALS = "command_reversals"
+"""Metric that counts reversals of the command."""
+_SHORTEST_HOLD = 0.1
+"""Share of a run that a hold must last to be judged as one [-]."""
+_MOVED_JOINT = 0.01
+"""Travel of a joint in the settled part that disturbs the loop of a torque or a pressure [rad]."""
+
+Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"]
+"""Kind of failure."""
+
+
+class SettledPart(NamedTuple):
+    """Numbers of the settled part of a run, in SI of what is controlled.
+
+    ``samples`` selects it in the recording and ``duration`` [s] is how long it lasts. ``wanted`` is the change wanted,
+    of a walk the RMS of the request; ``error`` is the RMS error, ``missing`` its mean and ``swing`` its standard
+    deviation; ``turns`` counts reversals of the error, 0 below ``SUSTAINED``. ``moved`` is the range of the value over
+    the run, ``peak`` its largest change in the wanted direction, 0 where that says nothing. ``rests`` where reference
+    and joint stand still; ``ends_on_ramp`` where the run ends before a monotone reference rests.
+    """
+
+    samples: slice | NDArray[np.bool_]
+    duration: float
+    wanted: float
+    error: float
+    missing: float
+    swing: float
+    turns: int
+    moved: float
+    peak: float
+    rests: bool
+    ends_on_ramp: bool = False
+
+    @property
+    def share(self) -> float:
+        """RMS error over the wanted change [-]."""
+        return self.error / self.wanted
+
+
+def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: float, stride_time: float = 0.0) -> float:
+    """Reversals of the command in a time [s] above which a loop oscillates; infinite for a law that may switch.
+
+    ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
+    """
+    # A law that requests openings between shut and open should not reverse.
+    if law is None or not scenario.motion.motion_kind.asks_gradually(law):
+        return math.inf
+    return duration * (MOST_PER_STRIDE / stride_time if stride_time > 0.0 else MOST_PER_SECOND)
+
+
+def settled_walk(recording: Recording) -> SettledPart | None:
+    """Settled part of a walk: the samples with a requested torque; None where none is requested."""
+    asked = asked_samples(recording)
+    reference, value = (series[asked] for series in followed(recording))
+    wanted = float(np.sqrt(np.mean(reference**2))) if reference.size else 0.0
+    if wanted == 0.0:
+        return None
+    error = value - reference
+    rms = float(np.sqrt(np.mean(error**2)))
+    return SettledPart(
+        samples=asked,
+        duration=float(np.ptp(recording.time[[0, -1]])),
+        wanted=wanted,
+        error=rms,
+        missing=float(np.mean(error)),
+        swing=rms,
+        turns=0,
+        moved=float(np.ptp(value)),
+        peak=float(np.max(np.abs(recording["torque"]))),
+        rests=False,
+    )
+
+
+def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
+    """Settled part of a task with a reference."""
+    reference, value = followed(recording)
+    time, count = recording.time, len(recording)
+    first = hold_start(recording)
+    rests = first is not None and time[-1] - time[first] >= _SHORTEST_HOLD * (time[-1] - time[0])
+    samples = slice((first + count) // 2 if rests and first is not None else count // 2, None)
+    error = (value - reference)[samples]
+    asked = extent(recording)
+    wanted = max(asked, _smallest_change(scenario))
+    # A joint that is moved disturbs the loop of a torque or a pressure all the time, as a moving reference does.
+    rests = rests and (scenario.controlled == ANGLE or float(np.ptp(recording["angle"][samples])) <= _MOVED_JOINT)
+    turns = reversals(np.asarray(error, dtype=np.float64), OSCILLATION_THRESHOLD * wanted)
+    return SettledPart(
+        samples=samples,
+        duration=float(time[-1] - time[samples][0]),
+        wanted=wanted,
+        error=float(np.sqrt(np.mean(error**2))),
+        missing=float(np.mean(error)),
+        swing=float(np.std(error)),
+        turns=turns if turns >= SUSTAINED else 0,
+        moved=float(np.ptp(value)),
+        peak=_peak(scenario, reference, value) if asked >= wanted else 0.0,
+        rests=rests,
+        ends_on_ramp=not rests and first is None and _is_monotone(reference),
+    )
+
+
+def _peak(scenario: Scenario, reference: Floats, value: Floats) -> float:
+    """Largest change of the value in the direction of the reference, once it has met that."""
+    start = 0.0 if scenario.controlled == TORQUE else float(value[0])
+    ahead = reference - start
+    sign = math.copysign(1.0, float(ahead[int(np.argmax(np.abs(ahead)))]))
+    # What a joint has at the start, such as the torque of its material, is not the loop's.
+    met = int(np.argmax((value - reference) * sign <= 0.0))
+    return float(np.max((value[met:] - start) * sign))
+
+
+def _is_monotone(reference: Floats) -> bool:
+    steps = np.diff(reference)
+    return bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
+
+
+def _smallest_change(scenario: Scenario) -> float:
+    """Smallest change that is judged, from the range of what is controlled."""
+    kind, device = CONTROLLED[scenario.controlled], scenario.device
+    if kind.name == TORQUE:
+        lowest, highest = torque_reach(device, 0.5 * (device.actuator.angle_min + device.actuator.angle_max))
+    else:
+        limits = limits_of(device, kind)
+        lowest, highest = float(limits.lowest), float(limits.highest)
+    # A torque or a difference of pressures goes from 0 to one end of its range.
+    one_way = 0.5 if kind.name in (TORQUE, "pressure_difference") else 1.0
+    return max(SMALLEST_CHANGE * one_way * abs(highest - lowest), SMALLEST_SIZE * kind.size)
+
+
+def failure_of_walk(settled: SettledPart, is_restless: bool, torque_limit: float) -> Failure | None:
+    """Kind of failure of a walk, whose controller requests no more than a limit [N m]; None where it follows.
+
+    ``is_restless`` says that its command reverses too often; a limit of 0 is none.
+    """
+    if is_restless:
+        return "oscillates"
+    if torque_limit > 0.0 and settled.peak > LARGEST_PEAK_WALK * torque_limit:
+        return "overshoots"
+    return "does not follow" if settled.share > LARGEST_SHARE_WALK else None
+
+
+def failure_of_task(settled: SettledPart, is_restless: bool, only_switches: bool) -> Failure | None:
+    """Kind of failure of a task; None where the controlled quantity follows its reference.
+
+    ``is_restless`` says that the command reverses too often, ``only_switches`` that the law knows no gradual opening.
+    """
+    most = LARGEST_SHARE_SWITCHED if only_switches else LARGEST_SHARE if settled.rests else LARGEST_SHARE_MOVING
+    if settled.share > LARGEST_SHARE and settled.moved <= SMALLEST_MOVE * settled.wanted:
+        return "does not move"
+    # A run that ends on its ramp has no settled part: every loop is behind there.
+    is_off = settled.share > most and not settled.ends_on_ramp
+    if only_switches:
+        swings = is_off and settled.swing > abs(settled.missing)
+    else:
+        swings = settled.turns > 0 and (settled.rests or is_off)
+    if is_restless or swings:
+        return "oscillates"
+    overshoots = settled.peak > LARGEST_PEAK * settled.wanted and settled.rests and not only_switches
+    return "does not follow" if is_off else "overshoots" if overshoots else None
+
+
+def torque_limit(settings: Mapping[str, float]) -> float:
+    """Largest torque [N m] that the controller of a walk requests; 0 where it has no limit."""
+    return float(settings.get("largest_torque", 0.0))

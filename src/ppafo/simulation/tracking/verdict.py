@@ -1,0 +1,217 @@
+"""Verdict on a run: whether what is controlled follows its reference, what hinders it, and what was seen to help."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ppafo.control.kind import ControllerKind
+from ppafo.errors import PpafoError
+from ppafo.metrics.metric import has_reference
+from ppafo.model.controlled import CONTROLLED
+from ppafo.signals import Recording
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.causes import Case, cause_of_task, torque_beyond_reach
+from ppafo.simulation.tracking.remedies import Remedy, change_text
+from ppafo.simulation.tracking.rule import (
+    LARGEST_SHARE,
+    REVERSALS,
+    Failure,
+    SettledPart,
+    failure_of_task,
+    failure_of_walk,
+    most_reversals,
+    settled_task,
+    settled_walk,
+    torque_limit,
+)
+from ppafo.simulation.tracking.walk_causes import cause_of_walk
+from ppafo.units.shown import in_units, units_in_force
+
+if TYPE_CHECKING:
+    from ppafo.simulation.at_hand import Recorded
+
+MOST_TRIED = 12
+"""Remedies that are tried side by side."""
+_STRIDES_TRIED = 8.0
+"""Strides of a walk with which a remedy is tried: the first ones, in which a controller learns, are not judged."""
+_FEWEST_SAMPLES = 8
+"""Samples of a recording below which nothing is judged."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tracking:
+    """Verdict on a run whose controlled quantity does not follow its reference.
+
+    ``error`` and ``wanted`` are the RMS error of the settled part and the change wanted, ``missing`` the mean error,
+    ``moved`` how far the value went, all in SI of what is ``controlled``. ``reversals`` are the command's ``per``
+    stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``tried`` what
+    did; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one.
+    """
+
+    kind: Failure
+    controlled: str
+    error: float
+    wanted: float
+    missing: float
+    moved: float
+    reversals: float
+    per: str
+    cause: str
+    advice: str
+    remedies: tuple[Remedy, ...] = ()
+    accepted: str = ""
+    tried: str = ""
+    at_rest: bool = True
+    units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
+
+    @property
+    def rests(self) -> bool:
+        """True where nearly the same error is left for all of the settled part."""
+        return abs(self.missing) > 0.9 * self.error
+
+    @property
+    def is_useless(self) -> bool:
+        """False where the scenario itself says that its reference lies beyond reach."""
+        return not self.accepted
+
+    @property
+    @in_units(lambda tracking: tracking.units)
+    def sentence(self) -> str:
+        """Verdict in one line."""
+        return f"{self._found}; {self.cause}{self._help}"
+
+    @property
+    def _found(self) -> str:
+        words = CONTROLLED[self.controlled].words
+        error, wanted, moved = (change_text(self.controlled, each) for each in (self.error, self.wanted, self.moved))
+        plain_error, plain_moved = error.partition(" ")[0], moved.partition(" ")[0]
+        if self.kind == "does not move":
+            return f"the {words} loop does not move: {plain_moved} of {wanted} wanted"
+        if self.kind == "oscillates":
+            often = f"{self.reversals:.3g} reversals a {self.per}"
+            return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted"
+        if self.kind == "overshoots":
+            return f"the {words} overshoots: {plain_moved} of {wanted} wanted at most"
+        if self.rests and self.at_rest:
+            missing = change_text(self.controlled, abs(self.missing))
+            side = "below" if self.missing < 0.0 else "above"
+            return f"the {words} stays {missing} {side} its reference, of {wanted} wanted"
+        return f"the {words} does not follow its reference: RMS {plain_error} of {wanted} wanted"
+
+    @property
+    def _help(self) -> str:
+        if self.accepted:
+            return f"; on purpose: {self.accepted}"
+        if self.tried:
+            return f"; {self.tried}"
+        if self.remedies:
+            return f": {' or '.join(remedy.text for remedy in self.remedies[:2])}"
+        return f"; {self.advice}" if self.advice else ""
+
+
+def tracking_in(result: "Recorded") -> Tracking | None:
+    """Verdict on a result; None where it follows its reference, or has none."""
+    scenario, metrics = result.scenario, {name: metric.value for name, metric in result.metrics.items()}
+    strides, time = metrics.get("strides", 0.0), result.recording.time
+    stride_time = float(time[-1] - time[0]) / strides if strides > 0.0 else 0.0
+    return tracking_of(scenario, scenario.law, result.recording, metrics.get(REVERSALS, 0.0), stride_time)
+
+
+@in_units(lambda scenario, *_, **__: scenario.device.shown)
+def tracking_of(
+    scenario: Scenario, law: ControllerKind | None, recording: Recording, reversals: float, stride_time: float = 0.0
+) -> Tracking | None:
+    """Verdict on a recording whose command reversed so often; None where it follows its reference, or has none.
+
+    ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
+    """
+    if not has_reference(recording) or len(recording) < _FEWEST_SAMPLES or scenario.controller.is_open_loop:
+        return None
+    is_task = scenario.follows_reference
+    settled = settled_task(scenario, recording) if is_task else settled_walk(recording)
+    if settled is None:
+        return None
+    duration = float(np.ptp(recording.time[[0, -1]]))
+    is_restless = reversals > most_reversals(scenario, law, duration, stride_time)
+    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
+    if is_task:
+        failure = failure_of_task(settled, is_restless, law is not None and law.only_switches)
+    else:
+        failure = failure_of_walk(settled, is_restless, limit)
+    case = Case(scenario, law, recording, settled, failure == "oscillates")
+    # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
+    if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
+        failure = "does not follow" if torque_beyond_reach(case) is not None else None
+    if failure is None:
+        return None
+    cause = cause_of_task(case) if is_task else cause_of_walk(case)
+    return Tracking(
+        kind=failure,
+        controlled=scenario.controlled,
+        error=settled.error,
+        wanted=limit if failure == "overshoots" and not is_task else settled.wanted,
+        missing=settled.missing,
+        moved=settled.peak if failure == "overshoots" else settled.moved,
+        reversals=_rate(settled, is_restless, reversals / duration) * (stride_time if stride_time > 0.0 else 1.0),
+        per="stride" if stride_time > 0.0 else "second",
+        cause=cause.text,
+        advice=cause.advice,
+        remedies=cause.remedies,
+        accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
+        at_rest=settled.rests,
+    )
+
+
+def _rate(settled: SettledPart, is_restless: bool, of_command: float) -> float:
+    """Reversals a second of the value where these fail, else of the command."""
+    return settled.turns / settled.duration if settled.turns and not is_restless else of_command
+
+
+def tried(scenario: Scenario, verdict: Tracking | None) -> Tracking | None:
+    """Verdict with the first of its remedies that lets the run follow, from runs with each, side by side.
+
+    A walk is tried on its first strides. Without such a remedy it is the one that leaves the least error, if that is
+    less than half.
+    """
+    if verdict is None or verdict.accepted or not verdict.remedies:
+        return verdict
+    from ppafo.simulation.simulate import simulate_many
+
+    changed: list[tuple[Remedy, Scenario]] = []
+    for remedy in verdict.remedies[:MOST_TRIED]:
+        try:
+            changed.append((remedy, _on_trial(with_numbers(scenario, remedy.numbers))))
+        except PpafoError:
+            continue
+    try:
+        results = simulate_many([candidate for _, candidate in changed])
+    except PpafoError:
+        return verdict
+    best: tuple[Remedy, float] | None = None
+    for (remedy, _), result in zip(changed, results, strict=True):
+        if not result.status.is_completed:
+            continue
+        left = result.tracking
+        if left is None:
+            return replace(verdict, tried=f"with {remedy.text} it does, as a further run shows")
+        if left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
+            best = (remedy, left.error)
+    if best is not None:
+        error = change_text(verdict.controlled, best[1])
+        return replace(verdict, tried=f"with {best[0].text} an RMS error of {error} is left, as a further run shows")
+    names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
+    advice = f"{verdict.advice}; " if verdict.advice else ""
+    return replace(verdict, tried=f"{advice}other {names} alone did not mend it")
+
+
+def _on_trial(scenario: Scenario) -> Scenario:
+    """Scenario with which a remedy is tried: a task as it is, a walk of some strides."""
+    duration = _STRIDES_TRIED * scenario.motion.stride_time
+    if scenario.follows_reference or not 0.0 < duration < scenario.run.duration:
+        return scenario
+    # A whole number of steps and samples, as the walk itself has.
+    interval = scenario.run.output_interval
+    return replace(scenario, run=replace(scenario.run, duration=round(duration / interval) * interval))

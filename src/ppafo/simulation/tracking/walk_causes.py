@@ -1,0 +1,95 @@
+"""Causes of a walk whose torque does not follow what its controller requests, the surest cause first."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ppafo.metrics.metric import followed
+from ppafo.parameters.reach import static_torque, supply_for, torque_reach
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.tracking.causes import Case, Cause, gains_of_another_device, oscillation
+from ppafo.simulation.tracking.remedies import level_text, remedy, sized_valves
+
+_OFTEN = 0.1
+"""Share of the time with a request that is often [-]."""
+_ANGLES_OF_WALK = 400
+"""Samples of a walk at which the reach is compared with the request."""
+
+
+def cause_of_walk(case: Case) -> Cause:
+    """First cause that applies to a walk."""
+    return next(cause for find in _OF_WALK if (cause := find(case)) is not None)
+
+
+def _request_beyond_reach(case: Case) -> Cause | None:
+    """The controller of a walk often requests more torque than the actuator gives at the angle of that moment."""
+    scenario, samples = case.scenario, case.settled.samples
+    device, torque = scenario.device, static_torque(scenario.device)
+    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    places = np.unique(np.linspace(0, angle.size - 1, _ANGLES_OF_WALK).astype(np.intp))
+    reaches = np.array([torque_reach(device, float(angle[place]), torque) for place in places])
+    above, below = reference[places] - reaches[:, 1], reaches[:, 0] - reference[places]
+    share = float(np.mean((above > 0.0) | (below > 0.0)))
+    if share <= _OFTEN:
+        return None
+    most = [level_text("N m", float(np.max(np.abs(numbers))), scenario) for numbers in (reaches, reference)]
+    text = (
+        f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, {most[0]} "
+        f"at most of {most[1]} asked for"
+    )
+    numbers: dict[str, float] = {}
+    for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
+        place = places[int(np.argmax(lacking))]
+        needed = (
+            supply_for(device, float(angle[place]), 1.05 * float(reference[place])) if lacking.max() > 0.0 else None
+        )
+        if needed is not None:
+            numbers[path] = needed
+    remedies = [remedy(scenario, numbers)] if numbers else []
+    if scenario.controller.settings.get("largest_torque", 0.0) > 0.0:
+        least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
+        if least > 0.0:
+            remedies.append(remedy(scenario, {"controller.largest_torque": least}))
+    return Cause(text, tuple(remedies), "take a higher `supply.pressure` or ask for less", is_beyond_reach=True)
+
+
+def _valve_of_walk(case: Case) -> Cause | None:
+    """The valve of a walk is fully open often: too small for the speed of the joint."""
+    if case.oscillates or case.only_switches or case.fully_open <= _OFTEN:
+        return None
+    text = (
+        f"its valve is fully open for {100.0 * case.fully_open:.0f} % of the time: it is too small for how quickly the "
+        "gait turns the joint"
+    )
+    return Cause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "take a larger valve")
+
+
+def _speed_of_gait(case: Case) -> Cause:
+    """The gait turns the joint faster than the loop of a walk follows."""
+    scenario = case.scenario
+    volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
+    remedies = [] if case.law is None else [*sized_valves(scenario, (0.5, 2.0))]
+    remedies += [
+        remedy(scenario, {path: factor * number for path, number in volumes.items()})
+        for factor in (2.0, 4.0)
+        if min(volumes.values()) > 0.0
+    ]
+    return Cause(
+        "the gait turns the joint more quickly than its loop follows",
+        tuple(remedies),
+        "take larger dead volumes or a quicker valve",
+    )
+
+
+def _oscillation_of_walk(case: Case) -> Cause | None:
+    return oscillation(case) if case.oscillates else None
+
+
+_OF_WALK: tuple[Callable[[Case], Cause | None], ...] = (
+    _request_beyond_reach,
+    _oscillation_of_walk,
+    _valve_of_walk,
+    gains_of_another_device,
+    _speed_of_gait,
+)
+"""Causes of a walk, the surest first; the last one always applies."""
