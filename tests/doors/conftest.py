@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
@@ -14,6 +13,15 @@ from tests.page_code import write_package
 
 EXAMPLES = ROOT / "src" / "ppafo" / "examples"
 PACKAGES = {"add-an-actuator": "my_actuators.muscle_pair", "add-a-controller": "my_laws.hysteresis"}
+
+
+@pytest.fixture(scope="module")
+def quick_units() -> Iterator[None]:
+    """Build units by gcc without optimisation: the quickest way, and strict arithmetic has the same bits."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(platforms, "compiler_for", lambda _name: ["gcc"])
+        patch.setattr(platforms, "FLAGS", ("-std=c99", "-O0", "-ffp-contract=off", "-fwrapv"))
+        yield
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -30,12 +30,17 @@ ALLOWED_AT_ZERO = 1.0e-15
 _MARKS = {"short": ("short",), "long": ("long",), "thorough": ("long", "thorough")}
 
 
+def parameter(case: Case, *more: Any, suite: str = "") -> Any:
+    """A case, and what else a test of it is given, with the marks of its suite or of another one."""
+    name = ", ".join([case.name, *map(str, more)])
+    return pytest.param(
+        case, *more, id=name, marks=[getattr(pytest.mark, mark) for mark in _MARKS[suite or case.suite]]
+    )
+
+
 def parameters(cases: Sequence[Case] = CASES) -> list[Any]:
     """Cases as parameters of a test, with the marks of their suites."""
-    return [
-        pytest.param(case, id=case.name, marks=[getattr(pytest.mark, mark) for mark in _MARKS[case.suite]])
-        for case in cases
-    ]
+    return list(map(parameter, cases))
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,17 @@ def assert_same_channels(found: Mapping[str, Floats], answer: Answer, but: Seque
         else f"{len(found[name])} samples for {len(answer.time)}"
         for name in shared
         if np.asarray(found[name]).tobytes() != answer.channels[name].tobytes()
+    }
+    assert not differ, differ
+
+
+def assert_near_channels(found: Mapping[str, Floats], answer: Answer, share: float) -> None:
+    """Every channel that Python has too differs by at most a share of its range."""
+    differ = {
+        name: (float(np.abs(values - expected).max()), float(np.ptp(expected)))
+        for name, values in found.items()
+        if (expected := answer.channels.get(name)) is not None
+        and np.abs(values - expected).max() > share * np.ptp(expected)
     }
     assert not differ, differ
 

@@ -102,7 +102,11 @@ VANE_FEATURES: dict[str, Feature] = {
     ),
     "coil heating": _feature(
         *_SOLENOID,
-        *("valve.opening_delay=3.3 ms", "effects.coil_heating.steady_rise=60 K", "effects.coil_heating.time_constant=1 s"),
+        *(
+            "valve.opening_delay=3.3 ms",
+            "effects.coil_heating.steady_rise=60 K",
+            "effects.coil_heating.time_constant=1 s",
+        ),
         "effects.coil_heating.pull_in_share=0.5",
         needs="valve law",
     ),
@@ -111,7 +115,9 @@ VANE_FEATURES: dict[str, Feature] = {
     "thermal gas": _feature(*_THERMAL),
     "supply lines": _feature(*_LINES),
     "relieving regulators": _feature("supply.relieving=true", "initial.pressure_1=70 psi_g"),
-    "line resistance": _feature("effects.line_resistance.area=6 mm^2", "effects.line_resistance.discharge_coefficient=0.6"),
+    "line resistance": _feature(
+        "effects.line_resistance.area=6 mm^2", "effects.line_resistance.discharge_coefficient=0.6"
+    ),
     "second virial": _feature("effects.second_virial.share=1", "effects.second_virial.coefficient=-1e-5 m^3/mol"),
     "silencer": _feature("effects.silencer.sonic_conductance=2e-9 m^3/(s Pa)", "initial.pressure_2=40 psi_g"),
     "ice": _feature(
@@ -121,9 +127,7 @@ VANE_FEATURES: dict[str, Feature] = {
     "laminar leak": _feature("effects.laminar_leak.coefficient=1e-16 kg/(s Pa^2)"),
     # The joint.
     "free": _feature(*_FREE, "motion.angular_velocity=100 deg/s", "motion.external_torque=1 N m", needs="motion"),
-    "impact": _feature(
-        *_FREE, "motion.angular_velocity=2000 deg/s", "actuator.restitution=0.4", needs="motion"
-    ),
+    "impact": _feature(*_FREE, "motion.angular_velocity=2000 deg/s", "actuator.restitution=0.4", needs="motion"),
     "joint load": _feature(
         *_FREE,
         *("effects.joint_load.drag=0.01 N m s^2/rad^2", "effects.joint_load.stiffness=2 N m/rad"),
@@ -132,7 +136,10 @@ VANE_FEATURES: dict[str, Feature] = {
     ),
     "seal friction": _feature(
         *_FREE,
-        *("effects.seal_friction.static_per_pressure=2e-6 N m/Pa", "effects.seal_friction.dynamic_per_pressure=1e-6 N m/Pa"),
+        *(
+            "effects.seal_friction.static_per_pressure=2e-6 N m/Pa",
+            "effects.seal_friction.dynamic_per_pressure=1e-6 N m/Pa",
+        ),
         needs="motion",
     ),
     "Stribeck": _feature(*_FREE, "effects.stribeck.velocity=1 rad/s", "effects.stribeck.share=0.5", needs="motion"),
@@ -188,7 +195,10 @@ VANE_FEATURES: dict[str, Feature] = {
     # References.
     "constant reference": _feature("reference.kind=constant", needs="reference"),
     "sine": _feature(
-        "reference.kind=sine", "reference.level=2 N m", "reference.amplitude=2 N m", "reference.frequency=10 Hz",
+        "reference.kind=sine",
+        "reference.level=2 N m",
+        "reference.amplitude=2 N m",
+        "reference.frequency=10 Hz",
         needs="reference",
     ),
     "table": _feature("reference.kind=tabulated", *_KNOTS, needs="reference"),
@@ -227,7 +237,12 @@ WALK_FEATURES: dict[str, Feature] = {
     "ice": _feature("effects.ice.blockage_per_gas=1e4 1/kg", "effects.ice.melting_time=30 ms"),
     "joint load": _feature("effects.joint_load.drag=0.01 N m s^2/rad^2", "effects.joint_load.stiffness=1 N m/rad"),
     "noise": _feature(
-        *("sensors.angle_noise=0.3 deg", "sensors.pressure_noise=0.3 psi_d", "sensors.force_noise=5 N", "sensors.seed=5"),
+        *(
+            "sensors.angle_noise=0.3 deg",
+            "sensors.pressure_noise=0.3 psi_d",
+            "sensors.force_noise=5 N",
+            "sensors.seed=5",
+        ),
     ),
     "resolution": _feature(
         *("sensors.angle_resolution=0.5 deg", "sensors.pressure_resolution=0.2 psi_d", "sensors.force_resolution=2 N"),
@@ -260,7 +275,9 @@ WALK_FEATURES: dict[str, Feature] = {
     "damped": _feature("controller.kind=damped_proportional", needs="law"),
     "heel frozen": _fault("heel", "frozen", "period=0.1 s", time="0.1 s"),
     "heel stuck": _fault("heel", "stuck", "reading=300 N"),
-    "heel distorted": _fault("heel", "distorted", "lag=20 ms", "lost_share=0.2", "delay=7.3 ms", "crosstalk=0.3", "offset=20 N"),
+    "heel distorted": _fault(
+        "heel", "distorted", "lag=20 ms", "lost_share=0.2", "delay=7.3 ms", "crosstalk=0.3", "offset=20 N"
+    ),
     "toe frozen": _fault("toe", "frozen"),
     "toe stuck": _fault("toe", "stuck", "reading=300 N"),
     "toe distorted": _fault("toe", "distorted", "gain=0.8", "drift=100 N/s", "delay=4 ms"),
@@ -314,6 +331,11 @@ class Case:
     def walks(self) -> bool:
         """Whether it is a walk, and no vane alone."""
         return self.scenario in list_walks()
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it has the program of a shipped scenario or walk, whatever its times are."""
+        return all(text.startswith(("run.", "controller.rate")) for text in self.texts)
 
     @property
     def leaves(self) -> bool:
@@ -445,8 +467,13 @@ NOT_EXPORTED: dict[str, Case] = {
 
 _ALL = ((VANE_BASE, VANE_FEATURES), (WALK_BASE, WALK_FEATURES))
 GROUPS = tuple(case for base, features in _ALL for case in _groups(base, features))
+_IN_GROUPS = {case.name for case in GROUPS}
 ALONE = tuple(
-    _joined("thorough", base, {name: feature}) for base, features in _ALL for name, feature in features.items()
+    case
+    for base, features in _ALL
+    for name, feature in features.items()
+    # Where none goes with it a feature is alone in its group.
+    if (case := _joined("thorough", base, {name: feature})).name not in _IN_GROUPS
 )
 PAIRS = tuple(case for base, features in _ALL for case in _pairs(base, features))
 CASES = (*SHORT, *SHIPPED, *OBJECTS, *GROUPS, *ALONE, *PAIRS)

@@ -7,15 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.exports.fmu import platforms
+from ppafo.engine.run import whole_and_rest
 from ppafo.exports.fmu.interface import plant_alone
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
 from ppafo.running import simulate
-from ppafo.simulation.scenario import PrescribedMotion
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from scripts.instances import Instance
-from tests.doors.of_python import Floats, answer_of, assert_same_channels, parameters, run_by, scenario_of
-from tests.doors.table import CASES, Case
+from tests.doors.of_python import (
+    Floats,
+    answer_of,
+    assert_near_channels,
+    assert_same_channels,
+    parameters,
+    run_by,
+    scenario_of,
+)
+from tests.doors.table import Case
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
 pytestmark = [
@@ -24,11 +32,21 @@ pytestmark = [
 ]
 
 
-@pytest.fixture
-def _quick_units(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Build units by gcc without optimisation."""
-    monkeypatch.setattr(platforms, "compiler_for", lambda _name: ["gcc"])
-    monkeypatch.setattr(platforms, "FLAGS", ("-std=c99", "-O0", "-ffp-contract=off", "-fwrapv"))
+ALLOWED = 1.0e-3
+"""Share of the range of a channel by which a plant may differ that has other steps than the loop, or another path."""
+
+
+def has_other_steps(scenario: Scenario) -> bool:
+    """Whether the plant alone cannot have the steps of the closed loop.
+
+    An ankle that is led has the path between two samples from the inputs of the first. And where sensors look inside a
+    step, the loop ends a part there; no sensor looks at a plant alone.
+    """
+    motion = scenario.motion
+    is_led = isinstance(motion, PrescribedMotion) and motion.locked_angle is None
+    run, _ = scenario.motion.motion_kind.plan(scenario)
+    _, lag = whole_and_rest(run.signal_delay, run.step)
+    return is_led or lag > 0.0
 
 
 def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, Floats]:
@@ -49,7 +67,7 @@ def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, 
     return dict(zip(names, np.array(rows).T, strict=True))
 
 
-@pytest.mark.usefixtures("_quick_units")
+@pytest.mark.usefixtures("quick_units")
 @pytest.mark.parametrize("case", parameters())
 def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_path: Path) -> None:
     scenario = scenario_of(case)
@@ -59,4 +77,7 @@ def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_
     ((name, content),) = functional_unit(plant, 2, ["linux64"]).items()
     (tmp_path / name).write_bytes(content)
     found = replayed(str(tmp_path / name), answer.time, dict(answer.channels))
-    assert_same_channels(found, answer)
+    if has_other_steps(scenario):
+        assert_near_channels(found, answer, ALLOWED)
+    else:
+        assert_same_channels(found, answer)

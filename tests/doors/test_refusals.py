@@ -79,7 +79,7 @@ def test_a_library_names_the_setting_that_python_names(
 
 
 @pytest.fixture(scope="module")
-def unit(tmp_path_factory: pytest.TempPathFactory) -> str:
+def unit(quick_units: None, tmp_path_factory: pytest.TempPathFactory) -> str:
     """The unit of FMI 2."""
     ((name, content),) = functional_unit(closed_loop(load_scenario(VANE_BASE)), 2, ["linux64"]).items()
     file = tmp_path_factory.mktemp("unit") / name

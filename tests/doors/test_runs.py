@@ -1,4 +1,4 @@
-"""The doors of Python: compiled code, an ensemble, a result that was stored and read again, and one that was pickled."""
+"""The doors of Python: compiled code, an ensemble, a result that was stored and read again, one that was pickled."""
 
 import json
 import math
