@@ -15,6 +15,7 @@ from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.graph import outside
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMotion, ProfileChoice, Scenario, Sensors
@@ -197,10 +198,11 @@ _EXAMPLE = 0.5
 
 
 def _half_open(scenario: Scenario) -> Scenario:
-    """Return the run of the example by Python: the plant for a tenth of a second under a constant command."""
+    """Return the run of the example by Python: the plant for a tenth of a second or longer under a constant command."""
     plant = _commanded(scenario.motion, scenario)
     command = replace(plant.controller, settings={"command": _EXAMPLE})
-    return replace(plant, controller=command, run=replace(plant.run, duration=0.1))
+    duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)
+    return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
 
 def surfaced(alone: PlantAlone) -> PlantAlone:
