@@ -95,9 +95,13 @@ def peak_torque(recording: Recording) -> float:
 
 
 class Asked(NamedTuple):
-    """Squared torque errors [N^2 m^2] of the samples in which a controller of walking asks for a torque; how many."""
+    """Sums over the samples in which a controller of walking asks for a torque, and how many these are.
+
+    Squared torque errors and squared requested torques [N^2 m^2].
+    """
 
     squares: float
+    requested: float
     samples: float
 
 
@@ -108,13 +112,17 @@ def is_asked(command: float, task: float) -> bool:
 
 def start_asked(_course: Course, _sample: Sample) -> Asked:
     """Nothing is asked for before a walk."""
-    return Asked(0.0, 0.0)
+    return Asked(0.0, 0.0, 0.0)
 
 
 def update_asked(state: Asked, _course: Course, sample: Sample) -> Asked:
     """One sample more, where a torque is asked for."""
     error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
-    return Asked(state.squares + (error * error if counts else 0.0), state.samples + (1.0 if counts else 0.0))
+    return Asked(
+        state.squares + (error * error if counts else 0.0),
+        state.requested + (sample.reference * sample.reference if counts else 0.0),
+        state.samples + (1.0 if counts else 0.0),
+    )
 
 
 ASKED = MeterKind("asked", Asked, start_asked, update_asked)
@@ -135,6 +143,12 @@ def torque_error(recording: Recording) -> float | None:
     return float(np.sqrt(np.mean((recording["reference"] - recording["torque"])[asked] ** 2)))
 
 
+def requested_torque(recording: Recording) -> float | None:
+    """RMS of the torque that a walk's controller requests [N m], where it requests one; None where it never does."""
+    asked = asked_samples(recording)
+    return float(np.sqrt(np.mean(recording["reference"][asked] ** 2))) if asked.any() else None
+
+
 def root_mean(squares: Floats, samples: Floats) -> Floats:
     """Root of a mean of squares; nan for none (runs,)."""
     found: Floats = root(choose(samples > 0.0, squares / larger(samples, 1.0), math.nan))
@@ -149,6 +163,16 @@ METRICS = (
         (),
         None,
         ReadAt(("meters.asked.squares", "meters.asked.samples"), root_mean),
+        (ASKED,),
+        needs=(WALK, REQUESTED),
+    ),
+    MetricKind(
+        "requested_torque",
+        "N m",
+        "RMS of requested torque where the controller requests one",
+        (),
+        None,
+        ReadAt(("meters.asked.requested", "meters.asked.samples"), root_mean),
         (ASKED,),
         needs=(WALK, REQUESTED),
     ),

@@ -1,6 +1,5 @@
 """Runs of a scenario over columns of values: numbers in, metrics out, one table that grows."""
 
-import math
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, final
@@ -13,10 +12,14 @@ from ppafo.metrics import METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.progress import Progress, Report
 from ppafo.running import most_reversals
+from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
+from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking import REVERSALS
+from ppafo.simulation.tracking.metered import following, needed_metrics
+from ppafo.simulation.tracking.rule import REVERSALS, smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import check_metrics
 
@@ -155,16 +158,25 @@ def failures_of(rows: Rows) -> int:
 def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ...]:
     """Return metrics with those that a judgement needs beside them, where the scenario offers them.
 
-    A metric at one instant needs oscillations of what is controlled, and each of them how often the command turns.
+    A metric at one instant needs oscillations of what is controlled, and the verdict on tracking its own metrics.
     """
-    wanted = (*metrics, REVERSALS) if judges_loop(scenario) else tuple(metrics)
     companions = [name for metric in metrics for name in ONE_INSTANT.get(metric, ())]
-    return tuple(dict.fromkeys((*wanted, *(name for name in companions if not lacking(scenario, METRICS[name])))))
+    offered = (name for name in (*companions, *needed_metrics(scenario)) if not lacking(scenario, METRICS[name]))
+    return tuple(dict.fromkeys((*metrics, *offered)))
 
 
-def judges_loop(scenario: Scenario) -> bool:
-    """Return whether it is known of a scenario's runs that their torque loop oscillates."""
-    return math.isfinite(most_reversals(scenario)) and not lacking(scenario, METRICS[REVERSALS])
+def follows(
+    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
+) -> Floats:
+    """Return whether metered runs follow their reference (runs,): 1, 0, or nan where that is not known.
+
+    ``columns`` are the values of the runs by path, of which those in ``gauge`` count from the atmosphere.
+    """
+    if not set(needed_metrics(scenario)) & set(rows):
+        return np.full(next(iter(rows.values())).size, np.nan)
+    varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
+    least = smallest_change(scenario) if scenario.follows_reference else 0.0
+    return following(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:

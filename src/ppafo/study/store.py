@@ -18,7 +18,7 @@ from ppafo.running import most_reversals
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.ensemble import EnsembleResult, run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
-from ppafo.simulation.tracking import REVERSALS
+from ppafo.simulation.tracking.rule import REVERSALS
 from ppafo.storage.parquet import (
     TableColumn,
     encode_texts,
@@ -33,7 +33,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.study import Configuration, Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
-from ppafo.study.runs import unvaried, with_companions
+from ppafo.study.runs import follows, unvaried, with_companions
 from ppafo.study.sent_plugins import SentPlugin, take_plugins
 
 if TYPE_CHECKING:
@@ -150,8 +150,8 @@ def stored_rows(location: Place, numbers: Sequence[int], columns: Sequence[str] 
             ) from error
 
 
-OSCILLATES = "oscillates"
-"""Column of the flag of runs whose torque loop oscillates."""
+OSCILLATES, FOLLOWS = "oscillates", "follows"
+"""Columns of the flags of runs whose loop oscillates, and of runs that follow their reference."""
 _TEXTS = ("configuration", "status", "reason", "channel")
 
 
@@ -181,7 +181,7 @@ def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
     result = _result(study, part, values, task.threads)
     columns = {
         **_columns_of_runs(study, part, values),
-        **_columns_of_endings(study.configurations[part.configuration], result),
+        **_columns_of_endings(study, part, values, result),
         **_columns_of_metrics(study, result, part.runs),
         **_columns_of_traces(study, part, result),
     }
@@ -210,14 +210,23 @@ def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> di
     return columns
 
 
-def _columns_of_endings(configuration: Configuration, result: EnsembleResult) -> dict[str, TableColumn]:
-    """Return how each run ended, when and why it failed, and whether its loop oscillates."""
+def _columns_of_endings(
+    study: Study, part: Chunk, values: dict[str, Floats], result: EnsembleResult
+) -> dict[str, TableColumn]:
+    """Return how each run ended, when and why it failed, whether its loop oscillates, and whether it follows."""
+    configuration = study.configurations[part.configuration]
+    varied = varied_columns(study, configuration, dict(values))
     return {
         "status": TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended"),
         "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
         "reason": TableColumn(texts_of_some(result.reasons, result.status.size), _PLAIN, "why the run has no metrics"),
         OSCILLATES: TableColumn(
             _flags(configuration, result), _PLAIN, "1 where the loop oscillates, empty where that is not known"
+        ),
+        FOLLOWS: TableColumn(
+            follows(result.metrics, configuration.scenario, varied, study.gauge),
+            _PLAIN,
+            "1 where the run follows its reference, 0 where not, empty where that is not known",
         ),
     }
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.metrics import METRICS, Metric
-from ppafo.metrics.command import command_reversals, peak_torque, torque_error
+from ppafo.metrics.command import command_reversals, peak_torque, requested_torque, torque_error
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.model.contact import FLAT, SWING
 from ppafo.model.helping import HELPS, PUSH_OFF
@@ -121,6 +121,7 @@ def torque_metrics(recording: Recording) -> dict[str, Metric]:
     """How well the torque follows what is requested, how high it gets, and how often the command turns."""
     metrics: dict[str, float | None] = {
         "torque_error": torque_error(recording) if "reference" in recording else None,
+        "requested_torque": requested_torque(recording) if "reference" in recording else None,
         "peak_torque": peak_torque(recording),
         "command_reversals": command_reversals(recording),
     }

@@ -2,13 +2,16 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from ppafo.loading import load_scenario
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import simulate
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking import tried
+from ppafo.study.runs import follows, with_companions
 
 TASK = "torque-task-proportional"
 
@@ -59,3 +62,20 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     assert simulate(TASK, ["run.duration=0.3 s"]).tracking is None
     assert simulate(TASK, ["reference.level=4 N m"]).tracking is None
+
+
+@pytest.mark.parametrize(
+    ("scenario", "column", "values"),
+    [
+        ("torque-task-proportional", "reference.level", [3.0, 4.5, 6.0, 9.0]),
+        ("torque-task-slow-valve", "controller.proportional_gain", [0.02, 0.3, 8.0]),
+        ("torque-task-solenoid", "reference.level", [0.5, 4.0, 5.9, 7.0]),
+        ("pressure-loop", "controller.proportional_gain", [1.0e-8, 1.0e-5]),
+    ],
+)
+def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: str, values: list[float]) -> None:
+    base = load_scenario(scenario)
+    columns = {column: np.array(values)}
+    metered = run_ensemble(base, columns, with_companions([], base)).metrics
+    alone = [simulate(with_numbers(base, {column: value})).tracking is None for value in values]
+    assert (follows(metered, base, columns) == 1.0).tolist() == alone

@@ -164,6 +164,9 @@ def _remarks(outcome: Outcome) -> Iterator[str]:
         )
     if outcome.oscillating:
         yield f"in {outcome.oscillating} of {outcome.runs} runs the loop oscillates: they count as not met"
+    missed = int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.metrics)))
+    if missed:
+        yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
     if outcome.failed:
         yield (
             f"{outcome.failed} of {outcome.runs} runs failed and count as not met; the first: {outcome.first_failure}"

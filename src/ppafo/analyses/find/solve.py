@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
 from ppafo.progress import Report
+from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, varied_path
-from ppafo.study.runs import Runs, Tally, oscillating, settled, with_companions
+from ppafo.study.runs import Runs, Tally, follows, oscillating, settled, with_companions
 from ppafo.units import split_quantity
 
 DEFAULT_GRID = 64
@@ -41,6 +42,7 @@ class Search:
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
         self.spread: Floats = np.empty(0)
+        self.follows: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
         self.unsettled = 0
         self.oscillating = 0
 
@@ -62,11 +64,20 @@ class Search:
         self.values = np.concatenate([self.values, values])
         self.metrics = np.concatenate([self.metrics, by_stream.mean(axis=0)])
         self.spread = np.concatenate([self.spread, by_stream.std(axis=0, ddof=min(1, streams - 1))])
+        # A reference that lies beyond reach on purpose is followed by no run.
+        on_purpose = self._base.beyond_reach and not changes_reach([self._path])
+        fails = (follows(rows, self._base, columns) == 0.0) & (not on_purpose)
+        self.follows = np.concatenate([self.follows, ~fails.reshape(streams, values.size).any(axis=0)])
+
+    @property
+    def is_met(self) -> NDArray[np.bool_]:
+        """True for each value that meets the condition with a reference that is followed."""
+        return np.asarray(self.condition.is_kept(self.metrics) & self.follows)
 
     def ends(self, highest: bool) -> tuple[float | None, float | None]:
         """Return the outermost value that meets the condition, and its neighbour on the outer side."""
         order = np.argsort(-self.values if highest else self.values)
-        met = np.flatnonzero(self.condition.is_kept(self.metrics[order]))
+        met = np.flatnonzero(self.is_met[order])
         if met.size == 0:
             return None, None
         values = self.values[order]
@@ -121,8 +132,9 @@ class Outcome:
     """A finished search; numbers in SI.
 
     ``values`` (values,) ascend, ``metrics`` are the metric at each, nan where the run failed, and ``spread`` its
-    standard deviation over ``noise_streams``. ``value`` is the outermost that meets the condition, None where none
-    does, and ``beyond`` its neighbour on the outer side, None at the end of the range.
+    standard deviation over ``noise_streams``. ``is_met`` tells which meet the condition: none that does not follow its
+    reference, of which ``follows`` tells. ``value`` is the outermost that meets the condition, None where none does,
+    and ``beyond`` its neighbour on the outer side, None at the end of the range.
     """
 
     scenario: str
@@ -133,6 +145,8 @@ class Outcome:
     metrics: Floats
     spread: Floats
     is_of_grid: NDArray[np.bool_]
+    is_met: NDArray[np.bool_]
+    follows: NDArray[np.bool_]
     value: float | None
     beyond: float | None
     noise_streams: int
@@ -141,11 +155,6 @@ class Outcome:
     first_failure: str
     unsettled: int
     oscillating: int
-
-    @property
-    def is_met(self) -> NDArray[np.bool_]:
-        """True for each value that meets the condition."""
-        return np.asarray(self.condition.is_kept(self.metrics), dtype=np.bool_)
 
     @property
     def changes(self) -> int:
@@ -202,6 +211,8 @@ def outermost(
         metrics=search.metrics[order],
         spread=search.spread[order],
         is_of_grid=order < grid,
+        is_met=search.is_met[order],
+        follows=search.follows[order],
         value=value,
         beyond=beyond,
         noise_streams=seeds.size,

@@ -66,6 +66,7 @@ class _Summary(_Table):
     refused: _Count
     completed_by_configuration: dict[str, _Count]
     oscillating: dict[str, _Count] = Field(default_factory=dict)
+    not_following: dict[str, _Count] = Field(default_factory=dict)
     failures: list[_Failure]
     quantile_definition: str
     configurations: dict[str, dict[str, _Described]]
@@ -109,7 +110,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         name="sweep",
         kicker="Study",
         title=results.name,
-        said=(f"{results.name}: {document['runs']:,} runs: {ended}", *_failed_and_oscillating(results)),
+        said=(f"{results.name}: {document['runs']:,} runs: {ended}", *_useless_runs(results)),
         parts=(
             figure_of(results, [described] if described else [], failures),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
@@ -124,17 +125,22 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
     )
 
 
-def _failed_and_oscillating(results: StudyResults) -> list[str]:
-    """Return how many runs failed, with the first of them, and how many oscillate, by configuration."""
+def _useless_runs(results: StudyResults) -> list[str]:
+    """Return how many runs failed, with the first of them, oscillate or do not follow, by configuration."""
     summary, runs = results.summary, results.document["runs"]
     sentences = [
         f"{runs - summary['completed']:,} of {runs:,} runs failed and have no metrics; the first is run "
         f"{failure['run']}: {failure['reason']}"
         for failure in summary["failures"][:1]
     ]
+    flags = (
+        ("oscillating", "the loop oscillates (column 'oscillates')"),
+        ("not_following", "the reference is not followed (column 'follows')"),
+    )
     return sentences + [
-        f"{name}: in {count:,} runs the loop oscillates (column 'oscillates')"
-        for name, count in summary.get("oscillating", {}).items()
+        f"{name}: in {count:,} runs {words}"
+        for key, words in flags
+        for name, count in summary.get(key, {}).items()
         if count
     ]
 

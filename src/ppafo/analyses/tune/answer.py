@@ -152,7 +152,7 @@ def finding_of(
             Part("To use the gains", code=_command(tuned)),
         ),
         found=tuned,
-        passed=after.is_feasible,
+        passed=after.is_feasible and not after.useless,
         files={"overrides.txt": _pasted(tuned).encode},
     )
 
@@ -231,16 +231,23 @@ def verdict(problem: Problem, before: Setting, after: Setting) -> str:
             f"{name}: the gains found satisfy all constraints over the draws of the search, but not over "
             f"{FRESH_DRAWS:,} fresh ones{_by_ceiling(problem, after)}"
         )
+    if after.useless:
+        return f"{name}: with the best gains found, {after.useless}"
+    return f"{name}: {_change(before, after)}"
+
+
+def _change(before: Setting, after: Setting) -> str:
+    """Return by how much gains that satisfy all constraints are better than the ones before."""
     if not before.is_feasible:
         return (
-            f"{name}: the gains found satisfy all constraints, which the previous gains did not; objective "
+            "the gains found satisfy all constraints, which the previous gains did not; objective "
             f"{after.objective:.4g}"
         )
     # Beyond a bound the gains before are no candidates, and the best within may be worse.
     if after.objective >= before.objective:
-        return f"{name}: nothing better than the previous gains was found within the bounds"
+        return "nothing better than the previous gains was found within the bounds"
     change = (after.objective - before.objective) / abs(before.objective) if before.objective else math.nan
-    return f"{name}: objective {before.objective:.4g} before, {after.objective:.4g} after ({100.0 * change:+.3g} %)"
+    return f"objective {before.objective:.4g} before, {after.objective:.4g} after ({100.0 * change:+.3g} %)"
 
 
 def _by_ceiling(problem: Problem, after: Setting) -> str:
@@ -250,8 +257,8 @@ def _by_ceiling(problem: Problem, after: Setting) -> str:
         return ""
     where = "" if problem.spread is None else f" in {percentage(ceiling.fraction, 2)} of the draws"
     return (
-        "; the torque ceiling is the cause: the reference requires more than the torque constant times the gauge "
-        f"pressure of the supply{where}, which no gains can change"
+        "; the torque ceiling is the cause: the reference requires more than the actuator gives at the pressure of the "
+        f"supply{where}, which no gains can change"
     )
 
 

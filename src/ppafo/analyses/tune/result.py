@@ -89,6 +89,12 @@ class Setting:
         return self.violation == 0.0 and self.share_without_value == 0.0
 
     @property
+    def useless(self) -> str:
+        """Verdict on the nominal run where it does not follow its reference, "" where it does."""
+        tracking = self.result.tracking
+        return tracking.sentence if tracking is not None and tracking.is_useless else ""
+
+    @property
     def is_feasible(self) -> bool:
         """True where all constraints are kept and no run fails, over fresh draws too."""
         return self.is_feasible_in_search and self.fresh_violation == 0.0 and self.fresh_share_without_value == 0.0

@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start
+from ppafo.engine.scheme.actuators import torque_of
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
+from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import TORQUE
+from ppafo.parameters.plant import plant_parameters
 from ppafo.report.kind import Interval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
@@ -29,6 +32,8 @@ from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import with_overrides
 from ppafo.study.runs import FAILED, Runs, oscillating, settled
 
+_ANGLES = 9
+"""Angles between the stops at which the torque of a joint that moves is looked for."""
 UNUSABLE = 1.0e12
 """Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
 
@@ -64,17 +69,23 @@ class Judgement:
 
 
 def shortfall(scenario: Scenario) -> Floats:
-    """Return what the supply lacks of the largest reference [N m] in each run (runs,); 0 for nothing.
+    """Torque [N m] that the supply lacks of the largest reference in each run (runs,); 0 where it lacks nothing.
 
-    With one chamber at its supply and the other at the atmosphere the vane holds at most the torque constant times the
-    difference of the two (equation (2)), whatever the controller does. Of another actuator no such limit is known here.
+    With one chamber at its supply and the other vented the actuator gives the most, whatever the controller does. A
+    joint that moves counts at the angles where it gives most.
     """
-    if not scenario.device.has_torque_constant or scenario.controlled != TORQUE:
+    if scenario.controlled != TORQUE:
         return np.zeros(1)
-    supply, constant = scenario.device.supply, scenario.device.actuator.torque_constant
-    lowest, highest = profile_bounds(scenario.reference)
-    above = highest - constant * (supply.pressure - supply.atmospheric_pressure)
-    below = -lowest - constant * (supply.dorsiflexion_pressure - supply.atmospheric_pressure)
+    device = scenario.device
+    actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
+    fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
+    first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
+    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), supply.atmospheric_pressure
+    angles = [first + fraction * travel for fraction in fractions]
+    highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
+    lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
+    least, most = profile_bounds(scenario.reference)
+    above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
     return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
 
 

@@ -28,6 +28,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking import Tracking, tried
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
@@ -106,16 +107,20 @@ def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkPair:
-    """Result of a walk with the device beside one without it, in the form that is printed and kept."""
+    """Result of a walk with the device beside one without it, in the form that is printed and kept.
+
+    ``tracking`` is the verdict where the torque does not follow what the controller requests, with tried remedies.
+    """
 
     comparison: Comparison
+    tracking: Tracking | None
 
     def json_document(self) -> dict[str, Any]:
         """Return metrics with the device, without it and of a healthy ankle, and events, as plain data in SI."""
         worn = self.comparison.with_device
         return {
             **walk_data(WALK_FORMAT, SCHEMA_VERSION, self.comparison),
-            **torque_loop_data(worn),
+            **torque_loop_data(worn, self.tracking),
             "minutes": float(worn.recording.time[-1]) / 60.0,
             **task_sequence_data(self.comparison),
             **bottle_data(worn),
@@ -124,9 +129,8 @@ class WalkPair:
         }
 
 
-def torque_loop_data(worn: WalkResult) -> dict[str, Any]:
+def torque_loop_data(worn: WalkResult, verdict: Tracking | None) -> dict[str, Any]:
     """Return the gains in force, and the verdict where the torque does not follow, as plain data in SI."""
-    verdict = worn.tracking
     return {
         "tracking": None if verdict is None else {**plain(verdict), "sentence": verdict.sentence},
         "gains": plain(gains_of(worn.scenario, law_of(worn.scenario))),
@@ -145,6 +149,7 @@ _NUMBERS = (
     ShownNumber(name="push_off_share", title="... of the healthy ankle's positive work", quantity="fraction", digits=1),
     ShownNumber(name="net_push_off_work", title="Net work on the wearer in push-off", quantity="energy", digits=2),
     ShownNumber(name="torque_error", title="Torque error where one is requested, RMS", quantity="torque", digits=2),
+    ShownNumber(name="requested_torque", title="... requested torque, RMS", quantity="torque", digits=2),
     ShownNumber(name="peak_torque", title="Peak torque", quantity="torque", digits=1),
     ShownNumber(name=LARGEST_TORQUE, title="... limit of the controller", quantity="torque", digits=1),
     ShownNumber(name=REVERSALS_PER_STRIDE, title="Command reversals per stride", quantity="", digits=1),
@@ -190,11 +195,13 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
     strides = f"{worn.metrics['strides'].value:.0f} strides" if "strides" in worn.metrics else "no strides"
     along = "" if motion.task_sequence is None else f", task sequence {motion.task_sequence.name}"
     assumed = [(assumption.path, assumption.note) for assumption in configuration.assumptions]
+    verdict = tried(configuration, worn.tracking)
+    ended = f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}"
     return Finding(
         name="walk",
         kicker=f"A walk of {float(worn.recording.time[-1]) / 60.0:.3g} min",
         title=f"Walking with {configuration.name}",
-        said=(f"{configuration.name}: {worn.status.kind}, {strides} of {motion.gait.name}{along}", *first_lines(worn)),
+        said=(ended, *first_lines(worn, verdict)),
         parts=(
             Part(said=_set_up(configuration), is_detail=True),
             *task_sequence_parts(comparison),
@@ -204,7 +211,7 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
             *_pictures(comparison),
             Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
         ),
-        found=WalkPair(comparison),
+        found=WalkPair(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,
         files={
             "recording.nc": partial(netcdf_bytes, worn.recording, None),
@@ -310,10 +317,10 @@ def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
     return {REVERSALS_PER_STRIDE: metrics["command_reversals"].value / strides}
 
 
-def first_lines(worn: WalkResult) -> list[str]:
+def first_lines(worn: WalkResult, verdict: Tracking | None) -> list[str]:
     """Return that the torque does not follow, where it does not, and the gains in force with where they come from."""
     in_force = gains_of(worn.scenario, law_of(worn.scenario))
-    return [side.sentence for side in (worn.tracking, in_force) if side is not None]
+    return [side.sentence for side in (verdict, in_force) if side is not None]
 
 
 def strides_csv(result: WalkResult) -> bytes:

@@ -6,6 +6,7 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
+from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import (
     RULES_OF_TIMES,
@@ -38,8 +39,13 @@ _FLAWS_OF_WALK = (
 
 
 def c_library(scenario: Scenario) -> dict[str, bytes]:
-    """Files of a library in C by name. ProgramError for what cannot be translated, with file and line."""
-    return library_files(library_of(scenario))
+    """Files of a library in C by name, with a run of Python to compare it with.
+
+    ProgramError for what cannot be translated, with file and line.
+    """
+    library = library_of(scenario)
+    metrics = [kind.name for kind in library.program.metrics]
+    return {**library_files(library), "expected.csv": expected_csv(scenario, library.program.outputs, metrics)}
 
 
 def scenario_library(scenario: Scenario) -> Library:
@@ -120,7 +126,12 @@ _LIBRARIES = {VANE: scenario_library, WALK: walk_library}
 
 
 def library_of(scenario: Scenario) -> Library:
-    """The library of a scenario or a walk."""
+    """The library of a scenario or a walk; ProgramError where an object of Python controls it."""
+    if scenario.controller.is_outside:
+        raise ProgramError(
+            f"{scenario.name}: a controller that is an object of Python cannot be exported; export the plant alone, or "
+            "write the law as a kind of controller"
+        )
     return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 
 

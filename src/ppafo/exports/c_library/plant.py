@@ -8,12 +8,14 @@ from typing import NamedTuple
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
 from ppafo.exports.c_library.files import Library, Setting, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.graph import outside
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMotion, ProfileChoice, Scenario, Sensors
@@ -100,7 +102,7 @@ _REPLACED = ("sensors.", "motion.profile.", "motion.external_torque", "motion.an
 
 
 def plant_of(scenario: Scenario) -> PlantAlone:
-    """Return the plant; an unconstrained vane takes an external torque, one with a prescribed angle angle and rate.
+    """Return the plant; a free joint takes a torque, one with a prescribed angle takes angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
@@ -165,30 +167,42 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> D
 
 @_drive_of.register
 def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
-    """Return the drive of a free joint: T_ex on a vane alone, or T_2 of the ankle of a leg, which is opposed."""
+    """Return the drive of a free joint: T_ex on a vane alone, or T_2 on the ankle of a leg, which T_ex opposes."""
     if motion.leg is None:
-        path, joint, setting = "motion.external_torque", "T_ex on the joint", "{external_torque}"
+        name, summary, start, load = (
+            "external_torque",
+            "T_ex, above 0 against plantarflexion",
+            motion.external_torque,
+            "",
+        )
     else:
-        path, joint, setting = "motion.ankle_torque", "on the ankle of the leg, -T_2", "-{external_torque}"
-    torque = Input(
-        "external_torque",
-        "N m",
-        f"torque {joint}, above 0 works against plantarflexion",
-        motion.outside_torque,
-        settings[path].quantity.minimum,
-        settings[path].quantity.maximum,
-    )
+        name, summary, start, load = "ankle_torque", "T_2, above 0 plantarflexes", motion.leg.ankle_torque, "-"
+    limits = settings[f"motion.{name}"].quantity
+    torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
     return Drive(
-        motion="The external torque is constant until the next one.",
+        motion="The torque is constant until the next one.",
         inputs=(torque,),
-        settings=(Assignment(c_identifier(path), setting),),
-        parameters=(Assignment("plant.external_torque", "{external_torque}"),),
+        settings=(Assignment(c_identifier(f"motion.{name}"), f"{{{name}}}"),),
+        parameters=(Assignment("plant.external_torque", f"{load}{{{name}}}"),),
     )
 
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Return the files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step."""
-    return library_files(surfaced(plant_of(scenario)).library)
+    library = surfaced(plant_of(scenario)).library
+    return {**library_files(library), "expected.csv": expected_csv(_half_open(scenario), library.program.outputs)}
+
+
+_EXAMPLE = 0.5
+"""Command of the example, which does something."""
+
+
+def _half_open(scenario: Scenario) -> Scenario:
+    """Return the run of the example by Python: the plant for a tenth of a second or longer under a constant command."""
+    plant = _commanded(scenario.motion, scenario)
+    command = replace(plant.controller, settings={"command": _EXAMPLE})
+    duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)
+    return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
 
 def surfaced(alone: PlantAlone) -> PlantAlone:
@@ -196,13 +210,16 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.
-    example = [0.5 if variable.name == "command" else variable.start for variable in alone.inputs]
+    example = [_EXAMPLE if variable.name == "command" else variable.start for variable in alone.inputs]
     comments = [f" * {variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
     entries = [f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs]
     words = {
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
         "first_inputs": ", ".join(map(repr, example)),
+        "check_inputs": "".join(f", {value!r}" for value in example),
+        "check_first": "",
+        "check_metrics": "",
         "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone)]),
         "said_inputs": ";\n".join(comments) + ".",
         "listed_inputs": "\n".join(entries),
@@ -269,7 +286,12 @@ def _commanded_vane(scenario: Scenario) -> Scenario:
         description=f"The plant alone of this scenario: {scenario.description}",
         run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
-        sensors=Sensors(),
+        # What a sensor sees reaches nothing here, but when it looks divides a step of the engine, and so does its lag.
+        sensors=Sensors(
+            delay=scenario.sensors.delay,
+            angle_bandwidth=scenario.sensors.angle_bandwidth,
+            pressure_bandwidth=scenario.sensors.pressure_bandwidth,
+        ),
         links=outside(scenario.links, "controller", "reference"),
     )
 

@@ -126,7 +126,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     samples = slice((first + count) // 2 if rests and first is not None else count // 2, None)
     error = (value - reference)[samples]
     asked = extent(recording)
-    wanted = max(asked, _smallest_change(scenario))
+    wanted = max(asked, smallest_change(scenario))
     # A joint that is moved disturbs the loop of a torque or a pressure all the time, as a moving reference does.
     rests = rests and (scenario.controlled == ANGLE or float(np.ptp(recording["angle"][samples])) <= _MOVED_JOINT)
     turns = reversals(np.asarray(error, dtype=np.float64), OSCILLATION_THRESHOLD * wanted)
@@ -160,8 +160,8 @@ def _is_monotone(reference: Floats) -> bool:
     return bool(np.all(steps >= 0.0) or np.all(steps <= 0.0))
 
 
-def _smallest_change(scenario: Scenario) -> float:
-    """Smallest change that is judged, from the range of what is controlled."""
+def smallest_change(scenario: Scenario) -> float:
+    """Smallest change that is judged, from the range of what is controlled [SI of it]."""
     kind, device = CONTROLLED[scenario.controlled], scenario.device
     if kind.name == TORQUE:
         lowest, highest = torque_reach(device, 0.5 * (device.actuator.angle_min + device.actuator.angle_max))
