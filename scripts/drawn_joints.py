@@ -19,9 +19,9 @@ import numpy as np
 
 from ppafo.errors import PpafoError
 from ppafo.parameters.reach import torque_reach
+from ppafo.running import tried
 from ppafo.simulation.loading import scenario_from_dict
 from ppafo.simulation.simulate import Result, simulate
-from ppafo.simulation.tracking import tried
 
 KINDS = ("vane", "cylinder", "bladder", "muscles")
 GOOD, FAILS, BETWEEN = "good", "fails", "between"
