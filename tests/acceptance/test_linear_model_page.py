@@ -19,7 +19,6 @@ def blocks(language: str) -> list[str]:
 
 
 def test_the_commands_of_the_page_write_what_it_lists(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("casadi", reason="linear models need the extra 'control'")
     monkeypatch.chdir(tmp_path)
     commands = [shlex.split(line)[1:] for line in blocks("sh")[0].splitlines()]
     assert [main(words) for words in commands] == [0, 0]

@@ -21,8 +21,8 @@ from ppafo.engine.continuous_time import (
     torque_at_rest,
 )
 from ppafo.engine.entries import with_arrays
+from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
-from ppafo.engine.linking import python_place
 from ppafo.engine.loading import load_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
@@ -191,10 +191,10 @@ class _Solution:
         stated = [number for state in states_at_start(run) for number in numbers(state)]
         self.y = np.array([*numbers(run.initial), *masses, *stated, *numbers(run.program.valve.initial())])
         self.valve_from = unknowns_before_valve(run.program)
-        self.show = python_place(shown_signals, run.program.effects, run.effects)
-        self.limit = python_place(friction_at_rest, run.program.effects, run.effects)
-        self.follows = python_place(at_valve, run.program.effects, run.effects)
-        self.settle = python_place(run.program.valve.settle, run.program.effects, run.effects)
+        self.show = in_program(shown_signals, run.program, run.effects)
+        self.limit = in_program(friction_at_rest, run.program, run.effects)
+        self.follows = in_program(at_valve, run.program, run.effects)
+        self.settle = in_program(run.program.valve.settle, run.program, run.effects)
         self.driven = torque_at_rest(run)
         self.arrived = 0.0
         self.command, self.time = 0.0, 0.0
@@ -284,8 +284,6 @@ class _Solution:
         angle = self.y[0] if run.program.angle is None else run.program.angle.value(run.path, self.time)[0]
         pressure_1, pressure_2 = run.program.actuator.pressures(run.plant, angle, self.y[2], self.y[3])
         signals = float(angle), float(pressure_1), float(pressure_2)
-        if self.show is None:
-            return signals
         shown: Signals = self.show(self.states_in(self.y), *signals)
         return shown
 
@@ -301,8 +299,6 @@ class _Solution:
     def plant_at(self, y: Sequence[float]) -> Any:
         """The plant with the friction that holds the vane at rest with unknowns."""
         plant = self.run.plant
-        if self.limit is None:
-            return plant
         pressures = self.run.program.actuator.pressures(plant, y[0], y[2], y[3])
         return plant._replace(static_torque=self.limit(self.states_in(y), plant.static_torque, *pressures))
 
@@ -322,8 +318,6 @@ class _Solution:
         """Let the valve have the command that has arrived, and effects between them change with it."""
         self.arrived = self.controller.arriving(self.time, self.arrived)
         self.command = self.arrived
-        if self.follows is None:
-            return
         self.command = self.follows(self.states_in(self.y), self.arrived)
         first, states = gas_unknowns(self.run.program), self.states_in(self.y)
         for effect, row in zip(self.run.program.effects, self.run.effects, strict=True):
@@ -336,9 +330,8 @@ class _Solution:
 
     def settle_valve(self) -> None:
         """Let the valve make the abrupt changes that are due."""
-        valve = self.run.program.valve
         given = self.run.valve, self.valve_state(), self.command, self.time
-        state = valve.settle(*given) if self.settle is None else self.settle(self.states_in(self.y), *given)
+        state = self.settle(self.states_in(self.y), *given)
         self.y[self.valve_from :] = numbers(state)
 
     def valve_state(self) -> Any:

@@ -1,23 +1,32 @@
-"""The plant in continuous time, as solvers and linear models share it: real gas, an unconstrained vane, its modes.
+"""Plant in continuous time, for solvers and linear models: balance of the gas, an unconstrained vane, its modes.
 
-A vane that sticks, slides or stands at a stop is in modes, which root functions end.
+The flows are those of a step of the engine. A vane that sticks, slides or stands at a stop is in modes, which root
+functions end.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
+from ppafo.engine.in_python import in_program
 from ppafo.engine.led_leg import torque_of_leg
-from ppafo.engine.linking import python_place
 from ppafo.engine.run import Run
+from ppafo.engine.scheme.pneumatics import StageFlows, plant_with_leak_at, stage_flows
 from ppafo.engine.scheme.real_gas import content_rate
+from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
+from ppafo.model.actuators.kind import Chambers
+from ppafo.model.actuators.vane import chambers
 from ppafo.model.plant import (
+    Openings,
     PlantParameters,
+    PlantState,
+    ThermalParameters,
+    ThermalState,
+    blended_port_flow,
+    blended_ports,
+    chamber_mass,
     chamber_volumes,
     driving_torque,
-    gravity_torque,
     holds_still,
-    loaded,
-    net_driving_torque,
     vane_acceleration,
 )
 from ppafo.model.ports import friction_in_motion, rebound
@@ -26,6 +35,120 @@ SAME_TIME = 1.0e-12
 """Two instants [s] that are as good as one."""
 SLOWEST_REBOUND = 1.0e-7
 """Angular velocity [rad/s] below which a rebound is not worth following."""
+NEAR = 1.0e-4
+"""Angle [rad] on either side at which volumes are looked at for how the angle widens them."""
+
+
+class GasRates(NamedTuple):
+    """Rates of both pressures [Pa/s] and temperatures [K/s], flows from the source and to the atmosphere [kg/s]."""
+
+    pressure_1: float
+    pressure_2: float
+    temperature_1: float
+    temperature_2: float
+    supplied: float
+    vented: float
+
+
+class TurningChambers(NamedTuple):
+    """Both chambers, and rates at which the angle widens them [m^3/s]."""
+
+    now: Chambers
+    growth_1: float
+    growth_2: float
+
+
+def turning_chambers(
+    plant: PlantParameters, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float
+) -> TurningChambers:
+    """Both chambers at an angle [rad], its rate [rad/s] and absolute pressures [Pa]. Equations (4), (5)."""
+    less = chambers(plant, angle - NEAR, pressure_1, pressure_2)
+    more = chambers(plant, angle + NEAR, pressure_1, pressure_2)
+    per_angle = angular_velocity / (2.0 * NEAR)
+    return TurningChambers(
+        now=chambers(plant, angle, pressure_1, pressure_2),
+        growth_1=(more.volume_1 - less.volume_1) * per_angle,
+        growth_2=(more.volume_2 - less.volume_2) * per_angle,
+    )
+
+
+def flows_at(plant: PlantParameters, openings: Openings, pressure_1: float, pressure_2: float) -> StageFlows:
+    """Flows [kg/s] through both ports and the leak of a valve that stands at openings [-]. Equations (6) to (8)."""
+    leaking = plant_with_leak_at(plant, pressure_1, pressure_2)
+    port_1, port_2 = blended_ports(plant, openings)
+    return stage_flows(leaking, pressure_1, pressure_2, port_1, port_2, blended_port_flow)
+
+
+def isothermal_rates(
+    plant: PlantParameters, openings: Openings, at: TurningChambers, pressure_1: float, pressure_2: float
+) -> GasRates:
+    """Rates of gas of one temperature, ideal or not, at absolute pressures [Pa]. Equations (3), (9)."""
+    in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
+    supplied = in_1.from_source + in_2.from_source
+    content_1 = chamber_mass(pressure_1, at.now.volume_1, plant.gas_product)
+    content_2 = chamber_mass(pressure_2, at.now.volume_2, plant.gas_product)
+    # Flows are true masses; where the gas is not ideal its content grows by another amount.
+    gained_1 = content_rate(content_1, at.now.volume_1, at.growth_1, in_1.total - leak)
+    gained_2 = content_rate(content_2, at.now.volume_2, at.growth_2, in_2.total + leak)
+    return GasRates(
+        *pressure_rates(plant, at, pressure_1, pressure_2, gained_1, gained_2),
+        temperature_1=0.0,
+        temperature_2=0.0,
+        supplied=supplied,
+        vented=supplied - in_1.total - in_2.total,
+    )
+
+
+def thermal_rates(
+    plant: PlantParameters,
+    thermal: ThermalParameters,
+    openings: Openings,
+    at: TurningChambers,
+    pressure_1: float,
+    pressure_2: float,
+    temperature_1: float,
+    temperature_2: float,
+) -> GasRates:
+    """Rates of gas with an energy balance at absolute pressures [Pa] and temperatures [K]. Equations (3), (9)."""
+    in_1, in_2, leak = flows_at(plant, openings, pressure_1, pressure_2)
+    content_1 = chamber_mass(pressure_1, at.now.volume_1, plant.gas_product)
+    content_2 = chamber_mass(pressure_2, at.now.volume_2, plant.gas_product)
+    mass_1 = content_1 * thermal.temperature / temperature_1
+    mass_2 = content_2 * thermal.temperature / temperature_2
+    warm = WarmChambers(
+        volume_1=at.now.volume_1,
+        volume_2=at.now.volume_2,
+        growth_1=at.growth_1,
+        growth_2=at.growth_2,
+        give_1=pressure_1 * at.now.compliance_1 / at.now.volume_1,
+        give_2=pressure_2 * at.now.compliance_2 / at.now.volume_2,
+    )
+    # Neither motion nor totals act on the rates of the gas: zeros stand for them.
+    state = PlantState(0.0, 0.0, content_1, content_2, 0.0, 0.0, 0.0)
+    masses = ThermalState(mass_1, mass_2, 0.0, 0.0, 0.0, 0.0)
+    found = thermal_flows(thermal, state, masses, warm, in_1, in_2, leak)
+    return GasRates(
+        # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
+        *pressure_rates(plant, at, pressure_1, pressure_2, found.content_1, found.content_2),
+        # A temperature is the walls' times content over mass.
+        temperature_1=temperature_1 * (found.content_1 / content_1 - found.mass_1 / mass_1),
+        temperature_2=temperature_2 * (found.content_2 / content_2 - found.mass_2 / mass_2),
+        supplied=found.supplied,
+        vented=found.supplied - found.mass_1 - found.mass_2,
+    )
+
+
+def pressure_rates(
+    plant: PlantParameters, at: TurningChambers, pressure_1: float, pressure_2: float, gained_1: float, gained_2: float
+) -> tuple[float, float]:
+    """Rates of both pressures [Pa/s] from those of the contents [kg/s]: equation (3) in time.
+
+    d(p V) = R T dm, and a chamber that gives grows with its pressure, too.
+    """
+    product, now = plant.gas_product, at.now
+    rate_1 = (product * gained_1 - pressure_1 * at.growth_1) / (now.volume_1 + pressure_1 * now.compliance_1)
+    rate_2 = (product * gained_2 - pressure_2 * at.growth_2) / (now.volume_2 + pressure_2 * now.compliance_2)
+    return rate_1, rate_2
 
 
 def real_gas_rates(
@@ -74,14 +197,12 @@ def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float
 
     The function takes states of effects by name, time [s], angle [rad] and two absolute pressures [Pa]. Equation (1).
     """
-    plant, program = run.plant, run.program
-    taken = python_place(loaded, program.effects, run.effects)
+    program = run.program
+    driving = in_program(driving_torque, program, run.effects)
 
     def torque(states: Mapping[str, Any], time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
-        actuator = program.actuator.torque(plant, angle, pressure_1, pressure_2)
-        alone = net_driving_torque(actuator, gravity_torque(angle, plant.gravity_torque), plant.external_torque)
-        left: float = alone if taken is None else taken(states, alone, angle)
-        return left if run.leg is None else left + torque_of_leg(program, run.leg, time, angle)
+        alone: float = driving(states, run.plant, angle, pressure_1, pressure_2)
+        return alone if run.leg is None else alone + torque_of_leg(program, run.leg, time, angle)
 
     return torque
 
@@ -116,7 +237,6 @@ def roots_sliding(plant: PlantParameters, angle: float, angular_velocity: float,
 
 def after_stop(run: Run, states: Mapping[str, Any], angular_velocity: float) -> float:
     """Angular velocity [rad/s] after an impact on a stop; 0 where the rebound is not worth following."""
-    law = python_place(rebound, run.program.effects, run.effects)
-    thrown_back = 0.0 if law is None else float(law(states, angular_velocity))
+    thrown_back = float(in_program(rebound, run.program, run.effects)(states, angular_velocity))
     # Rebounds follow in ever shorter times: without a lowest speed the solver would restart without end.
     return thrown_back if abs(thrown_back) > SLOWEST_REBOUND else 0.0

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.entries import entry_types
-from ppafo.engine.going_on import MATH, power, quotient, whole_part
+from ppafo.engine.in_python import MATH, power, quotient, whole_part
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.model.declaration import PlainFunction
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.control.kind import ProfileKind
-from ppafo.engine.over_samples import over_samples
+from ppafo.engine.in_python import over_samples
 from ppafo.engine.program import Program
 from ppafo.model.gait import ShankSeries, shank_in_gait
 from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot

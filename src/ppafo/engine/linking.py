@@ -1,19 +1,13 @@
-"""What a program calls in the place of functions of the model; single functions with the laws of effects in them."""
+"""What a program calls in the place of functions of the model."""
 
-import math
-from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
-from ppafo.engine.over_samples import called_over_samples, in_columns
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.actuators import links_of
-from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
-from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.valves.kind import valve_problem
 
@@ -78,69 +72,3 @@ def link_effects(effects: Sequence[Effect], collector: Linked, own: Mapping[Any,
             # By the names of its parameters: a law says itself which structs it needs.
             asked = law.__code__.co_varnames[: law.__code__.co_argcount]
             collector.effects[law] = tuple(row for row in effect.rows if row in asked)
-
-
-class Composed(NamedTuple):
-    """A function of the model as Python calls it with effects: before its own arguments it takes ``needed`` rows.
-
-    ``of_columns`` is the same over columns of samples, None where it has no such form.
-    """
-
-    function: PlainFunction
-    needed: tuple[str, ...]
-    of_columns: PlainFunction | None
-
-
-def composed_with(function: PlainFunction, effects: Sequence[Effect]) -> Composed | None:
-    """Return a function of the model with the laws of effects in it; None where no effect acts in it."""
-    if not effects:
-        return None
-    collector, composed = _composed_with(function, tuple(effects))
-    if collector.made_from.is_current():
-        return composed
-    _composed_with.cache_clear()
-    return _composed_with(function, tuple(effects))[1]
-
-
-@lru_cache(maxsize=64)
-def _composed_with(function: PlainFunction, effects: tuple[Effect, ...]) -> tuple[SourceCollector, Composed | None]:
-    collector = SourceCollector("")
-    link_effects(effects, collector)
-    name = collector.add(function)
-    if name not in collector.needs:
-        return collector, None
-    scope: dict[str, Any] = {"math": math, "namedtuple": namedtuple}
-    text = collector.text()
-    # The composed text runs as plain Python: solvers and recordings call single functions, not programs.
-    exec(text, scope)
-    return collector, Composed(scope[name], tuple(collector.needs[name]), in_columns(text, name))
-
-
-def python_place(port: PlainFunction, effects: Sequence[Effect], rows: Sequence[Any]) -> PlainFunction | None:
-    """Return a port as Python calls it with effects and their parameters; None where no effect acts there.
-
-    Before its own arguments it takes the states of effects by name. Any other function of the model will do too.
-    """
-    composed = composed_with(port, effects)
-    if composed is None:
-        return None
-    parameters = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
-
-    def called(states: Mapping[str, Any], *own: float) -> Any:
-        return composed.function(*((parameters | dict(states))[row] for row in composed.needed), *own)
-
-    return called
-
-
-def place_over_samples(port: PlainFunction, effects: Sequence[Effect], rows: Sequence[Any]) -> PlainFunction | None:
-    """Return what ``python_place`` does, for states and arguments whose numbers are columns (samples,)."""
-    composed = composed_with(port, effects)
-    if composed is None:
-        return None
-    parameters = {effect.name: row for effect, row in zip(effects, rows, strict=True)}
-
-    def called(states: Mapping[str, Any], *own: Any) -> Any:
-        of_effects = ((parameters | dict(states))[row] for row in composed.needed)
-        return called_over_samples(composed.function, composed.of_columns, *of_effects, *own)
-
-    return called

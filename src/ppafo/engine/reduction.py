@@ -151,6 +151,11 @@ def definition_of(function: FunctionType) -> Definition:
     return Definition(definition)
 
 
+def group_of_name(node: ast.expr) -> str:
+    """Name of the group for which a name in a reduced expression stands; empty for any other expression."""
+    return node.id.removeprefix(_GROUP) if isinstance(node, ast.Name) and node.id.startswith(_GROUP) else ""
+
+
 def uses_of_group(function: FunctionType, name: str, use: type[ast.expr_context]) -> list[ast.Attribute]:
     """Where a function of the step reads or sets ``lane.NAME``, in order."""
     nodes = [node for node in ast.walk(definition_of(function).tree) if isinstance(node, ast.Attribute)]

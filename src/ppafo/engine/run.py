@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.groups import Role, filled
+from ppafo.engine.in_python import functions_of
 from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
-from ppafo.engine.linking import composed_with
 from ppafo.engine.program import FaultPhases, LegPhases, Program
 from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
@@ -254,11 +254,16 @@ def gas_at_start(run: Run) -> Any:
     program, start = run.program, run.program.gas.START
     if start is None:
         return NoParameters()
-    composed = composed_with(start, program.effects)
-    if composed is None:
+    if not program.effects:
         return start(run.plant, run.initial)
-    rows = dict(zip((effect.name for effect in program.effects), run.effects, strict=True))
-    return of_each(composed.function, *(rows[name] for name in composed.needed), run.plant, run.initial)
+    rows: dict[str, Any] = {}
+    own = functions_of(program, rows).of(start)
+
+    def started(plant: Any, initial: Any, *effects: Any) -> Any:
+        rows.update(zip((effect.name for effect in program.effects), effects, strict=True))
+        return own(plant, initial)
+
+    return of_each(started, run.plant, run.initial, *run.effects)
 
 
 def states_at_start(run: Run) -> list[Any]:

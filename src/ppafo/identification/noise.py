@@ -73,9 +73,13 @@ def noise_of(series: Sequence[Floats], highest: int = HIGHEST_ORDER, may_drift: 
     reflection = burg(series, highest)
     found = Noise(1.0, reflection, 0.0, math.sqrt(math.prod(1.0 - one * one for one in reflection)))
     best = 2.0 * count * math.log(found.innovation) + 2.0 * len(reflection)
+    last = math.inf
     for gain in _GAINS if may_drift and count >= SAMPLES_PER_COEFFICIENT else ():
         innovation = math.sqrt(sum(float(np.square(_without_level(one, gain)).sum()) for one in series) / size)
-        criterion = 2.0 * count * math.log(innovation) + 2.0
+        # With ever less gain the innovations fall, and grow again: what follows is larger still.
+        if innovation > last:
+            break
+        last, criterion = innovation, 2.0 * count * math.log(innovation) + 2.0
         if criterion < best:
             best, found = criterion, Noise(1.0, (), gain, innovation)
     return found

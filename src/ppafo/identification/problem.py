@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.flow import GasAt, Law
@@ -26,11 +26,12 @@ from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.new_set import stated_half_width
 from ppafo.identification.source import Source
-from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances, deviation_of_limit
+from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances
 from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.storage.column_map import ColumnMap
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
@@ -309,7 +310,7 @@ def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float
 class ProblemFile(StrictTable):
     """Layout of a problem file: the set, the recordings, the procedures and the fit."""
 
-    schema_version: Literal[1] = Field(description="version of this layout")
+    schema_version: SchemaVersion
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
     title: str = Field("", description="title of the new parameter set")
     device: DeviceProblem = Field(description="the set to start from")

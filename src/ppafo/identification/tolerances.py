@@ -1,7 +1,7 @@
 """What a bench and a set do not know exactly: the table [bench], the defaults, and the one rule for priors.
 
-A limit, as data sheets state it, has the standard deviation of an even distribution between its ends, limit / sqrt(3)
-(GUM, JCGM 100:2008, 4.3.7). A set states half a 95 % interval, which is 1.96 standard deviations.
+Usual errors of sensors and supply are those of ``usual_errors.py``. A set states half a 95 % interval, which is 1.96
+standard deviations.
 """
 
 import math
@@ -10,11 +10,18 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text
 from ppafo.errors import IdentificationError, UnitError, refused_as
 from ppafo.identification.estimate import interval_factor
 from ppafo.parameters.parameter_set import CONFIDENCE
+from ppafo.simulation.recorded.usual_errors import (
+    ANGLE_ERRORS,
+    PRESSURE_ERRORS,
+    SUPPLY_ERROR,
+    deviation_of_limit,
+    usual_errors,
+)
 from ppafo.units import parse_quantity
 
 Sensed = Literal["zero", "gain"]
@@ -49,11 +56,6 @@ _LARGEST_FRACTION = 0.5
 """Largest limit of a gain [-]: beyond it a sensor is broken and not inexact."""
 
 
-def deviation_of_limit(limit: float) -> float:
-    """Return the standard deviation of a number known within a limit on either side, in the unit of the limit."""
-    return limit / math.sqrt(3.0)
-
-
 class BenchSection(StrictTable):
     """What the bench does not know exactly: limits on either side; 0 is known exactly."""
 
@@ -61,9 +63,7 @@ class BenchSection(StrictTable):
     supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording; 1 psi_d")] = None
     zero_of_angle: Annotated[Text | None, Field(description="of the zero of the angle sensor; 0.5 deg")] = None
     zero_of_pressure: Annotated[Text | None, Field(description="of each pressure sensor; 0.3 psi_d")] = None
-    gain: Annotated[
-        Text | None, Field(description="of the gain of each sensor; 0.5 %, but 0 % of the angle sensor")
-    ] = None
+    gain: Annotated[Text | None, Field(description="of the gain of each sensor; 0.5 %")] = None
     start_of_angle: Annotated[
         Text | None, Field(description="of the angle at the start of each recording; 0.05 deg where it is read there")
     ] = None
@@ -103,9 +103,9 @@ class Tolerances:
     """
 
     load: float = 0.02
-    supply: float = PASCALS_PER_PSI
-    zero_of_angle: float = math.radians(0.5)
-    zero_of_pressure: float = 0.3 * PASCALS_PER_PSI
+    supply: float = SUPPLY_ERROR
+    zero_of_angle: float = ANGLE_ERRORS.zero
+    zero_of_pressure: float = PRESSURE_ERRORS.zero
     gain: float | None = None
     start_of_angle: float | None = None
     start_of_pressure: float | None = None
@@ -122,9 +122,8 @@ class Tolerances:
         return self.zero_of_angle if channel == "angle" else self.zero_of_pressure
 
     def gain_of(self, channel: str) -> float:
-        """Return the limit of the gain of a channel [-]; an angle sensor counts as exact where nothing is stated."""
-        usual = 0.0 if channel == "angle" else 0.005
-        return usual if self.gain is None else self.gain
+        """Return the limit of the gain of a channel [-]."""
+        return usual_errors(channel).gain if self.gain is None else self.gain
 
     @property
     def law_of_gas(self) -> float:

@@ -11,9 +11,9 @@ from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
 from ppafo.control.kind import ProfileKind
 from ppafo.control.profiles import CONSTANT
+from ppafo.engine.in_python import over_samples
 from ppafo.engine.lanes import Floats
 from ppafo.engine.led_leg import GAIT_SHANK, LedLeg, shank_over_samples
-from ppafo.engine.over_samples import over_samples
 from ppafo.engine.run import Run
 from ppafo.model.columns import Problem
 from ppafo.model.gait import ShankSeries, foot_in_gait

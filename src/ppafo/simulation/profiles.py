@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ppafo.control.catalog import PROFILES
-from ppafo.engine.over_samples import over_samples
+from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs

@@ -7,8 +7,8 @@ from typing import Any, final
 import numpy as np
 
 from ppafo.control.kind import PythonController
+from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, effort_for, load_program, samples_in
-from ppafo.engine.linking import python_place
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -104,7 +104,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
     rows = row_numbers(program.state_rows())
     plant, sensors, actuator = _group(batch, "plant"), _group(batch, "sensors"), program.actuator
     groups = program.state_rows()
-    show = python_place(shown_signals, program.effects, [_group(batch, effect.name) for effect in program.effects])
+    show = in_program(shown_signals, program, [_group(batch, effect.name) for effect in program.effects])
 
     def see(sample: int) -> Measurement:
         state = block.states[:, 0]
@@ -114,10 +114,9 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
             angle = float(state[rows["state.angle"]])
             masses = float(state[rows["state.mass_1"]]), float(state[rows["state.mass_2"]])
             pressure_1, pressure_2 = actuator.pressures(plant, angle, *masses)
-            if show is not None:
-                values = state.tolist()
-                states = {name: group_of(name, groups, values) for name in program.effect_states}
-                angle, pressure_1, pressure_2 = show(states, angle, pressure_1, pressure_2)
+            values = state.tolist()
+            states = {name: group_of(name, groups, values) for name in program.effect_states}
+            angle, pressure_1, pressure_2 = show(states, angle, pressure_1, pressure_2)
         if program.ideal_sensors:
             return Measurement(
                 angle=angle,

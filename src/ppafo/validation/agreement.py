@@ -46,8 +46,6 @@ LEAST_NOISE = 1.0e-4
 """Noise of samples that is taken at least, over the full range [-]."""
 _UNMOVED = 1.0e-3
 """Error over the full range that is accepted of a signal that does not move: the zero of its sensor."""
-_USUAL_ZEROS = {"rad": math.radians(0.5), "Pa_d": 0.3 * 6894.757293168361}
-"""Zero by which a sensor of any bench is off: of a signal that does not move, nothing else could be seen."""
 _WITHIN_NOISE = 1.5
 """Size of white noise over its estimate up to which it may be noise."""
 _SHIFTS = 81
@@ -70,7 +68,7 @@ _AT_LIMIT = 0.99
 class Curve:
     """A channel of both: measured values at their times, the model's at its own, full range, unit of an error, limit.
 
-    ``limit`` is the one that was given for it, if any.
+    ``usual_zero`` is what sensors of any bench are off by; ``limit`` is the one that was given for it, if any.
     """
 
     channel: str
@@ -80,6 +78,7 @@ class Curve:
     model_times: Floats
     model_values: Floats
     full_range: float
+    usual_zero: float
     limit: Limit | None = None
 
     def shift(self, delay: float, times: Floats) -> Floats:
@@ -159,7 +158,8 @@ class ChannelAgreement:
 
     ``rms``, ``bias`` and ``largest`` (with its sign, at ``largest_time`` [s]); ``rms_unaligned`` is the RMS error
     without any shift; ``noise`` is the noise of its samples, correlated or not; ``variation`` is the standard deviation
-    of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that passes.
+    of the signal without its noise. ``limit`` is the largest fraction of ``full_range`` that passes, ``usual_zero``
+    what sensors of any bench are off by.
     """
 
     channel: str
@@ -173,6 +173,7 @@ class ChannelAgreement:
     largest: float
     largest_time: float
     limit: float
+    usual_zero: float
 
     @property
     def fraction(self) -> float:
@@ -214,7 +215,8 @@ class RecordingAgreement:
 def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     """Return the errors in one channel with the model shifted by ``delay`` [s].
 
-    Without a limit of its own an RMS error passes up to 10 % of full range or half of the variance, and noise.
+    Without a limit of its own an RMS error passes up to 3 % of full range or half of the variance, whichever is less,
+    beside the zero that sensors of any bench have, for a signal that stands still shows nothing else, and noise.
     """
     # Each sample speaks for its time by the trapezoidal rule, but not for a gap.
     intervals = np.diff(curve.times)
@@ -229,8 +231,9 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
     away = curve.values - weights @ curve.values
     variation = math.sqrt(max(float(weights @ away**2) - noise * noise, 0.0))
     explained = min(ACCEPTABLE_FRACTION * curve.full_range, math.sqrt(1.0 - EXPLAINED_FRACTION) * variation)
-    zero = min(_USUAL_ZEROS.get(curve.unit, 0.0), ACCEPTABLE_FRACTION * curve.full_range)
-    usual = math.hypot(max(explained, _UNMOVED * curve.full_range, zero), _WITHIN_NOISE * noise) / curve.full_range
+    # Of a low supply the usual zero is much of the range: there the limit stays a fraction of it.
+    zero = min(max(curve.usual_zero, _UNMOVED * curve.full_range), ACCEPTABLE_FRACTION * curve.full_range)
+    usual = math.hypot(explained, zero, _WITHIN_NOISE * noise) / curve.full_range
     return ChannelAgreement(
         channel=curve.channel,
         unit=curve.unit,
@@ -243,6 +246,7 @@ def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
         largest=float(error[worst]),
         largest_time=float(curve.times[worst]),
         limit=usual if curve.limit is None else curve.limit.fraction_of(curve.full_range),
+        usual_zero=curve.usual_zero,
     )
 
 
@@ -313,8 +317,19 @@ def _curves(measured: Measured, replayed: Replayed, device: Device, settings: Re
         values = measured_values(measured.recording, name)
         if values is not None and name not in replayed.inputs and name not in silent:
             times, limit = measured.recording.time, settings.thresholds.limit(name)
-            full_range = kind.full_range(device, gauge)
-            curves.append(Curve(name, kind.unit, times, values, model.time, model[name], full_range, limit))
+            curves.append(
+                Curve(
+                    channel=name,
+                    unit=kind.unit,
+                    times=times,
+                    values=values,
+                    model_times=model.time,
+                    model_values=model[name],
+                    full_range=kind.full_range(device, gauge),
+                    usual_zero=kind.usual_zero(device),
+                    limit=limit,
+                )
+            )
     if not curves:
         word = "pressure_1" if settings.volume is not None else "anything beside the prescribed angle"
         raise DataError(f"{measured.file}: has nothing to compare; it needs {word}")

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Set as AbstractSet
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
@@ -15,6 +16,13 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.numbers import declared_numbers, number_at, other_form
 from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.usual_errors import (
+    ANGLE_ERRORS,
+    PRESSURE_ERRORS,
+    SUPPLY_ERROR,
+    SensorErrors,
+    usual_errors,
+)
 from ppafo.units import from_si
 from ppafo.validation.agreement import ReplaySettings, replay_of
 from ppafo.validation.change import SENSORS, Candidate, Change, Sensor
@@ -59,16 +67,20 @@ def _groups(names: Collection[str]) -> Iterator[_Group]:
         yield _Group(channels, words, "seem" if has_several else "seems")
 
 
-def exchanges(device: Device, names: Collection[str]) -> Iterator[Candidate]:
-    """Yield mistakes without a size: units, gauge or absolute, swapped channels and signs."""
+def exchanges(device: Device, names: Collection[str], moving: AbstractSet[str]) -> Iterator[Candidate]:
+    """Yield mistakes without a size: units, gauge or absolute, swapped channels and signs.
+
+    A unit is misread of pressures of which one is ``moving``: a chamber that stays at the atmosphere shows no factor.
+    """
     atmosphere = device.supply.atmospheric_pressure
     for channels, group, verb in _groups(names):
-        for unit, factor in _MISREAD_UNITS.items():
+        for unit, factor in _MISREAD_UNITS.items() if moving & set(channels) else ():
             words = f"{group} {verb} to be {unit}"
-            yield Candidate(words, words, partial(_sensed, channels, "gain", atmosphere), (factor,))
+            change = partial(_sensed, channels, "gain", atmosphere)
+            yield Candidate(words, words, change, (factor,), is_of_unit=True)
         for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
             words = f"{group} {verb} to be {kind}"
-            yield Candidate(words, words, partial(_sensed, channels, "zero", 0.0), (zero,))
+            yield Candidate(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
     has_both = PRESSURE_1 in names and PRESSURE_2 in names
     if has_both:
         yield Candidate("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: Change(is_swapped=True))
@@ -104,21 +116,14 @@ _LONG_DELAYS = _both_ways(0.015, 0.03, 0.05, 0.08, 0.12)
 _RATES = (0.7, 0.85, 0.94, 0.98, 0.995, 1.005, 1.02, 1.06, 1.15, 1.4)
 """Rate [-] of the clock of a recording."""
 
-_USUAL_ANGLE = math.radians(0.5)
-"""Zero [rad] by which the angle sensor of any bench is off: no disagreement."""
-_USUAL_PRESSURE = 0.3 * PASCALS_PER_PSI
-"""Zero [Pa] by which a pressure sensor of any bench is off."""
-_USUAL_GAIN = 0.005
-"""Gain [-] by which a sensor of any bench is off, beside 1."""
-_USUAL_DELAY = 1.0e-3
-"""Delay [s] of a sensor of any bench."""
+_EXACT = SensorErrors(zero=0.0, gain=0.0, delay=0.0)
+"""Usual errors of a command, which no sensor reads."""
 
 
 class _Reading(NamedTuple):
     """Channels that are read by sensors of one kind: the point [SI] about which a gain turns, and a size of 1 [SI].
 
-    Their zeros are shown in ``unit``, ``shown`` of which are a size of 1; ``usual_zero`` and ``usual_gain`` are what
-    sensors of any bench have.
+    Their zeros are shown in ``unit``, ``shown`` of which are a size of 1; ``usual`` are the errors of any bench.
     """
 
     group: _Group
@@ -126,8 +131,7 @@ class _Reading(NamedTuple):
     size: float
     unit: str
     shown: float
-    usual_zero: float
-    usual_gain: float
+    usual: SensorErrors
 
 
 def _readings(device: Device, names: Collection[str]) -> Iterator[_Reading]:
@@ -142,8 +146,7 @@ def _readings(device: Device, names: Collection[str]) -> Iterator[_Reading]:
             size=gauge,
             unit=unit,
             shown=per_pascal,
-            usual_zero=_USUAL_PRESSURE,
-            usual_gain=_USUAL_GAIN,
+            usual=PRESSURE_ERRORS,
         )
     if ANGLE in names:
         yield _Reading(
@@ -152,8 +155,7 @@ def _readings(device: Device, names: Collection[str]) -> Iterator[_Reading]:
             size=1.0,
             unit="deg",
             shown=math.degrees(1.0),
-            usual_zero=_USUAL_ANGLE,
-            usual_gain=_USUAL_GAIN,
+            usual=ANGLE_ERRORS,
         )
     yield _Reading(
         group=_Group((COMMAND,), COMMAND, "seems"),
@@ -161,8 +163,7 @@ def _readings(device: Device, names: Collection[str]) -> Iterator[_Reading]:
         size=1.0,
         unit="of full opening",
         shown=1.0,
-        usual_zero=0.0,
-        usual_gain=0.0,
+        usual=_EXACT,
     )
 
 
@@ -176,7 +177,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
             partial(_sensed, channels, "zero", 0.0),
             tuple(reading.size * part for part in _ZEROS),
             shown=reading.shown,
-            usual=reading.usual_zero,
+            usual=reading.usual.zero,
         )
         yield Candidate(
             f"gain of {words}",
@@ -184,22 +185,23 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
             partial(_sensed, channels, "gain", reading.about),
             _GAINS,
             is_ratio=True,
-            usual=reading.usual_gain,
+            usual=reading.usual.gain,
         )
     sensors = tuple(name for name in SENSORS if name in names)
-    for name in sensors:
+    # Of one sensor alone the delay is the one of all, which is taken out.
+    for name in sensors if len(sensors) > 1 else ():
         yield Candidate(
             f"delay of {name}",
             f"{name} seems to be later than the other channels by {{:.3g}} ms",
             partial(_sensed, (name,), "delay", 0.0),
             _DELAYS,
             shown=1.0e3,
-            usual=_USUAL_DELAY,
+            usual=usual_errors(name).delay,
         )
     yield Candidate(
         "delay of all sensors",
         "all sensors seem to be later than the command by {:.3g} ms",
-        partial(_sensed, sensors, "delay", 0.0),
+        lambda delay: Change(delay=delay),
         _LONG_DELAYS,
         shown=1.0e3,
     )
@@ -235,7 +237,8 @@ def numbers(measured: Measured, device: Device, settings: ReplaySettings) -> Ite
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
             change = partial(_numbered, path, value)
-            yield Candidate(path, words, change, factors, is_ratio=True, unit=quantity.unit or "-")
+            usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
+            yield Candidate(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     yield _other_atmosphere(request.device, pressures)
 

@@ -7,7 +7,7 @@ one leaves of a recording, and ``search.py`` at which size it leaves least.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,9 +15,10 @@ import numpy as np
 from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
-from ppafo.progress import Progress, Report, report_nothing
+from ppafo.progress import Report, report_nothing
 from ppafo.simulation.recorded.clock import usual_interval
 from ppafo.simulation.recorded.rest import samples_at_rest
+from ppafo.simulation.recorded.usual_errors import usual_errors
 from ppafo.validation.agreement import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.candidates import effects, exchanges, numbers, sizes
 from ppafo.validation.change import SENSORS, Candidate, Change
@@ -100,7 +101,6 @@ def causes_of(
     none = search.evaluated([Change()])[0]
     if none is None or none.is_noise:
         return Causes(is_noise=none is not None)
-    report(Progress("searching for causes"))
     if settings.motion == "measured":
         # A measured angle is an input, and a delay of the sensors would be one of an input: samples alone are searched.
         tried = search.compared(_samples(records), none)
@@ -108,45 +108,77 @@ def causes_of(
         # That no change explains the recordings would say too much.
         return _explained(search, none, tried, explaining, []) if explaining else Causes()
     names = set.intersection(*(set(measured.recording.names) for measured in read))
+    moving = _moving(agreements, device)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
     sized = [*sizes(device, names), *numbers(read[0], device, settings)]
-    tried, explaining = _tried_in_turn(search, none, [_samples(records), _motions(records, settings)])
+    first = [_samples(records), _motions(records, settings)]
+    tried, explaining = _tried_in_turn(search.compared(stage, none) for stage in first)
     if not explaining:
         # Errors that any bench has come before a fault, a mistake without a size too: they need no cause.
-        usual = [candidate for candidate in sized if candidate.usual]
-        errors = _usual_errors(search, none, usual)
+        of_bench = search.compared([candidate for candidate in sized if candidate.usual], none)
+        # A delay that ends at its limit is longer than that, and no error of any bench.
+        is_late = any(agreement.delay.is_at_limit for agreement in agreements)
+        errors = None if is_late else _usual_errors(search, none, of_bench)
         if errors is not None:
-            return Causes(errors, None, len(usual))
-        stages = [list(exchanges(device, names)), sized, list(effects(device))]
-        tried_later, explaining = _tried_in_turn(search, none, stages)
-        tried += tried_later
+            return Causes(errors, None, len(tried) + len(of_bench))
+
+        def stages() -> Iterator[list[Tried]]:
+            yield search.compared(list(exchanges(device, names, moving)), none)
+            yield of_bench + search.compared([candidate for candidate in sized if not candidate.usual], none)
+            yield search.compared(list(effects(device)), none)
+
+        later, explaining = _tried_in_turn(stages())
+        tried += later
     if explaining:
         return _explained(search, none, tried, explaining, sized)
-    # What is wrong with samples is seen in them, whatever else is wrong.
-    nearest = max(tried, key=lambda each: (each.candidate.is_of_samples, each.gain), default=None)
+    # What is wrong with samples is seen in them, whatever else is wrong; a misread unit is no hint beside other faults.
+    nearest = max(
+        (each for each in tried if not each.candidate.is_of_unit),
+        key=lambda each: (each.candidate.is_of_samples, each.gain),
+        default=None,
+    )
     return Causes() if nearest is None else Causes(None, _cause_of([nearest], search.penalty), len(tried))
 
 
-def _tried_in_turn(
-    search: Search, none: Left, stages: Sequence[Sequence[Candidate]]
-) -> tuple[list[Tried], list[Tried]]:
+def _moving(agreements: Sequence[RecordingAgreement], device: Device) -> set[str]:
+    """Return the channels that part from the atmosphere, measured or in the model, by more than a usual zero."""
+    atmosphere = device.supply.atmospheric_pressure
+    return {
+        name
+        for agreement in agreements
+        for recording in (agreement.measured, agreement.model)
+        for name in recording.names
+        if float(np.abs(recording[name] - atmosphere).max()) > usual_errors(name).zero
+    }
+
+
+def _tried_in_turn(stages: Iterable[Sequence[Tried]]) -> tuple[list[Tried], list[Tried]]:
     """Return the candidates that were tried, stage by stage until one explains the recordings, and those that do."""
     tried: list[Tried] = []
     for stage in stages:
-        tried += search.compared(stage, none)
+        tried += stage
         explaining = [each for each in tried if each.explains]
         if explaining:
             return tried, explaining
     return tried, []
 
 
-def _usual_errors(search: Search, none: Left, usual: Sequence[Candidate]) -> Cause | None:
-    """Return the error of sensors, as any bench has it, that explains the recordings: one, or else several together."""
+def _usual_errors(search: Search, none: Left, of_bench: Sequence[Tried]) -> Cause | None:
+    """Return the error of sensors, as any bench has it, that explains the recordings: one, or else several together.
+
+    ``of_bench`` are the errors that a bench may have, one by one.
+    """
     # Beside pressures that are nearly equal a flow bends: what is small together may fail on straight lines, and not
     # alone.
-    alone = [each for each in search.compared(usual, none) if each.explains and each.is_usual]
-    together = [each for each in search.compared(search.together(usual, none), none) if each.explains]
-    return _cause_of(alone or together, search.penalty) if alone or together else None
+    explaining = [each for each in of_bench if each.explains]
+    usual = [each for each in explaining if each.is_usual]
+    if not usual:
+        candidates = [each.candidate for each in of_bench]
+        # One error beyond its limit explains more than several that strain to add up to it.
+        least = max((each.gain for each in explaining), default=0.0) - search.penalty
+        together = search.compared(search.together(candidates, none), none)
+        usual = [each for each in together if each.explains and each.gain > least]
+    return _cause_of(usual, search.penalty) if usual else None
 
 
 def _explained(

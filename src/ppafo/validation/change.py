@@ -37,18 +37,25 @@ class Change:
     """How a recording and its device differ from the set: nothing, unless it says so.
 
     ``sensors`` are by channel, ``numbers`` of the set by path [SI], ``effects`` are settings by the name of an effect.
-    Pressures 1 and 2 may be swapped, the clock may run ``clock`` times as fast as its times say, and the vane may do
-    another ``motion``. With a ``start``, samples that no sensor made are left out. It is where a channel begins whose
-    first samples are among them, as a fraction [-] of its range.
+    Pressures 1 and 2 may be swapped, all sensors may be later than the command by a ``delay`` [s], the clock may
+    run ``clock`` times as fast as its times say, and the vane may do another ``motion``. With a ``start``, samples
+    that no sensor made are left out. It is where a channel begins whose first samples are among them, as a fraction
+    [-] of its range.
     """
 
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_swapped: bool = False
+    delay: float = 0.0
     clock: float = 1.0
     motion: Motion | None = None
     start: float | None = None
+
+    @property
+    def has_delay(self) -> bool:
+        """True where all sensors are later than the command, by themselves or behind a valve that is."""
+        return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
 
 
 def joined(first: Change, second: Change) -> Change:
@@ -64,7 +71,8 @@ def joined(first: Change, second: Change) -> Change:
             delay=sensor.delay + other.delay,
         )
     numbers, effects = {**second.numbers, **first.numbers}, {**second.effects, **first.effects}
-    return replace(first, sensors=sensors, numbers=numbers, effects=effects, clock=first.clock * second.clock)
+    delay, clock = first.delay + second.delay, first.clock * second.clock
+    return replace(first, sensors=sensors, numbers=numbers, effects=effects, delay=delay, clock=clock)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +81,8 @@ class Candidate:
 
     ``sizes`` are tried first; a cause with one has nothing to fit. A size that ``is_ratio`` is sought as a logarithm.
     ``usual`` is the largest size, or logarithm, that any bench has, ``is_usual`` says so of one without a size.
-    ``is_of_samples`` is true of samples that no sensor made, which they show themselves. ``unit`` is the unit of the
-    number of the set.
+    ``is_of_samples`` is true of samples that no sensor made, which they show themselves; ``is_of_unit`` of a misread
+    unit, which is no hint where it leaves more than noise. ``unit`` is the unit of the number of the set.
     """
 
     name: str
@@ -86,12 +94,18 @@ class Candidate:
     usual: float = 0.0
     is_usual: bool = False
     is_of_samples: bool = False
+    is_of_unit: bool = False
     unit: str = ""
 
     @property
     def has_size(self) -> bool:
         """True of a cause whose size is fitted; a swap or a sign has none."""
         return len(self.sizes) > 1
+
+    @property
+    def is_of_bench(self) -> bool:
+        """True of an error that any bench has, of one sensor: those of groups are sums of these."""
+        return self.usual > 0.0 and len(self.at(self.usual).sensors) <= 1
 
     @property
     def grid(self) -> list[float]:

@@ -126,8 +126,11 @@ def _channel_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> _Ch
     values = measured_values(recording, channel.channel)
     assert values is not None
     residuals = values - np.interp(recording.time - agreement.delay.correction, model.time, model[channel.channel])
-    # Samples in a channel that the model explains are right, however they look.
-    wrong = None if channel.in_noise**2 < ONLY_NOISE else _wrong_samples(values, residuals, channel, recording.time)
+    # Samples in a channel that the model explains are right, however they look; so are those of one that stands still
+    # with the model, but for its zero.
+    stands_still = np.ptp(values) == 0.0 and np.ptp(residuals) < channel.usual_zero
+    is_right = stands_still or channel.in_noise**2 < ONLY_NOISE
+    wrong = None if is_right else _wrong_samples(values, residuals, channel, recording.time)
     if wrong is None:
         return _Channel(agreement=channel, values=values, noise=channel.noise, wrong=None)
     is_good = np.logical_not(wrong.samples)
@@ -240,7 +243,8 @@ def readings_of(record: Record, replayed: Replayed, change: Change, offset: floa
     for name in record.channels:
         sensor = change.sensors.get(name, Sensor())
         source = model[SWAPPED.get(name, name) if change.is_swapped else name]
-        rows.append(sensor.of(np.interp(true_time - offset - sensor.delay, model.time, source)))
+        delay = offset + change.delay + sensor.delay
+        rows.append(sensor.of(np.interp(true_time - delay, model.time, source)))
     return np.asarray(np.stack(rows) / record.noise[:, None])
 
 
@@ -250,9 +254,8 @@ def left_of(record: Record, replayed: Replayed, change: Change, longest_delay: f
     The delay that was found may be what a wrong model makes: it is sought from there and from none.
     """
     good = np.ones_like(record.good) if change.start is None else record.good
-    # What all sensors together are late by is their common delay: it is not taken out beside itself.
-    if all(change.sensors.get(name, Sensor()).delay for name in record.channels):
-        longest_delay = 0.0
+    # No quantity stands twice in one fit: beside a delay of its own a change gets no free one, which would take a part.
+    longest_delay = 0.0 if change.has_delay else longest_delay
     firsts = {0.0, record.delay} if longest_delay > 0.0 else {0.0}
     options = [_errors_from(record, replayed, change, good, first, longest_delay) for first in firsts]
     errors = min(options, key=lambda option: float(option @ option))
@@ -272,10 +275,13 @@ def _errors_from(
     errors = np.zeros(good.size)
     for _ in range(STEPS + 1):
         readings = readings_of(record, replayed, change, delay)
-        late = np.gradient(readings, axis=1) * (longest_delay > 0.0)
-        columns = (np.stack([late, *record.starts]) * good).reshape(-1, good.size)
+        late = [np.gradient(readings, axis=1)] * (longest_delay > 0.0)
         errors = ((record.values - readings) * good).ravel()
-        sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ errors)
-        errors = errors - sizes @ columns
+        if late or record.starts:
+            columns = (np.stack([*late, *record.starts]) * good).reshape(-1, good.size)
+            sizes = np.linalg.solve(columns @ columns.T + np.eye(len(columns)), columns @ errors)
+            errors = errors - sizes @ columns
+        if not late:
+            break
         delay = min(max(delay - interval * float(sizes[0]), -longest_delay), longest_delay)
     return errors

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
+from scipy.stats import chi2
 
 from ppafo.errors import PpafoError
 from ppafo.parameters.device import Device
@@ -19,6 +20,7 @@ from ppafo.progress import Progress, Report
 from ppafo.signals.recording import Floats
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.validation.agreement import ReplaySettings, replay_of
 from ppafo.validation.change import SWAPPED, Candidate, Change, joined
 from ppafo.validation.record import ONLY_NOISE, STEPS, Left, Record, at_rate, left_of, starts_without_wrong
@@ -32,6 +34,8 @@ _SMALL = 0.1
 """Size over the smallest of its grid by which a second change is tried beside a first."""
 _PARTING = 1.0e-4
 """Fraction of a squared slope that must lie across the first's, for a second change to be another one."""
+_UNUSUAL = 0.01
+"""Chance [-] below which errors of sensors are together more than any bench has."""
 _SMALLEST = 1.0e-300
 """What a sum of squares is at least where it divides."""
 
@@ -103,8 +107,7 @@ class Search:
         """Return what each change leaves; None for one of a device that cannot have made such a recording."""
         left: list[Left | None] = []
         for first in range(0, len(changes), _TOGETHER):
-            if first:
-                self.report(Progress("searching for causes", first, len(changes)))
+            self.report(Progress("searching for causes", first, len(changes), noun="changes"))
             left += self._evaluated_together(changes[first : first + _TOGETHER])
         return left
 
@@ -196,6 +199,9 @@ class Search:
 
     def slopes(self, change: Change, left: Left, candidates: Sequence[Candidate]) -> list[Slope]:
         """Return how the errors that a change leaves grow with the size of each of some candidates beside it."""
+        # A delay of all sensors is free already, unless the change has one itself.
+        is_free = self.settings.longest_delay > 0.0 and not change.has_delay
+        candidates = [each for each in candidates if not (is_free and each.at(each.grid[0]).has_delay)]
         steps = [_SMALL * min(map(abs, candidate.grid)) for candidate in candidates]
         changes = [joined(change, candidate.at(step)) for candidate, step in zip(candidates, steps, strict=True)]
         return [
@@ -205,11 +211,24 @@ class Search:
         ]
 
     def together(self, usual: Sequence[Candidate], none: Left) -> list[Candidate]:
-        """Return the errors that any bench has, all at once, each as large as explains most; none without a sensor."""
-        slopes = self.slopes(Change(), none, usual)
+        """Return the likeliest usual errors of all sensors as one change; none where together they are unusual.
+
+        Each error is one of one sensor, for what groups have together would add to it beyond its limit. In each channel
+        the sum of what they explain is one number, whose square over its variance is chi-square: as many errors at
+        their limits at once, all one way, are one that is beyond its own.
+        """
+        slopes = self.slopes(Change(), none, [candidate for candidate in usual if candidate.is_of_bench])
         if not slopes:
             return []
-        change = reduce(joined, [sized.change for sized in _bounded(slopes, none.errors)])
+        sized = _bounded(slopes, none.errors)
+        counts = [record.values.shape[1] for record in self.records for _ in record.channels]
+        sums = np.add.reduceat(np.stack([each.slope for each in sized], axis=1), np.cumsum([0, *counts[:-1]]))
+        deviations = [deviation_of_limit(each.candidate.usual) for each in sized]
+        found = np.square(sums @ [each.size for each in sized])
+        squares = found / np.maximum(np.square(sums * deviations).sum(axis=1), _SMALLEST)
+        if len(counts) * float(chi2.sf(squares.max(), 1)) < _UNUSUAL:
+            return []
+        change = reduce(joined, [each.change for each in sized])
         words = "zeros, gains and delays of several sensors seem to be off"
         return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
@@ -218,7 +237,8 @@ class Search:
 
         Their sizes are those of straight lines; a run says whether they explain. Names in ``known`` are left out.
         """
-        usual, sized, changes = [slope for slope in slopes if slope.candidate.usual], list[_Sized](), list[Change]()
+        usual = [slope for slope in slopes if slope.candidate.is_of_bench]
+        sized, changes = list[_Sized](), list[Change]()
         for slope in slopes:
             candidate = slope.candidate
             if candidate.name in known:
@@ -281,9 +301,10 @@ def _neighbours(tried: Tried) -> tuple[float, float]:
 
 
 def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:
-    """Return candidates with the sizes, no larger than usual, that leave least of errors on straight lines.
+    """Return candidates with the likeliest sizes, no larger than usual, beside errors on straight lines.
 
-    One whose usual size is infinite has no bound.
+    Usual sizes are known as limits are, so that one of which the errors say nothing stays small. One whose usual size
+    is infinite has no bound.
     """
     # In units of its limit, or of its slope, each has one size, whatever its own unit is.
     scales = np.array(
@@ -295,6 +316,8 @@ def _bounded(slopes: Sequence[Slope], errors: Floats) -> list[_Sized]:
         ]
     )
     limits = np.array([1.0 if math.isfinite(slope.candidate.usual) else math.inf for slope in slopes])
-    columns = np.stack([slope.errors for slope in slopes], axis=1)
-    sizes = lsq_linear(columns * scales, -errors, (-limits, limits)).x * scales
+    columns = np.stack([slope.errors for slope in slopes], axis=1) * scales
+    known = np.diag(np.where(np.isfinite(limits), 1.0 / deviation_of_limit(1.0), 0.0))
+    rows, left = np.concatenate([columns, known]), np.concatenate([-errors, np.zeros(len(limits))])
+    sizes = lsq_linear(rows, left, (-limits, limits)).x * scales
     return [_Sized(slope.candidate, float(size), slope.errors) for slope, size in zip(slopes, sizes, strict=True)]

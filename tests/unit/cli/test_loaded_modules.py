@@ -13,7 +13,7 @@ import ppafo
 
 HEAVY = frozenset(
     {
-        *("casadi", "dask", "h5netcdf", "h5py", "jax", "jinja2", "matplotlib", "numpy", "pandas"),
+        *("dask", "h5netcdf", "h5py", "jax", "jinja2", "matplotlib", "numpy", "pandas"),
         *("PIL", "pint", "pyarrow", "pydantic", "scipy", "sksundae", "xarray"),
     }
 )

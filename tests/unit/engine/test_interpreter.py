@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.interpreter import going_on, quotient, whole_part
+from ppafo.engine.in_python import going_on, quotient, whole_part
 from ppafo.engine.lanes import Batch, run_batch
 from ppafo.engine.loading import BACKEND_VARIABLE
 from ppafo.engine.rows import row_numbers

@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.identification.tolerances import Tolerances
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.validation.agreement import ReplaySettings, compare_recording
+from ppafo.validation.candidates import sizes
 from ppafo.validation.causes import Causes, causes_of
+from ppafo.validation.compared import COMPARED
 from ppafo.validation.measured import check_recording
 
 ROOM = 101325.0
@@ -300,3 +303,83 @@ def test_correlated_noise_is_noise() -> None:
         run = with_channel(run, name, run[name] + size * coloured(random, len(run)))
     found = causes(run)
     assert found.is_noise
+
+
+def later(one: Recording, samples: int) -> Recording:
+    """All sensors later by some samples, in which they stand still and are noisy."""
+    random = np.random.default_rng(samples)
+    for name, noise in (("angle", 2e-3), ("pressure_1", 500.0), ("pressure_2", 500.0)):
+        still = np.full(samples, one[name][0]) + noise * random.standard_normal(samples)
+        one = with_channel(one, name, np.concatenate([still, one[name][:-samples]]))
+    return one
+
+
+@pytest.mark.parametrize("late", [22, 26, 38, 50, 70])
+def test_a_delay_of_all_sensors_is_named_whole_beside_the_common_delay_that_is_taken_out(
+    late: int, bench: Recording
+) -> None:
+    """A part of it, up to the limit of 20 ms, went into the common delay while that was free.
+
+    22 ms are no 20 ms of a logger with the usual delay of each sensor.
+    """
+    found = causes(later(bench, late)).found
+    assert found is not None
+    assert found.name == "delay of all sensors"
+    assert float(found.in_words.split()[-2]) == pytest.approx(late, abs=0.3)
+    assert not found.is_usual
+
+
+def test_three_times_the_usual_zero_of_one_sensor_is_not_the_usual_zeros_of_groups(bench: Recording) -> None:
+    """Zeros of the sensor, of both chambers and of all pressures added up to one of 6 kPa as on any bench."""
+    found = causes(with_channel(bench, "pressure_1", bench["pressure_1"] + 6.0e3)).found
+    assert found is not None
+    assert found.name == "zero of pressure_1"
+    assert not found.is_usual
+
+
+@pytest.fixture(scope="module")
+def filling() -> Recording:
+    """Chamber 1 fills behind a locked vane, and chamber 2 stands at the atmosphere."""
+    at_rest = ["initial.pressure_1=atmosphere", "initial.pressure_2=atmosphere", "controller.command=1"]
+    words = ["motion.kind=locked", "run.duration=0.3 s", "motion.angle=20 deg", *at_rest, *SUPPLY]
+    run = simulate(load_scenario("step-response", words)).recording
+    random = np.random.default_rng(7)
+    channels = {
+        name: Channel(run[name] + 20.0 * random.standard_normal(len(run)), "Pa")
+        for name in ("pressure_1", "pressure_2")
+    }
+    supply = Channel(np.full(len(run), load_device("ppafo2011", overrides=SUPPLY).supply.pressure), "Pa")
+    channels |= {"command": Channel(run["command"], "-"), "angle": Channel(run["angle"], "rad")}
+    return Recording("filling", run.time, {**channels, "supply_pressure": supply}, "synthetic")
+
+
+@pytest.mark.parametrize(("zero", "rise", "step"), [(1.0e3, 0.0, 0.0), (0.0, 300.0, 0.0), (1.5e3, 300.0, 500.0)])
+def test_a_chamber_that_stands_still_is_within_its_limit_and_has_no_unit_misread(
+    zero: float, rise: float, step: float, filling: Recording
+) -> None:
+    """A zero of 0.15 psi was psi read as bar, and a rise of 300 Pa kPa read as psi, of a column declared in bar."""
+    values = filling["pressure_2"] + zero + rise * np.linspace(0.0, 1.0, len(filling))
+    values = step * np.round(values / step) if step else values
+    device = load_device("ppafo2011", overrides=SUPPLY)
+    measured = check_recording(with_channel(filling, "pressure_2", values), device, "r.csv")
+    settings = ReplaySettings(motion="locked")
+    agreement = compare_recording(measured, device, settings)
+    assert agreement.passes
+    found = causes_of([measured], [agreement], device, settings)
+    assert found.found is None or found.found.is_usual
+    assert found.nearest is None or "read as" not in found.nearest.name
+
+
+def test_a_chamber_that_rises_by_more_than_a_usual_zero_does_not_agree(filling: Recording) -> None:
+    rising = with_channel(filling, "pressure_2", filling["pressure_2"] + np.linspace(0.0, 6.0e3, len(filling)))
+    device = load_device("ppafo2011", overrides=SUPPLY)
+    measured = check_recording(rising, device, "r.csv")
+    assert not compare_recording(measured, device, ReplaySettings(motion="locked")).passes
+
+
+def test_what_is_usual_on_a_bench_is_the_same_for_limits_causes_and_the_fit() -> None:
+    usual, device = Tolerances(), load_device("ppafo2011", overrides=SUPPLY)
+    by_name = {candidate.name: candidate.usual for candidate in sizes(device, ["angle", "pressure_1", "pressure_2"])}
+    for channel in ("angle", "pressure_1"):
+        assert by_name[f"zero of {channel}"] == usual.zero_of(channel) == COMPARED[channel].usual_zero(device)
+        assert by_name[f"gain of {channel}"] == usual.gain_of(channel)

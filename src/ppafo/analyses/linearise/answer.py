@@ -181,14 +181,14 @@ def _point(model: LinearModel) -> Part:
 
 
 def _edges(model: LinearModel) -> list[str]:
-    """Return a remark on each comparison that the point lies on the edge of."""
+    """Return a remark on each kink of the plant that lies at the point."""
     remarks = []
     for edge in model.edges:
-        function, _, comparison = edge.place.partition(": ")
-        taken = "true" if edge.is_true else "false"
+        side, other = ("above", "below") if edge.is_above else ("below", "above")
+        value = _value_at_point(model, edge.name)
         remarks.append(
-            f"the point lies on an edge, with another linear model beyond: `{comparison}` in {function} was taken to "
-            f"be {taken}"
+            f"the plant has a kink at this point: the column of `{edge.name}` holds {side} {value:.5g}, and another "
+            f"one {other} it"
         )
     return remarks
 

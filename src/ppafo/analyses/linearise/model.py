@@ -29,13 +29,13 @@ class Variable:
 
 @dataclass(frozen=True, slots=True)
 class Edge:
-    """A comparison whose two numbers are equal at the point: where it stands, and whether it counts as true.
+    """A kink of the plant at the point: state or input along which slopes of both sides differ, and the side taken.
 
-    On the other side of it the plant may have another linear model.
+    The linear model holds above the value of the point where ``is_above`` is true, else below it.
     """
 
-    place: str
-    is_true: bool
+    name: str
+    is_above: bool
 
 
 @dataclass(frozen=True, slots=True)

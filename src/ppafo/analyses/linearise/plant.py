@@ -1,19 +1,22 @@
-"""The plant of a run without its controller and sensors, in symbols of CasADi: rates of its states, and outputs."""
+"""Plant of a run without its controller and sensors as a function of named numbers, and its one-sided slopes."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
-from ppafo.engine.led_leg import LedLeg, shank_at
+import numpy as np
+
+from ppafo.engine.continuous_time import free_motion, isothermal_rates, thermal_rates, turning_chambers
+from ppafo.engine.in_python import PythonFunctions, functions_of
+from ppafo.engine.lanes import Floats
+from ppafo.engine.led_leg import torque_of_leg
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, leaves, rebuilt
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run
-from ppafo.model.leg import FootLoad, ShankNow, torque_on_foot
-from ppafo.model.plant import ThermalParameters
+from ppafo.errors import SimulationError
+from ppafo.model.plant import Openings, ThermalParameters, joint_torque
 from ppafo.model.ports import at_valve
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
-from ppafo.translation.plant_rates import SINES, Turning, acceleration_of, gas_rates, thermal_gas_rates
-from ppafo.translation.symbolic import Compare, both_sides, symbolic
 
 VALVE = "valve_"
 """Begins the names of the states of a valve."""
@@ -36,29 +39,95 @@ UNITS = {
     "vented_flow": "kg/s",
 }
 """Units of all that a linear model names, in SI."""
+_SIZES = {"Pa": 1.0e5, "K": 300.0}
+"""Size of a number of a unit [SI]; 1 of any other."""
+
+
+def size_of(name: str) -> float:
+    """Size of a state or an input [SI], of which differences are fractions."""
+    return _SIZES.get(UNITS.get(name, ""), 1.0)
+
+
+class PlantValues(NamedTuple):
+    """Rates of all states and outputs, each by name [SI]."""
+
+    rates: dict[str, float]
+    outputs: dict[str, float]
 
 
 @dataclass(frozen=True, slots=True)
 class Plant:
-    """Symbols by name, and expressions by name: ``rates`` of states, ``outputs``; ``inputs`` are names of symbols."""
+    """Plant of a run without its controller and sensors; the shank of a leg is where it is at ``time`` [s].
 
-    symbols: Mapping[str, Any]
-    rates: Mapping[str, Any]
-    inputs: tuple[str, ...]
-    outputs: Mapping[str, Any]
+    ``way`` is the direction of a free vane, 0 for one that is held by friction or a stop; None where the ankle is
+    prescribed: angle and angular velocity are inputs then. ``functions`` are those of the model as the run has them.
+    """
+
+    run: Run
+    way: float | None
+    time: float
+    functions: PythonFunctions
 
     @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return tuple(self.rates)
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        more = ("angle", "angular_velocity") if self.way is None else ("external_torque",) if self.way else ()
+        return ("command", "supply_pressure", "dorsiflexion_pressure", *more)
 
-    def function(self, expressions: Sequence[Any]) -> Callable[[Mapping[str, float]], Any]:
-        """A function of the values of all symbols by name; it returns a column for each expression."""
-        # CasADi is an optional package: this module can be imported without it.
-        import casadi
+    def at(self, values: Mapping[str, float]) -> PlantValues:
+        """Rates and outputs at values of all states and inputs by name [SI].
 
-        function = casadi.Function("of_values", list(self.symbols.values()), list(expressions))
-        return lambda values: function.call([values[name] for name in self.symbols])
+        A valve state that the valve takes from its command at once is no state: it has a rate of 0 and no effect.
+        """
+        run, program, call = self.run, self.run.program, self.functions.of
+        driven: dict[str, Any] = {name: values[name] for name in DRIVEN}
+        plant = run.plant._replace(**driven)
+        angle, rate = values["angle"], values["angular_velocity"]
+        pressures = values["pressure_1"], values["pressure_2"]
+        valve = valve_at(run, self.functions, values)
+        chambers = call(turning_chambers)(plant, angle, rate, *pressures)
+        moving, warm = {}, {}
+        if isinstance(run.thermal, ThermalParameters):
+            temperatures = values["temperature_1"], values["temperature_2"]
+            gas = call(thermal_rates)(plant, run.thermal, valve.openings, chambers, *pressures, *temperatures)
+            warm = {"temperature_1": gas.temperature_1, "temperature_2": gas.temperature_2}
+        else:
+            gas = call(isothermal_rates)(plant, valve.openings, chambers, *pressures)
+        # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
+        if self.way:
+            added = 0.0 if run.leg is None else torque_of_leg(program, run.leg, self.time, angle)
+            moved = call(free_motion)(plant, angle, rate, *pressures, added, self.way)
+            moving = dict(zip(("angle", "angular_velocity"), moved, strict=True))
+        rates = moving | {"pressure_1": gas.pressure_1, "pressure_2": gas.pressure_2} | warm
+        outputs = {"torque": call(joint_torque)(plant, angle, *pressures)} | {name: values[name] for name in rates}
+        outputs |= {"supplied_flow": gas.supplied, "vented_flow": gas.vented}
+        return PlantValues(rates | valve.rates, outputs | {name: values[name] for name in valve.rates})
+
+
+DRIVEN = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
+"""Numbers of the plant that a linear model has as inputs, by their names in ``PlantParameters``."""
+
+
+def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: float = 0.0) -> Plant:
+    """Return the plant of a run near some values; other arguments as in ``Plant``.
+
+    Near a request that has arrived no slew limit is at work: a small command is followed in no time. SimulationError
+    for an effect with a state of its own.
+    """
+    limitless, functions = without_slew_limit(run), functions_in(run)
+    has_arrived = valve_at(run, functions, values).state == valve_at(limitless, functions, values).state
+    return Plant(limitless if has_arrived else run, way, time, functions)
+
+
+def functions_in(run: Run) -> PythonFunctions:
+    """Return the functions of the model as a run has them; SimulationError for an effect with a state of its own."""
+    for effect in run.program.effects:
+        if effect.state is not None:
+            raise SimulationError(
+                f"effect '{effect.name}' has a state of its own, which no linear model has: switch it off"
+            )
+    effects = zip(run.program.effects, run.effects, strict=True)
+    return functions_of(run.program, {effect.name: row for effect, row in effects})
 
 
 def valve_states(program: Program) -> dict[str, str]:
@@ -67,81 +136,91 @@ def valve_states(program: Program) -> dict[str, str]:
     return {VALVE + path.removeprefix("valve_state.").replace(".", "_"): path for path in paths}
 
 
-def plant_of(run: Run, way: float | None, compare: Compare = both_sides, time: float = 0.0) -> Plant:
-    """The plant of a run without its controller and sensors; the shank of a leg is where it is at ``time`` [s].
+class ValveNow(NamedTuple):
+    """State of the valve after the changes that it makes at once, its openings [-], and rates of its states by name."""
 
-    ``way`` is the direction of a free vane, 0 for one that is held by friction or a stop; None where the ankle is
-    prescribed: angle and angular velocity are inputs then.
-    """
-    import casadi
-
-    program = run.program
-    valve_names = valve_states(program)
-    motion, warm = ("angle", "angular_velocity"), ("temperature_1", "temperature_2") if program.is_thermal else ()
-    driven = ("command", "supply_pressure", "dorsiflexion_pressure", "external_torque")
-    names = (*motion, "pressure_1", "pressure_2", *warm, *valve_names, *driven)
-    symbols = {name: casadi.SX.sym(name) for name in names}
-    supplies_and_torque: dict[str, Any] = {name: symbols[name] for name in driven[1:]}
-    plant = run.plant._replace(**supplies_and_torque)
-    openings, moves = valve_equations(run, [symbols[name] for name in valve_names], symbols["command"], compare)
-    acting = dict(zip(program.effects, run.effects, strict=True))
-    turn: tuple[Any, Any] = (symbols["angle"], symbols["angular_velocity"])
-    pressures: tuple[Any, Any] = (symbols["pressure_1"], symbols["pressure_2"])
-    turning = Turning(program.actuator, plant, *turn, pressures, compare, acting)
-    if isinstance(run.thermal, ThermalParameters):
-        temperatures = symbols["temperature_1"], symbols["temperature_2"]
-        rates = thermal_gas_rates(turning, run.thermal, openings, temperatures)
-    else:
-        rates = gas_rates(turning, openings)
-    gas = {name: getattr(rates, name) for name in ("pressure_1", "pressure_2", *warm)}
-    spool = dict(zip(valve_names, moves, strict=True))
-    moving: dict[str, Any] = {}
-    # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
-    if way:
-        added = 0.0 if run.leg is None else _torque_of_leg(run.program, run.leg, time, symbols["angle"])
-        acceleration = acceleration_of(turning, way, added)
-        moving = {"angle": symbols["angular_velocity"], "angular_velocity": acceleration}
-    outputs = {"torque": turning.torque()}
-    outputs |= {name: symbols[name] for name in (*moving, *gas)}
-    outputs |= {"supplied_flow": rates.supplied, "vented_flow": rates.vented}
-    # What the valve takes from its command at once is no state: nothing asks for what it was before.
-    used = casadi.vertcat(*gas.values(), *moves, *outputs.values())
-    kept = {name: rate for name, rate in spool.items() if casadi.depends_on(used, symbols[name])}
-    inputs = (*driven[:3], *(motion if way is None else driven[3:] if way else ()))
-    return Plant(symbols, moving | gas | kept, inputs, outputs | {name: symbols[name] for name in kept})
+    state: Any
+    openings: Openings
+    rates: dict[str, float]
 
 
-def _torque_of_leg(program: Program, leg: LedLeg, time: float, angle: Any) -> Any:
-    """Torque of a leg [N m] at an angle that is a symbol, with the shank as it is at a time [s]."""
-    assert program.shank is not None, "a leg has a shank"
-    torque = symbolic(torque_on_foot, FootLoad, ShankNow, float, around=SINES)
-    return torque(leg.load, shank_at(program.shank, leg.shank, time), angle)
-
-
-def valve_equations(run: Run, state: list[Any], command: Any, compare: Compare) -> tuple[Any, list[Any]]:
-    """Openings of the valve [-] and the rates of its states, after the changes that it makes at once."""
-    valve, acting = run.program.valve, dict(zip(run.program.effects, run.effects, strict=True))
-    types = (valve.parameters, valve.state, float)
-    command = symbolic(at_valve, float, compare=compare, acting=acting)(command)
-    settled = symbolic(valve.settle, *types, float, compare=compare, acting=acting)(
-        run.valve, rebuilt(valve.state, state), command, 0.0
-    )
-    openings = symbolic(valve.instant, *types, compare=compare)(run.valve, settled, command)
-    return openings, leaves(symbolic(valve.rates, *types, compare=compare)(run.valve, settled, command))
+def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) -> ValveNow:
+    """The valve of a run at values of its states and of the command by name."""
+    valve, names = run.program.valve, valve_states(run.program)
+    command = functions.of(at_valve)(values["command"])
+    state = rebuilt(valve.state, [values[name] for name in names])
+    settled = functions.of(valve.settle)(run.valve, state, command, 0.0)
+    openings = functions.of(valve.instant)(run.valve, settled, command)
+    rates = numbers(functions.of(valve.rates)(run.valve, settled, command))
+    return ValveNow(settled, openings, dict(zip(names, rates, strict=True)))
 
 
 def without_slew_limit(run: Run) -> Run:
-    """The run with a valve that requests the opening of its command at once: at rest no slew limit is at work."""
+    """The run with a valve that requests the opening of its command at once, as one does that has arrived."""
     is_limited = hasattr(run.valve, "slew_limit")
     return replace(run, valve=run.valve._replace(slew_limit=NO_SLEW_LIMIT)) if is_limited else run
 
 
 def opens_in_proportion(run: Run) -> bool:
     """Return whether a small change of the command changes the openings of the valve, or how fast they move."""
-    import casadi
+    limitless = without_slew_limit(run)
+    start = dict(zip(valve_states(run.program), numbers(run.program.valve.initial()), strict=True))
+    functions = functions_in(limitless)
 
-    command = casadi.SX.sym("command")
-    start = leaves(run.program.valve.initial())
-    openings, moves = valve_equations(without_slew_limit(run), start, command, both_sides)
-    slopes = casadi.Function("slopes", [command], [casadi.jacobian(casadi.vertcat(*openings, *moves), command)])
-    return any(abs(slope) > 0.0 for value in (-0.5, 0.5) for slope in slopes(value).nonzeros())
+    def moved(command: float) -> Floats:
+        valve = valve_at(limitless, functions, start | {"command": command})
+        return np.array([*valve.openings, *valve.rates.values()])
+
+    return any(bool(np.any(one_sided_slopes(moved, value, 1.0, 1.0).values)) for value in (-0.5, 0.5))
+
+
+# Slopes by differences: towards one side of a point, where the model may have a kink.
+
+LONGEST = 1.0e-2
+"""Longest difference over the size of a number [-]."""
+SHORTER, LENGTHS = 4.0, 8
+"""How much shorter each next difference is [-], and how many there are: the shortest is some 1e-6 of the size."""
+ORDERS = 5
+"""Powers of the length of a difference that are taken out of its error."""
+
+
+class Slopes(NamedTuple):
+    """Slopes of some numbers (rows,), and estimates of their errors."""
+
+    values: Floats
+    errors: Floats
+
+
+def one_sided_slopes(function: Callable[[float], Floats], at: float, side: float, size: float) -> Slopes:
+    """Slopes of a function (rows,) at a number, towards one ``side`` (1 or -1).
+
+    Differences of values on that side, from a hundredth of ``size`` to a millionth, extrapolated to none by
+    Ridders' method (Adv. Eng. Softw. 4, 1982): of each row the slope whose two neighbours are nearest to it. The value
+    at the number itself is not asked for, so that a jump there does not matter.
+    """
+    places = at + side * LONGEST * size / SHORTER ** np.arange(LENGTHS)
+    values = np.array([function(place) for place in places.tolist()])
+    slopes = np.diff(values, axis=0) / np.diff(places)[:, None]
+    best, errors = slopes[-1], np.full(slopes.shape[1], np.inf)
+    for order in range(1, ORDERS + 1):
+        better = slopes[1:] + np.diff(slopes, axis=0) / (SHORTER**order - 1.0)
+        apart = np.maximum(np.abs(better - slopes[1:]), np.abs(better - slopes[:-1]))
+        nearest = np.nanargmin(np.where(np.isfinite(apart), apart, np.inf), axis=0), np.arange(best.size)
+        is_better = apart[nearest] < errors
+        best, errors = np.where(is_better, better[nearest], best), np.where(is_better, apart[nearest], errors)
+        slopes = better
+    return Slopes(best, errors)
+
+
+def side_of(name: str, values: Mapping[str, float], way: float | None) -> float:
+    """Side of a number on which a linear model holds: the command goes up, or back from full opening.
+
+    The faster or fuller side of a vane, of chamber 1 and its supply; the emptier one of chamber 2.
+    """
+    if name == "command":
+        return 1.0 if abs(values[name]) < 1.0 else -float(np.sign(values[name]))
+    if name in (f"{VALVE}requested", f"{VALVE}opening"):
+        return 1.0 if values[name] < 1.0 else -1.0
+    if name == "angular_velocity" and way:
+        return way
+    return 1.0 if name in ("pressure_1", "supply_pressure", "angle", "angular_velocity") else -1.0

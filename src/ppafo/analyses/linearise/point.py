@@ -2,16 +2,27 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 
-from ppafo.analyses.linearise.plant import VALVE, plant_of, valve_states, without_slew_limit
+from ppafo.analyses.linearise.plant import (
+    VALVE,
+    Plant,
+    functions_in,
+    one_sided_slopes,
+    plant_of,
+    side_of,
+    size_of,
+    valve_at,
+    valve_states,
+    without_slew_limit,
+)
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.continuous_time import mode_at_rest, torque_at_rest
+from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Floats, run_batch
-from ppafo.engine.linking import python_place
-from ppafo.engine.rows import numbers, rebuilt
+from ppafo.engine.rows import numbers
 from ppafo.engine.run import NEVER_FAILED, Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -27,13 +38,12 @@ STEADY = 1.0e-9
 """Largest rate of a state [1/s], over the size of the state, that counts as none."""
 _FIRST_COMMANDS = (0.01, 0.1, 0.003, 0.03, 0.3, 1.0)
 """Sizes of commands [-] from which the steady state is looked for."""
-_SIZES = {"pressure": 1.0e5, "temperature": 300.0, "torque": 1.0}
 _MOST_STEPS = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Point:
-    """Values of all symbols of the plant by name [SI], at a ``time`` [s] of the run; None for a steady state.
+    """Values of all states and inputs of the plant by name [SI], at a ``time`` [s] of the run; None for a steady state.
 
     ``way`` is the direction of a free vane, 0 where friction or a stop holds it; None where the ankle is prescribed.
     """
@@ -87,10 +97,9 @@ def _way(run: Run, values: Mapping[str, float], time: float) -> float | None:
     rate, angle = values["angular_velocity"], values["angle"]
     if rate != 0.0:
         return 1.0 if rate > 0.0 else -1.0
-    limit, plant = python_place(friction_at_rest, run.program.effects, run.effects), run.plant
+    limit, plant = in_program(friction_at_rest, run.program, run.effects), run.plant
     pressures = values["pressure_1"], values["pressure_2"]
-    if limit is not None:
-        plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
+    plant = plant._replace(static_torque=limit({}, plant.static_torque, *pressures))
     return mode_at_rest(plant, angle, torque_at_rest(run)({}, time, angle, *pressures))
 
 
@@ -137,8 +146,8 @@ def equilibrium(scenario: Scenario) -> Point:
     # A valve that is closed but for rounding is closed.
     steady |= {name: 0.0 for name in ("command", *opening_names(steady)) if abs(steady[name]) < STEADY}
     # What the valve takes from its command at once was no unknown.
-    at_rest = dict(zip(valve_states(run.program), numbers(settled(run, steady)), strict=True))
-    return Point(None, steady | at_rest, way)
+    at_rest = numbers(valve_at(run, functions_in(run), steady).state)
+    return Point(None, steady | dict(zip(valve_states(run.program), at_rest, strict=True)), way)
 
 
 def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: float | None) -> dict[str, float] | None:
@@ -152,19 +161,19 @@ def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: f
         pressures = [1.001 * lowest + (surplus if is_fed else 0.0) for is_fed in (command > 0.0, command < 0.0)]
         fed = {"pressure_1": pressures[0], "pressure_2": pressures[1], "command": command}
         starts.append({**values, **fed, **dict.fromkeys(opening_names(values), command)})
-    import casadi
-
-    # All rates, and the torque where one is wanted, as functions of all states, and the command where that is free.
-    plant = plant_of(run, held)
-    names = [*plant.states, *([] if wanted is None else ["command"])]
-    sizes = np.array([_SIZES.get(name.partition("_")[0], 1.0) for name in names])
-    # Rates over the sizes of their states, so that pascals and openings count alike.
-    rates = [plant.rates[name] / size for name, size in zip(plant.states, sizes.tolist(), strict=False)]
-    unknowns = casadi.vertcat(*(plant.symbols[name] for name in names))
-    residual = casadi.vertcat(*rates, *([] if wanted is None else [plant.outputs["torque"] - wanted]))
-    function = plant.function([residual, casadi.jacobian(residual, unknowns)])
-    reached = (_newton(function, names, sizes, start) for start in starts)
+    plant = plant_of(run, held, values)
+    # The unknowns are all states, and the command where a torque is wanted.
+    names = [*plant.at(values).rates, *([] if wanted is None else ["command"])]
+    reached = (_newton(partial(_imbalance, plant, wanted), names, start) for start in starts)
     return next((steady for steady in reached if steady is not None), None)
+
+
+def _imbalance(plant: Plant, wanted: float | None, values: Mapping[str, float]) -> Floats:
+    """All rates over the sizes of their states [1/s], and the torque less the one that is wanted [N m]."""
+    found = plant.at(values)
+    # So that pascals and openings count alike.
+    rates = [rate / size_of(name) for name, rate in found.rates.items()]
+    return np.array([*rates, *([] if wanted is None else [found.outputs["torque"] - wanted])])
 
 
 def opening_names(values: Mapping[str, float]) -> list[str]:
@@ -172,21 +181,30 @@ def opening_names(values: Mapping[str, float]) -> list[str]:
     return [name for name in values if name in (f"{VALVE}requested", f"{VALVE}opening")]
 
 
+def _slopes(
+    function: Callable[[Mapping[str, float]], Floats], names: Sequence[str], values: Mapping[str, float]
+) -> Floats:
+    """Slopes of a function of named values (rows, names)."""
+
+    def along(name: str) -> Floats:
+        side, size = side_of(name, values, None), size_of(name)
+        return one_sided_slopes(lambda value: function({**values, name: value}), values[name], side, size).values
+
+    return np.array([along(name) for name in names]).T
+
+
 def _newton(
-    function: Callable[[Mapping[str, float]], Any], names: Sequence[str], sizes: Floats, start: Mapping[str, float]
+    function: Callable[[Mapping[str, float]], Floats], names: Sequence[str], start: Mapping[str, float]
 ) -> dict[str, float] | None:
     """Values at which a function is 0, by Newton's method with steps cut where they lead too far; None where none."""
-
-    def at(values: Mapping[str, float]) -> tuple[Floats, Floats]:
-        residual, slopes = (np.array(column) for column in function(values))
-        return residual.ravel(), slopes
-
+    sizes = np.array([size_of(name) for name in names])
     values = dict(start)
-    residual, slopes = at(values)
+    residual = function(values)
     for _ in range(_MOST_STEPS):
         largest = float(np.max(np.abs(residual)))
         if largest < STEADY:
             return values if abs(values["command"]) <= 1.0 + STEADY else None
+        slopes = _slopes(function, names, values)
         if not (np.isfinite(largest) and np.isfinite(slopes).all()):
             return None
         # Least squares instead of a solver that refuses: in a dead band the slopes are singular.
@@ -201,7 +219,7 @@ def _newton(
                     moved[name] = max(moved[name], 0.5 * values[name])
                 if name == "command":
                     moved[name] = min(max(moved[name], -1.0), 1.0)
-            residual, slopes = at(moved)
+            residual = function(moved)
             if np.isfinite(residual).all() and float(np.max(np.abs(residual))) < largest:
                 break
             share *= 0.5
@@ -209,9 +227,3 @@ def _newton(
             return None
         values = moved
     return None
-
-
-def settled(run: Run, values: Mapping[str, float]) -> Any:
-    """State of the valve after the changes that it makes at once."""
-    state: Any = rebuilt(run.program.valve.state, [values[name] for name in valve_states(run.program)])
-    return run.program.valve.settle(run.valve, state, values["command"], 0.0)

@@ -23,7 +23,8 @@ def linearise(
     """Make a linear model of the plant near one point, for control design.
 
     The equilibrium is the steady state whose torque is the last value of the reference, or, where the controller is a
-    constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives are exact.
+    constant command, whose command is that one; the ankle stands where the run leaves it. Derivatives
+    are differences of the plant's own equations, good to 1e-6 of the largest of their row.
     ScenarioError for a time outside the run, where there is no equilibrium, and for a valve that is on or off.
 
     at: a time of the run, such as '1.5 s', or 'equilibrium' (default): the steady state that holds the last value of

@@ -1,80 +1,45 @@
 """A linear model of the plant of a scenario, at an instant of its run or at its steady state."""
 
 from collections.abc import Mapping
-from importlib.util import find_spec
 from numbers import Real
-from typing import Any
 
 import numpy as np
 
 from ppafo.analyses.linearise.model import Delays, Edge, LinearModel, Variable
-from ppafo.analyses.linearise.plant import UNITS, VALVE, Plant, opens_in_proportion, plant_of
-from ppafo.analyses.linearise.point import Point, equilibrium, point_at, settled
+from ppafo.analyses.linearise.plant import (
+    UNITS,
+    VALVE,
+    Plant,
+    PlantValues,
+    functions_in,
+    one_sided_slopes,
+    opens_in_proportion,
+    plant_of,
+    side_of,
+    size_of,
+    valve_at,
+)
+from ppafo.analyses.linearise.point import Point, equilibrium, point_at
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.orifice import FlowCurve
-from ppafo.model.plant import Openings
 from ppafo.parameters.joint import Joint
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
 
-# The smooth piece of the plant on which a point lies: how comparisons are decided there, and which side that is.
-
-EQUAL = 1.0e-12
-"""Two sides that differ by less than this, over the larger one, are equal."""
 ON_THE_EDGE = 1.0e-6
-"""Two sides of a comparison that differ by less than this, over the larger one, lie on an edge of the model."""
+"""Two slopes of one number, towards both sides, that differ by more than this, over the largest of their row, are two.
 
-
-class Sides:
-    """Decides every comparison at a point, one of them on its ``other_side``, and keeps those that lie on an edge.
-
-    Of two equal numbers that one counts as larger which grows faster along one direction, so that all comparisons are
-    decided as they are at one point nearby.
-    """
-
-    def __init__(self, values: Mapping[str, float], other_side: str = "") -> None:
-        self._values, self._other_side = values, other_side
-        self.edges: dict[str, Edge] = {}
-
-    def __call__(self, sign: str, left: Any, right: Any, where: str) -> bool:
-        """Return whether the comparison of two expressions that stands at a place counts as true."""
-        import casadi
-
-        # Both values at the point, and how fast the one grows beyond the other along the direction.
-        symbols = casadi.symvar(casadi.vertcat(left, right))
-        onward = casadi.DM([_direction(symbol.name(), self._values) for symbol in symbols])
-        surplus = casadi.SX(left) - casadi.SX(right)
-        growth = casadi.jtimes(surplus, casadi.vertcat(*symbols), onward) if symbols else 0.0
-        known = [self._values[symbol.name()] for symbol in symbols]
-        row = casadi.Function("values", symbols, [casadi.vertcat(left, right, growth)]).call(known)[0]
-        left_value, right_value, ahead = (float(number) for number in row.nonzeros())
-        larger, difference = max(abs(left_value), abs(right_value)), left_value - right_value
-        beyond = difference if abs(difference) > EQUAL * larger else ahead
-        tests = {"<": beyond < 0.0, "<=": beyond <= 0.0, ">": beyond > 0.0, ">=": beyond >= 0.0}
-        # Signs that are not in the table are == and !=: they have no edge.
-        is_true = tests.get(sign, (left_value == right_value) == (sign == "=="))
-        if sign in tests and abs(difference) <= ON_THE_EDGE * larger:
-            self.edges[where] = Edge(where, is_true)
-        return is_true != (where == self._other_side)
-
-
-def _direction(name: str, values: Mapping[str, float]) -> float:
-    """Where the point nearby lies: the command goes up, or back from full opening; the rest counts less."""
-    if name == "command":
-        return 1.0 if abs(values[name]) < 1.0 else -values[name]
-    if name in (f"{VALVE}requested", f"{VALVE}opening"):
-        return 1.0e-6 if values[name] < 1.0 else -1.0e-6
-    first = ("pressure_1", "supply_pressure", "angle", "angular_velocity")
-    return 1.0e-6 * max(1.0, abs(values[name])) * (1.0 if name in first else -0.5)
+Slopes by differences agree to some 1e-9 where the plant has no kink.
+"""
 
 
 def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
     """Which side of each limit the point lies on, in words by place; ``joint`` names what moves."""
     at, plant = point.values, run.plant
-    openings: Openings = run.program.valve.instant(run.valve, settled(run, at), at["command"])
+    openings = valve_at(run, functions_in(run), at).openings
     room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
     paths = {
         "source to chamber 1": (at["supply_pressure"], first, openings.source_1),
@@ -113,17 +78,14 @@ def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: flo
 
 
 EQUILIBRIUM = "equilibrium"
-MISSING_CASADI = "a linear model needs CasADi: pip install ppafo[control]"
 DEAF = "no small change of the command changes it (dead band, slew limit, beyond full): the command's column is 0"
 
 
 def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     """Return the linear model of a scenario at a time [s] of its run, a number or a text, or at ``EQUILIBRIUM``.
 
-    ScenarioError without CasADi, for regulated supplies, a valve that is on or off, and a point that is not there.
+    ScenarioError for regulated supplies, a valve that is on or off, and a point that is not there.
     """
-    if find_spec("casadi") is None:
-        raise ScenarioError(MISSING_CASADI)
     run = plan_run(scenario)
     if scenario.supply_lines is not None:
         raise ScenarioError(f"{scenario.name}: linear models are for constant supplies; omit [supply_line]")
@@ -143,51 +105,55 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
 
 
 def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
-    """The linear model at a point, from the smooth piece that the point lies on."""
-    values = dict(point.values)
-    decided = Sides(values)
-    time = point.time or 0.0
-    plant = plant_of(run, point.way, decided, time)
-    matrices = _matrices(plant, values)
-    edges = []
-    for comparison, edge in decided.edges.items():
-        others = _matrices(plant_of(run, point.way, Sides(values, comparison), time), values)
-        # An edge counts only where the linear model on its other side is another one, or of other states.
-        pairs = list(zip(matrices[:4], others[:4], strict=True))
-        is_same = all(here.shape == beyond.shape for here, beyond in pairs) and all(
-            np.allclose(here, beyond, rtol=ON_THE_EDGE, atol=0.0, equal_nan=True) for here, beyond in pairs
-        )
-        if not is_same:
-            edges.append(edge)
-    a, b, c, d, rates, outputs = matrices
+    """The linear model at a point, towards the side of each state and input that ``side_of`` says."""
+    values, plant = dict(point.values), plant_of(run, point.way, point.values, point.time or 0.0)
+    here = plant.at(values)
+    slopes = {name: _both_slopes(plant, values, name) for name in (*here.rates, *plant.inputs)}
+    # What the valve takes from its command at once is no state: nothing asks for what it was before.
+    idle = [name for name in here.rates if name.startswith(VALVE) and not _acts(here, name, slopes[name])]
+    states, outputs = ([name for name in names if name not in idle] for names in (here.rates, here.outputs))
+    columns = [*states, *plant.inputs]
+    is_row = [name not in idle for name in (*here.rates, *here.outputs)]
+    taken, beyond, errors = (np.array([slopes[name][part] for name in columns]).T[is_row] for part in (0, 1, 2))
+    count = len(states)
+    a, b, c, d = taken[:count, :count], taken[:count, count:], taken[count:, :count], taken[count:, count:]
     sides = sides_of(run, point, scenario.device.joint)
     if not np.any(b[:, 0]) and not np.any(d[:, 0]):
         sides["valve"] += f"; {DEAF}"
+    sizes = np.array([size_of(name) for name in columns])
+    largest = np.max(np.maximum(np.abs(taken), np.abs(beyond)) * sizes, axis=1, keepdims=True)
+    is_kink = np.any(np.abs(taken - beyond) * sizes > ON_THE_EDGE * largest + 10.0 * errors * sizes, axis=0)
+    kinks = [name for name, differs in zip(columns, is_kink.tolist(), strict=True) if differs]
     return LinearModel(
         scenario=scenario,
         time=point.time,
-        states=tuple(Variable(name, UNITS[name], values[name]) for name in plant.states),
+        states=tuple(Variable(name, UNITS[name], values[name]) for name in states),
         inputs=tuple(Variable(name, UNITS[name], values[name]) for name in plant.inputs),
-        outputs=tuple(
-            Variable(name, UNITS[name], float(value))
-            for name, value in zip(plant.outputs, outputs.ravel().tolist(), strict=True)
-        ),
+        outputs=tuple(Variable(name, UNITS[name], here.outputs[name]) for name in outputs),
         a=a,
         b=b,
         c=c,
         d=d,
-        rates=rates.ravel(),
+        rates=np.array([here.rates[name] for name in states]),
         sides=sides,
-        edges=tuple(edges),
+        edges=tuple(Edge(name, side_of(name, values, point.way) > 0.0) for name in kinks),
         delays=Delays(run.command_delay, run.signal_delay, run.period),
     )
 
 
-def _matrices(plant: Plant, values: Mapping[str, float]) -> list[Floats]:
-    """A, B, C and D of a plant at some values; then its rates and outputs there, as columns."""
-    import casadi
+def _both_slopes(plant: Plant, values: Mapping[str, float], name: str) -> tuple[Floats, Floats, Floats]:
+    """Slopes (rates and outputs,) by a state or an input on its side of the point, beyond it, and their errors."""
 
-    x, u = (casadi.vertcat(*(plant.symbols[name] for name in names)) for names in (plant.states, plant.inputs))
-    rates, outputs = casadi.vertcat(*plant.rates.values()), casadi.vertcat(*plant.outputs.values())
-    jacobians = [casadi.jacobian(column, by) for column in (rates, outputs) for by in (x, u)]
-    return [np.array(matrix) for matrix in plant.function([*jacobians, rates, outputs])(values)]
+    def moved(value: float) -> Floats:
+        found = plant.at({**values, name: value})
+        return np.array([*found.rates.values(), *found.outputs.values()])
+
+    side, size = side_of(name, values, plant.way), size_of(name)
+    taken, beyond = (one_sided_slopes(moved, values[name], way, size) for way in (side, -side))
+    return taken.values, beyond.values, taken.errors + beyond.errors
+
+
+def _acts(here: PlantValues, name: str, slopes: tuple[Floats, Floats, Floats]) -> bool:
+    """True where a state of the valve changes anything but the output that shows it."""
+    is_other = [row != name for row in (*(f"rate of {state}" for state in here.rates), *here.outputs)]
+    return any(bool(np.any(side[is_other])) for side in slopes[:2])

@@ -44,12 +44,12 @@ def validate(
 ) -> Finding[Validation]:
     """Compare a parameter set with recordings, channel by channel.
 
-    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model. With
-    no threshold it is 10 % of full range, at least half of the variance of a signal beside its noise is explained, and
-    no single change of record, set or model may explain the recordings; what none explains may be 3 %. The result's
+    The model is run on the recorded command, supply pressure and external torque; residuals are measured - model.
+    With no threshold an RMS error may be 3 % of full range, and less where that is over half of the variance of a
+    signal, beside noise and the usual zero of a sensor; a cause is named whether it passes or not. The result's
     ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
-    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay [s]
-    of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
+    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay
+    [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
 
     parameter_set: name of a parameter set, or a .toml file
     recordings: a .csv or .nc file, or a result folder; several may be given
@@ -60,7 +60,7 @@ def validate(
         compared
     initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
     thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7 psi_d';
-        default: 10%, and half of the variance of the signal is explained
+        default: 3%, and half of the variance of the signal is explained
     longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
     columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
         it
@@ -123,6 +123,5 @@ def validate(
         settings=settings,
         recordings=tuple(agreements),
         causes=causes_of(read, agreements, device, settings, report),
-        has_limits=bool(thresholds),
     )
     return finding_of(validation)

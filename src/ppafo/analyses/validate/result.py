@@ -12,8 +12,6 @@ from ppafo.validation.causes import Cause, Causes
 from ppafo.validation.compared import COMPARED
 from ppafo.version import __version__
 
-LITTLE = 0.03
-"""RMS error over the full range up to which a residual beside the noise, of which no cause is known, is a remark."""
 _EXPLAINS = 0.5
 """Residual with the nearest cause over the residual without any, up to which that cause is worth naming."""
 
@@ -22,8 +20,7 @@ _EXPLAINS = 0.5
 class Validation:
     """A parameter set and what each recording reports of it.
 
-    ``overrides`` changed the set, ``causes`` are those of what is left; ``has_limits`` is true where limits of the
-    errors were given.
+    ``overrides`` changed the set, ``causes`` are those of what is left.
     """
 
     parameter_set: str
@@ -32,20 +29,11 @@ class Validation:
     settings: ReplaySettings
     recordings: tuple[RecordingAgreement, ...]
     causes: Causes
-    has_limits: bool
 
     @property
     def passes(self) -> bool:
-        """True where every error is within its limit and, without limits given, only what any bench has is left.
-
-        A cause that is found and that not any bench has is a disagreement, however small. A residual that no single
-        cause explains is one only where it is more than ``LITTLE``, for no model has all that a device has. Of a
-        recorded angle that is followed causes are not searched.
-        """
-        causes, channels = self.causes, [channel for recording in self.recordings for channel in recording.channels]
-        is_little = causes.tried == 0 or all(channel.fraction <= LITTLE for channel in channels)
-        is_usual = causes.is_noise or (is_little if causes.found is None else causes.found.is_usual)
-        return (self.has_limits or is_usual) and all(recording.passes for recording in self.recordings)
+        """True where every error is within its limit: a cause says why, whether it passes or not."""
+        return all(recording.passes for recording in self.recordings)
 
     def json_document(self) -> dict[str, Any]:
         """Return errors, causes and recordings as plain data in SI."""
@@ -81,16 +69,14 @@ def verdict(validation: Validation) -> str:
         for channel, agreement in pairs
         if not channel.passes
     )
-    why = _why(validation.causes, worst.in_noise)
-    if not validation.passes:
-        # Where no channel is beyond its limit, an unusual cause alone is what fails the set.
-        parts = (why, size, f"beyond the limit: {failed}") if why else (failed, size)
-        return f"{name} does not agree: {'; '.join(parts if failed else parts[:2])}"
+    why = _why(validation.causes, worst.in_noise, validation.passes)
     rest = "nothing but noise is left" if validation.causes.is_noise else "; ".join([size, *([why] if why else [])])
+    if not validation.passes:
+        return f"{name} does not agree: {failed}; {rest}"
     return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
-def _why(causes: Causes, without: float) -> str:
+def _why(causes: Causes, without: float, passes: bool) -> str:
     """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
 
     ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or
@@ -98,7 +84,8 @@ def _why(causes: Causes, without: float) -> str:
     """
     if causes.found is not None:
         verdict = in_words(causes.found)
-        verdict += ", as on any bench" if causes.found.is_usual else ""
+        # What is beyond a limit is more than usual, of whatever kind it is.
+        verdict += ", as on any bench" if causes.found.is_usual and passes else ""
         same = ", ".join(cause.name for cause in causes.found.same)
         return f"{verdict} (or, the same for these recordings: {same})" if same else verdict
     if not causes.tried:

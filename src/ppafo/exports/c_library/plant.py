@@ -100,7 +100,7 @@ _REPLACED = ("sensors.", "motion.profile.", "motion.external_torque", "motion.an
 
 
 def plant_of(scenario: Scenario) -> PlantAlone:
-    """Return the plant; an unconstrained vane takes an external torque, one with a prescribed angle angle and rate.
+    """Return the plant; a free joint takes a torque, one with a prescribed angle takes angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone.
     """
@@ -165,24 +165,23 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> D
 
 @_drive_of.register
 def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
-    """Return the drive of a free joint: T_ex on a vane alone, or T_2 of the ankle of a leg, which is opposed."""
+    """Return the drive of a free joint: T_ex on a vane alone, or T_2 on the ankle of a leg, which T_ex opposes."""
     if motion.leg is None:
-        path, joint, setting = "motion.external_torque", "T_ex on the joint", "{external_torque}"
+        name, summary, start, load = (
+            "external_torque",
+            "T_ex, above 0 against plantarflexion",
+            motion.external_torque,
+            "",
+        )
     else:
-        path, joint, setting = "motion.ankle_torque", "on the ankle of the leg, -T_2", "-{external_torque}"
-    torque = Input(
-        "external_torque",
-        "N m",
-        f"torque {joint}, above 0 works against plantarflexion",
-        motion.outside_torque,
-        settings[path].quantity.minimum,
-        settings[path].quantity.maximum,
-    )
+        name, summary, start, load = "ankle_torque", "T_2, above 0 plantarflexes", motion.leg.ankle_torque, "-"
+    limits = settings[f"motion.{name}"].quantity
+    torque = Input(name, "N m", f"torque on the ankle, {summary}", start, limits.minimum, limits.maximum)
     return Drive(
-        motion="The external torque is constant until the next one.",
+        motion="The torque is constant until the next one.",
         inputs=(torque,),
-        settings=(Assignment(c_identifier(path), setting),),
-        parameters=(Assignment("plant.external_torque", "{external_torque}"),),
+        settings=(Assignment(c_identifier(f"motion.{name}"), f"{{{name}}}"),),
+        parameters=(Assignment("plant.external_torque", f"{load}{{{name}}}"),),
     )
 
 
@@ -269,7 +268,12 @@ def _commanded_vane(scenario: Scenario) -> Scenario:
         description=f"The plant alone of this scenario: {scenario.description}",
         run=replace(scenario.run, step=step, output_interval=step),
         controller=Control("constant", {"command": 0.0}, step),
-        sensors=Sensors(),
+        # What a sensor sees reaches nothing here, but when it looks divides a step of the engine, and so does its lag.
+        sensors=Sensors(
+            delay=scenario.sensors.delay,
+            angle_bandwidth=scenario.sensors.angle_bandwidth,
+            pressure_bandwidth=scenario.sensors.pressure_bandwidth,
+        ),
         links=outside(scenario.links, "controller", "reference"),
     )
 

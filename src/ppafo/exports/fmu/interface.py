@@ -77,7 +77,7 @@ def closed_loop(scenario: Scenario) -> Interface:
 
 
 def plant_alone(scenario: Scenario) -> Interface:
-    """Return the plant; an unconstrained vane takes an external torque, one with a prescribed angle angle and rate.
+    """Return the plant; a free joint takes a torque, one with a prescribed angle takes angle and rate.
 
     For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
     """

@@ -11,9 +11,9 @@ from ppafo.identification.fit import Fit, fit
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
 from ppafo.identification.residuals import Block, Free
 from ppafo.identification.source import Source
-from ppafo.identification.tolerances import deviation_of_limit
 from ppafo.signals.faults import resolution_of, rounding_of
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
 Values = Mapping[str, float]
 """Numbers of a law by name, SI units; one that is not there is 0."""

@@ -45,11 +45,12 @@ from ppafo.identification.source import (
     pool,
     window,
 )
-from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances, deviation_of_limit
+from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 
 PROCEDURE = "vane-leak"
 LAMINAR = "effects.laminar_leak.coefficient"

@@ -13,7 +13,7 @@ from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.keys import positive_in, quantity_in
 from ppafo.identification.source import Source, Use, double_use, told_of_readings
-from ppafo.identification.tolerances import Tolerances, deviation_of_limit, quantity_of
+from ppafo.identification.tolerances import Tolerances, quantity_of
 from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
@@ -38,6 +38,7 @@ from ppafo.simulation.recorded.channels import ANGLE, COMMAND
 from ppafo.simulation.recorded.clock import LONGEST_STEP
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import Scenario
 
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 
 from ppafo.identification.new_set import fitting_unit, stated_half_width
-from ppafo.identification.tolerances import Tolerances, deviation_of_limit
+from ppafo.identification.tolerances import Tolerances
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, Experiment, scenario_of
 from ppafo.identification.trajectory.numbers import (
     GAIN_OF,
@@ -19,6 +19,7 @@ from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
 from ppafo.signals.recording import Recording
 from ppafo.simulation.recorded.channels import ANGLE, DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
+from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import FreeMotion, Scenario, vane_motion
 
 _WIDEST = 12.0

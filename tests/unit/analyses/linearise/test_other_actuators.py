@@ -1,15 +1,14 @@
 """Linear models of actuators that are no vane: rates against a recording, slopes against rates."""
 
-import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-pytest.importorskip("casadi")
-from ppafo.analyses.linearise.plant import plant_of
-from ppafo.analyses.linearise.solve import linear_model
+from ppafo.analyses.linearise.plant import plant_of, valve_states
+from ppafo.analyses.linearise.point import point_at
+from ppafo.analyses.linearise.solve import linear_model, model_at
 from ppafo.loading import load_scenario
 from ppafo.running import simulate
 from ppafo.simulation.plan import plan_run
@@ -54,16 +53,29 @@ def test_the_columns_of_a_linear_model_are_differences_of_its_rates(case: str) -
     model, run = linear_model(scenario, AT), plan_run(scenario)
     values = {variable.name: variable.value for variable in (*model.states, *model.inputs)}
     way = float(np.sign(values["angular_velocity"])) if "angular_velocity" in values else 0.0
-    plant = plant_of(dataclasses.replace(run), way)
-    known = {name: values.get(name, 0.0) for name in plant.symbols} | {"angle": values.get("angle", run.initial.angle)}
-    import casadi
-
-    function = plant.function([casadi.vertcat(*plant.rates.values())])
+    known = {"external_torque": 0.0, "angular_velocity": 0.0, "angle": run.initial.angle, **values}
+    known = {**dict.fromkeys(valve_states(run.program), 0.0), **known}
+    plant = plant_of(run, way, known)
     for column, variable in enumerate(model.states):
         step = 1.0e-6 * max(abs(variable.value), 1.0)
-        more, less = (
-            np.array(function({**known, variable.name: variable.value + way * step})[0]).ravel() for way in (1, -1)
-        )
-        difference = (more - less) / (2.0 * step)
+        more, less = (plant.at({**known, variable.name: variable.value + sign * step}).rates for sign in (1, -1))
+        difference = np.array([(more[item.name] - less[item.name]) / (2.0 * step) for item in model.states])
         scale = np.max(np.abs(difference)) + 1e-9
         assert model.a[:, column] == pytest.approx(difference, abs=1e-4 * scale), variable.name
+
+
+def test_a_load_has_the_slopes_of_its_formula_on_every_actuator() -> None:
+    load = ("effects.joint_load.drag=0.05 N m s^2/rad^2", "effects.joint_load.stiffness=8 N m/rad")
+    for case in ("cylinder", "bladder"):
+        name, overrides = CASES[case]
+        texts = [*overrides, "run.duration=0.1 s"]
+        plain = load_scenario(ACTUATORS / f"{name}.toml", texts)
+        loaded = load_scenario(ACTUATORS / f"{name}.toml", [*texts, *load])
+        point = point_at(plain, AT)
+        without, model = (model_at(scenario, plan_run(scenario), point) for scenario in (plain, loaded))
+        inertia, rate = plan_run(plain).plant.inertia, point.values["angular_velocity"]
+        states = [variable.name for variable in model.states]
+        row, by_angle = states.index("angular_velocity"), states.index("angle")
+        more = (model.a - without.a)[row]
+        assert more[by_angle] == pytest.approx(-8.0 / inertia, rel=1e-4), case
+        assert more[row] == pytest.approx(-2.0 * 0.05 * abs(rate) / inertia, rel=1e-4), case

@@ -14,6 +14,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import read_csv, write_csv, write_netcdf
 
+CHAMBERS = ("pressure_1", "pressure_2")
 SUPPLY = ["--set", "supply.pressure=55 psi_g", "--set", "supply.dorsiflexion_pressure=55 psi_g"]
 SET = ["validate", "ppafo2011", *SUPPLY]
 
@@ -107,7 +108,7 @@ def test_a_wrong_parameter_and_a_strict_threshold_give_exit_code_1(
     assert main([*SET, step, "--set", "valve.area=8 mm^2"]) == 1
     # Only the product of area and discharge coefficient acts.
     orifice = r"valve\.(area|discharge_coefficient)"
-    assert re.search(rf"does not agree: {orifice} seems to be 3\.9\d times", capsys.readouterr().out)
+    assert re.search(rf"does not agree: angle in .*; {orifice} seems to be 3\.9\d times", capsys.readouterr().out)
     assert main([*SET, step, "--threshold", "angle=10%", "--threshold", "pressure_1=0.01 psi_d"]) == 1
     printed = capsys.readouterr().out
     assert "does not agree: pressure_1 in" in printed
@@ -209,3 +210,18 @@ def test_a_small_residual_of_which_no_cause_is_known_is_a_remark_and_a_large_one
         assert found.passed is agrees, said
         assert "no single change explains it" in said
         assert re.search(r"is off by [\d.]+ times its noise \([\d.]+ % of full range\)", said)
+
+
+def test_a_named_cause_is_a_remark_of_either_verdict_and_the_size_decides(tmp_path: Path) -> None:
+    """A discharge coefficient 3 % low failed by its name at a quarter of a percent of the range."""
+    random = np.random.default_rng(12)
+    for factor, agrees in ((0.97, True), (0.5, False)):
+        words = ["motion.kind=free", "run.duration=0.2 s", f"valve.discharge_coefficient={0.113 * factor:.6g}"]
+        run = simulate(load_scenario("step-response", words)).recording
+        channels = {name: Channel(run[name] + 50.0 * random.standard_normal(len(run)), "Pa") for name in CHAMBERS}
+        channels |= {"command": Channel(run["command"], "-"), "angle": Channel(run["angle"], "rad")}
+        write_csv(tmp_path / "one.csv", Recording("one", run.time, channels, "synthetic"))
+        found = ppafo.validate("ppafo2011", [tmp_path / "one.csv"], overrides=SUPPLY[1::2])
+        said = str(found.to_dict()["summary"])
+        assert found.passed is agrees, said
+        assert f"seems to be {factor:.3g}" in said
