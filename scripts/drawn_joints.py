@@ -8,6 +8,7 @@ its limits are counted as between, since nobody can say whether they are good. A
 import math
 import random
 import re
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -52,7 +53,7 @@ def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Pat
     """Write the parameter set of a drawn joint with a proportional valve and a pair of on/off valves; its file."""
 
     def log(low: float, high: float) -> float:
-        return low * (high / low) ** draw.random()
+        return float(low * (high / low) ** draw.random())
 
     first = float(draw.randrange(5, 60))
     last, gauge = first + draw.randrange(45, 110), draw.uniform(2.0, 8.0)
@@ -268,6 +269,7 @@ def count_joints(seed: int, joints: int) -> dict[tuple[str, str], Counter[str]]:
             for task in draw_tasks(draw, file):
                 row = counts.setdefault((kind, task.name), Counter())
                 row.update(_outcome(task))
+            print(f"{number + 1} of {joints} joints", file=sys.stderr, flush=True)
     return counts
 
 
