@@ -127,8 +127,9 @@ class PythonFunctions:
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         own = [name for name in names if name not in rows]
 
-        def called(*arguments: Any) -> Any:
-            return function(**dict(zip(own, arguments, strict=True)), **{row: self._rows[row] for row in rows})
+        def called(*arguments: Any, **named: Any) -> Any:
+            given = dict(zip(own, arguments, strict=False))
+            return function(**given, **named, **{row: self._rows[row] for row in rows})
 
         return called
 
