@@ -8,9 +8,8 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import simulate
+from ppafo.running import simulate, tried
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking import tried
 
 SERVO = ("cylinder-servo", ("run.duration=1 s",))
 STUCK = ("friction.static_torque=2 N m", "friction.dynamic_torque=1 N m")
