@@ -15,7 +15,8 @@ from ppafo.engine.run import Run, batch_of
 from ppafo.engine.step import isothermal, phases
 from ppafo.engine.step.lane import Lane
 from ppafo.errors import ProgramError
-from ppafo.model.plant import BlendedPort
+from ppafo.model.plant import BlendedPort, single_ports
+from ppafo.model.valves.vent_valve import connect_ideal
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 
@@ -76,13 +77,27 @@ def test_a_gas_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_sa
     assert not np.array_equal(records[1], usual)
 
 
+def unannotated(plant, shown):  # type: ignore[no-untyped-def]
+    """Ports of a valve that does not say which."""
+    return single_ports(plant, shown)
+
+
 @BACKENDS
-def test_a_valve_with_other_ports_than_it_says_is_refused(backend: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"port": BlendedPort}, r"valve: single_ports makes tuple.*, and the valve has ports BlendedPort"),
+        ({"connect": unannotated}, r"valve: unannotated\(plant, shown\) must be annotated with float and tuple\[Sing"),
+        ({"shown": Mine, "connect": connect_ideal}, r"valve: connect_ideal takes a VentedOpening, and .* shows a Mine"),
+    ],
+)
+def test_a_valve_whose_function_says_another_thing_than_the_valve_is_refused(
+    changed: dict[str, Any], said: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     run = plan_run(load_scenario("step-response", ("run.duration=20 ms",)))
-    valve = replace(run.program.valve, port=BlendedPort)
-    batch = batch_of(replace(run, program=replace(run.program, valve=valve)))
-    with pytest.raises(ProgramError, match=r"valve: single_ports makes tuple.*, and the valve has ports BlendedPort"):
+    batch = batch_of(replace(run, program=replace(run.program, valve=replace(run.program.valve, **changed))))
+    with pytest.raises(ProgramError, match=said):
         run_batch(batch)
 
 
