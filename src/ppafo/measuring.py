@@ -10,7 +10,7 @@ from ppafo.storage import read_recording
 from ppafo.storage.result_folder import ColumnsLike
 
 
-@checked()
+@checked
 def evaluate(recording: Recording | str | Path, *, columns: ColumnsLike | None = None) -> dict[str, Metric]:
     """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
 

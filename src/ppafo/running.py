@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
 
 
-@checked()
+@checked
 def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> Result:
     """Run one scenario: an object, or the name of a shipped one or a file.
 
@@ -56,7 +56,7 @@ def most_reversals(scenario: Scenario) -> float:
     return rules.most_reversals(scenario, law, first(scenario.run.duration), scenario.motion.stride_time)
 
 
-@checked("scenarios", "threads")
+@checked
 def simulate_many(
     scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
 ) -> list[Result]:

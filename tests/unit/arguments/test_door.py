@@ -14,7 +14,7 @@ from ppafo.errors import ArgumentError, StudyError
 TASK = "torque-task-proportional"
 
 
-@checked("mass", "overrides")
+@checked
 def walked(
     mass: Mass,
     *,
