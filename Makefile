@@ -8,7 +8,7 @@ CORES := $(shell nproc 2>/dev/null || echo 2)
 QUICK_TESTS := tests/architecture tests/contract/test_command_words.py tests/contract/test_catalogs.py $(addprefix tests/unit/,\
 	test_public_interface.py test_units.py control documents gait metrics model parameters signals storage)
 
-.PHONY: reproduce validation test test-long test-all test-processors coverage quick check format bench bits dist page site lock clean
+.PHONY: reproduce validation test test-long test-all test-processors test-host coverage quick check format bench bits dist page site lock clean
 
 reproduce: $(LEAN)
 	$(BIN)/ppafo reproduce --out out/reproduce
@@ -36,8 +36,14 @@ FITTING := tests/unit/identification tests/unit/validation tests/unit/studies te
 test-processors: $(READY)
 	set -e; for kernel in $(PROCESSORS); do OPENBLAS_CORETYPE=$$kernel $(TESTS) -m "not long" $(FITTING); done
 
+# The short tests of what a host program asks for, in one that has set decimals, errors of NumPy, locale and warnings in its own way.
+HOSTED := tests/contract/test_docstring_examples.py tests/acceptance/test_hostile_host.py tests/unit/test_units.py tests/unit/test_results_at_hand.py \
+	$(addprefix tests/unit/,arguments control documents metrics parameters signals storage)
+test-host: $(READY)
+	$(TESTS) -p tests.hostile_host -m "not long" $(HOSTED)
+
 # Kept as bytecode, tests and libraries begin at once in the next run, whatever the surroundings say of it.
-test test-long test-all test-processors quick coverage: export PYTHONDONTWRITEBYTECODE =
+test test-long test-all test-processors test-host quick coverage: export PYTHONDONTWRITEBYTECODE =
 TESTS := $(BIN)/python -m pytest -n $(CORES) --dist loadfile --no-loadscope-reorder --costs show
 
 # The last line is branch coverage of the package in percent; `coverage report --sort=miss` says where it is not. Compiled code is not seen.

@@ -1,5 +1,6 @@
 """Units at the edge."""
 
+import decimal
 import math
 import re
 import subprocess
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ppafo.errors import UnitError
+from ppafo.parameters.audit.evidence import digits
 from ppafo.units import (
     ParsedUnit,
     base_value,
@@ -23,6 +25,8 @@ from ppafo.units import (
     to_si,
     unit_by_pint,
 )
+from ppafo.units.definitions import parse_unit
+from ppafo.units.quantity import conversion
 
 PAIRS = [
     ("mm^2", "m^2"),
@@ -423,3 +427,37 @@ def test_only_digits_of_ascii_make_a_number(text: str) -> None:
         number_text(text)
     with pytest.raises(UnitError, match=r"does not start with a number|is not a unit"):
         split_quantity(f"{text} m")
+
+
+@pytest.mark.parametrize(
+    ("text", "si_unit", "meant"),
+    [
+        ("1 KHz", "Hz", "'kHz'"),
+        ("3 Kg", "kg", "'kg'"),
+        ("4 KN", "N", "'kN'"),
+        ("2 Kg/s", "kg/s", "'kg/s'"),
+        ("30 MS", "s", "'Ms' or 'ms'"),
+    ],
+)
+def test_letters_in_the_wrong_case_are_answered_with_what_fits(text: str, si_unit: str, meant: str) -> None:
+    # A prefix in the wrong case may be a unit itself: KHz is kelvin times hertz.
+    with pytest.raises(UnitError, match=rf", did you mean {meant}\?"):
+        parse_quantity(text, si_unit)
+
+
+def test_decimals_of_a_host_program_change_no_conversion() -> None:
+    def converted() -> list[object]:
+        for kept in (conversion, parse_unit, known_units):
+            kept.cache_clear()
+        return [
+            parse_quantity("8.4 g", "kg"),
+            from_si(451325.0, "psi_g", "Pa_a"),
+            base_value(77.0, "degF"),
+            parse_quantity("23.4 L/min (70 degF, 14.696 psi_a, air)", "kg/s"),
+            unit_by_pint("mm^3/min"),
+            digits(0.01234),
+        ]
+
+    expected = converted()
+    with decimal.localcontext(decimal.Context(prec=3, rounding=decimal.ROUND_UP, traps=[decimal.Inexact])):
+        assert converted() == expected

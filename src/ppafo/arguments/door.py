@@ -8,6 +8,7 @@ import contextlib
 import functools
 import inspect
 import re
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
@@ -46,6 +47,18 @@ def without_names() -> Iterator[None]:
         yield
     finally:
         _says_arguments.reset(token)
+
+
+def _usual_numpy() -> contextlib.AbstractContextManager[object]:
+    """NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
+
+    Where nobody has loaded NumPy it is the usual one.
+    """
+    numpy = sys.modules.get("numpy")
+    if numpy is None:
+        return contextlib.nullcontext()
+    usual: contextlib.AbstractContextManager[object] = numpy.errstate(all="warn", under="ignore")
+    return usual
 
 
 def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
@@ -95,11 +108,12 @@ def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callab
         @functools.wraps(function)
         def call(*args: P.args, **kwargs: P.kwargs) -> R:
             values = _values(function.__name__, signature(), args, kwargs, formerly, renamed)
-            if _says_arguments.get():
-                # Only the function that was called says which argument: those that it calls have others.
-                with without_names():
-                    return _named(function, values)
-            return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
+            with _usual_numpy():
+                if _says_arguments.get():
+                    # Only the function that was called says which argument: those that it calls have others.
+                    with without_names():
+                        return _named(function, values)
+                return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
 
         return call
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
-from ppafo.arguments.words import Word, taken_flag, taken_number, taken_text, taken_whole
+from ppafo.arguments.words import Word, taken_document, taken_flag, taken_number, taken_text, taken_whole
 from ppafo.errors import ArgumentError, one_line
 
 _LONGEST = 60
@@ -91,6 +91,8 @@ def taken(annotation: Any) -> Taken:
 
 
 def _of_class(kind: type, inner: tuple[Any, ...]) -> Taken:
+    if issubclass(kind, Mapping) and inner[1] is Any:
+        return _one("a dictionary with texts as its keys", taken_document)
     if issubclass(kind, Mapping):
         return _mapping(taken(inner[1]))
     if inner and _is_iterable(kind):
@@ -183,9 +185,10 @@ def _in_words(kinds: list[str]) -> str:
 
 
 def _among(allowed: tuple[Any, ...], value: Any) -> Any:
-    if not isinstance(value, str) or value not in allowed:
+    word = taken_text(value)
+    if word not in allowed:
         raise ValueError
-    return value
+    return word
 
 
 def _instance(kind: type, value: Any) -> Any:

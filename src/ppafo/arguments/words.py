@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from ppafo.errors import ArgumentError, UnitError
+from ppafo.errors import ArgumentError, UnitError, one_line
 from ppafo.units import SI, number_text, parse_quantity
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
@@ -30,7 +30,7 @@ _EXAMPLES = {
     "rad": ("an angle", ("deg", "rad")),
 }
 """What a quantity is called, and the units in which people write it."""
-_MAXIMUM_DIGITS, _ABOVE_ALL = 40, 10**40
+_MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
 
@@ -199,15 +199,24 @@ def taken_address(value: Any) -> str:
 
 
 def taken_text(value: Any) -> str:
-    """Return a text with something in it; ValueError for anything else."""
+    """Return a text with something in it; ValueError for anything else.
+
+    Of an enumeration or another subclass it is the text itself, whatever its ``str()`` says.
+    """
     if not isinstance(value, str) or not value.strip() or "\0" in value:
         raise ValueError
-    return value
+    return str.__str__(value)
 
 
 def _single(value: Any) -> Any:
-    """Return the Python number of an array without axes, and anything else as it is."""
-    return value.item() if getattr(value, "ndim", None) == 0 and hasattr(value, "item") else value
+    """Python value of an array without axes, None of a masked one and of a time; any other value as it is.
+
+    A time of NumPy would count as a whole number otherwise, and a masked value as the one that it hides.
+    """
+    if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
+        return value
+    is_hidden = bool(getattr(value, "mask", False))
+    return None if is_hidden or getattr(value.dtype, "kind", "") in "mM" else value.item()
 
 
 def taken_flag(value: Any) -> bool:
@@ -235,13 +244,13 @@ def taken_number(allowed: Range = ANY, read: Callable[[str], float] | None = Non
 
     def take(value: Any) -> float:
         if isinstance(value, str) and read is not None and not _NUMBER.fullmatch(value.strip()):
-            return read(value)
-        single = _single(value)
-        if isinstance(single, bool) or not isinstance(single, numbers.Real) or not math.isfinite(single):
+            return read(taken_text(value))
+        given = _single(value)
+        if isinstance(given, bool) or not isinstance(given, numbers.Real) or not math.isfinite(given):
             raise ValueError
-        if float(single) not in allowed:
+        if float(given) not in allowed:
             raise ValueError
-        return float(single)
+        return float(given)
 
     return take
 
@@ -254,31 +263,57 @@ def taken_overrides(value: Any) -> tuple[str, ...]:
     if isinstance(value, Mapping):
         return tuple(_overrides_of(value, ""))
     texts = (value,) if isinstance(value, str) else value
-    if isinstance(texts, bytes) or not isinstance(texts, Iterable):
+    # A table of pandas would be gone through by the names of its columns.
+    if isinstance(texts, bytes) or hasattr(texts, "keys") or not isinstance(texts, Iterable):
         raise ValueError
     return tuple(taken_text(text) for text in texts)
 
 
 def _overrides_of(table: Mapping[Any, Any], section: str) -> Iterator[str]:
     for name, value in table.items():
-        path, single = f"{section}{taken_text(name)}", _single(value)
-        if isinstance(single, Mapping):
-            yield from _overrides_of(single, f"{path}.")
-        elif isinstance(single, bool):
-            yield f"{path}={str(single).lower()}"
-        elif isinstance(single, numbers.Integral):
-            yield f"{path}={int(single)} {SI}"
-        elif isinstance(single, numbers.Real) and math.isfinite(single):
-            yield f"{path}={float(single)!r} {SI}"
-        elif isinstance(single, str) and single.strip():
-            yield f"{path}={single}"
+        path, given = f"{section}{taken_text(name)}", _single(value)
+        if isinstance(given, Mapping):
+            yield from _overrides_of(given, f"{path}.")
+        elif isinstance(given, bool):
+            yield f"{path}={str(given).lower()}"
+        elif isinstance(given, numbers.Integral):
+            yield f"{path}={int(given)} {SI}"
+        elif isinstance(given, numbers.Real) and math.isfinite(given):
+            yield f"{path}={float(given)!r} {SI}"
+        elif isinstance(given, str) and given.strip():
+            yield f"{path}={taken_text(given)}"
         else:
             # A number and its unit apart are one text.
-            is_pair = isinstance(single, list | tuple) and len(single) == 2 and isinstance(single[1], str)
-            example = f"'{single[0]} {single[1]}'" if is_pair else "'12.6 mm^2'"
-            raise ArgumentError(
-                f"{path} = {single!r}: must be a finite number in SI units, a flag or a text such as {example}"
-            )
+            is_pair = isinstance(given, list | tuple) and len(given) == 2 and isinstance(given[1], str)
+            example = f"'{given[0]} {given[1]}'" if is_pair else "'12.6 mm^2'"
+            what = f"must be a finite number in SI units, a flag or a text such as {example}"
+            raise ArgumentError(f"{path} = {one_line(repr(value))}: {what}")
+
+
+def taken_document(value: Any) -> dict[str, Any]:
+    """Return nested dictionaries as the plain data of a file, a copy; ValueError for anything but a dictionary.
+
+    Dictionaries of any class, lists and iterators, texts and numbers also of NumPy. ArgumentError for None.
+    """
+    if not isinstance(value, Mapping):
+        raise ValueError
+    return {taken_text(name): _plain(each, str(name), 1) for name, each in value.items()}
+
+
+def _plain(value: Any, path: str, level: int) -> Any:
+    given = _single(value)
+    if given is None:
+        raise ArgumentError(f"{path} = {one_line(repr(value))}: is no value; leave out the key of what is not given")
+    # What is nested deeper than any file is refused by whoever takes it as one.
+    if isinstance(given, bytes) or level > _MAXIMUM_LEVELS:
+        return given
+    if isinstance(given, Mapping):
+        return {taken_text(name): _plain(each, f"{path}.{name}", level + 1) for name, each in given.items()}
+    if isinstance(given, str):
+        return str.__str__(given)
+    if isinstance(given, Iterable) and not hasattr(given, "keys"):
+        return [_plain(each, f"{path}[{index}]", level + 1) for index, each in enumerate(given)]
+    return given
 
 
 def taken_tasks(value: Any) -> tuple[tuple[str, tuple[str, ...]], ...]:

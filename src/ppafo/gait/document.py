@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.arguments import checked
-from ppafo.documents.models import NAME, QUANTITY, make_schema, optional, table, validate
+from ppafo.documents.models import NAME, QUANTITY, SchemaVersion, make_schema, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
@@ -58,7 +58,7 @@ def gait_file() -> type[BaseModel]:
         "count": (Annotated[int, Field(ge=0)], Field(0, description="number of strides behind the curves; 0: unknown")),
     }
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME, max_length=100)),
         "title": (str, Field("", description="one line: who walks, and how")),
         "origin": (

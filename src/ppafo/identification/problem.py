@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.flow import GasAt, Law
@@ -310,7 +310,7 @@ def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float
 class ProblemFile(StrictTable):
     """Layout of a problem file: the set, the recordings, the procedures and the fit."""
 
-    schema_version: Literal[1] = Field(description="version of this layout")
+    schema_version: SchemaVersion
     name: str = Field(pattern=NAME, max_length=100, description="name of the new parameter set")
     title: str = Field("", description="title of the new parameter set")
     device: DeviceProblem = Field(description="the set to start from")

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.documents.models import NAME, make_schema, one_of, optional, table, validate
+from ppafo.documents.models import NAME, SchemaVersion, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.kinds import Kinds
@@ -143,7 +143,7 @@ def _joint_of(words: Any, file: str) -> Joint:
 @functools.lru_cache(maxsize=4)
 def _parameter_file(_kinds: Any) -> type[BaseModel]:
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME)),
         "title": (str, Field(min_length=1)),
         "citation": optional(Citation, "where the set was published"),

@@ -8,6 +8,7 @@ from ppafo.errors import ScenarioError
 from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
 from ppafo.processor.images import Decision, Image, Machine, Memory, Target
 from ppafo.processor.qemu import QemuSimulator
+from ppafo.storage.files import write_file
 
 # mspdebug's simulator of an MSP430, driven by its console.
 
@@ -46,7 +47,7 @@ class MspdebugSimulator:
             sent = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
             asked.append(f"mw simulated_readings {sent}\nrun\n{_SAID_OUTPUTS}\n")
         # mspdebug asks the system for every byte of its console, and for a file at once.
-        (self._folder / _ASKED).write_text("".join(asked), encoding="ascii")
+        write_file(self._folder / _ASKED, "".join(asked).encode("ascii"))
         self._say(f"read {_ASKED}")
         decisions = []
         for _ in every:

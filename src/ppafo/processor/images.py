@@ -1,7 +1,6 @@
 """Small processors and the images of their firmware: memory and tools of a target, images built and measured."""
 
 import struct
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from shutil import which
 from typing import NamedTuple, Protocol
 
 from ppafo.errors import SimulationError, one_line
+from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked
 
 
@@ -125,10 +125,8 @@ def missing_tools(target: Target) -> tuple[str, ...]:
     return tuple(tool for tool in target.tools if which(tool) is None)
 
 
-def built(contents: Mapping[str, bytes], folder: Path, goals: Sequence[str] = ("all",)) -> None:
-    """Write the files of a firmware into a folder and make what is asked for; SimulationError where that fails."""
-    for name, content in contents.items():
-        (folder / name).write_bytes(content)
+def make_firmware(folder: Path, goals: Sequence[str] = ("all",)) -> None:
+    """Make what is asked for of the files of a firmware in a folder; SimulationError where that fails."""
     done = asked(["make", "-C", str(folder), *goals], scratch=folder.absolute())
     if done.returncode != 0:
         # Make says which goal failed; the line of the compiler says why.
@@ -147,8 +145,8 @@ def processor_simulator(contents: Mapping[str, bytes], target: Target) -> Iterat
         raise SimulationError(
             f"the simulator of {target.name} needs {', '.join(absent)}; {target.packages} are packages of Debian"
         )
-    with tempfile.TemporaryDirectory(prefix="ppafo-processor-", ignore_cleanup_errors=True) as folder:
-        built(contents, Path(folder))
+    with temporary_folder("ppafo-processor", contents) as folder:
+        make_firmware(Path(folder))
         image = read_image(Path(folder), target)
         simulator = target.simulator(target, image)
         try:

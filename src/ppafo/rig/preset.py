@@ -13,13 +13,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import StrictTable, make_schema, read_model, table
+from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, read_model, table
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES
@@ -121,7 +121,7 @@ class PresetValue(StrictTable):
 def _layout() -> type[BaseModel]:
     """Return the layout of a preset file: what it says of itself, and a table for each section of ``SECTIONS``."""
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(description="name of the preset")),
         "title": (str, Field(description="which test bench it represents, in one line")),
         "notes": (str, Field(description="what is on, what is off, and where the values come from")),

@@ -1,20 +1,18 @@
 """The equations of the rig as compiled code, and the arrays through which Python calls it.
 
-The text is composed of the same functions as all compiled physics. The valve and a prescribed angle of the vane stay
-outside, in Python: what they ask for comes in as numbers. So there is one program for all devices and experiments, and
-a new computer compiles once.
+They are the same functions as all compiled physics. The valve and a prescribed angle of the vane stay outside, in
+Python: what they ask for comes in as numbers. So there is one program for all devices and experiments, and a new
+computer compiles once.
 """
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text, with_arrays
-from ppafo.engine.loading import load_source
-from ppafo.engine.rows import leaf_paths, numbers, row_expression
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.entries import with_arrays
+from ppafo.engine.row_functions import row_functions
+from ppafo.engine.rows import leaf_paths, numbers
 from ppafo.model.plant import Openings
 from ppafo.rig.dynamics import RigNumbers, RigState, observables, rig_rates
 
@@ -48,44 +46,21 @@ class Observed(NamedTuple):
     static_limit: float
 
 
-_OBSERVED_PATHS = ("node_1.pressure", "node_2.pressure", "torque", "static_limit")
-"""Where ``Observables`` has the numbers of ``Observed``, in their order."""
+def slopes_of(given: RigNumbers, state: RigState, inputs: Inputs, direction: float) -> RigState:
+    """Slopes of the unknowns [SI/s] of a vane that slides towards ``direction`` (1 or -1), or is held (0)."""
+    vane = inputs.vane
+    return rig_rates(given, inputs.openings, state, vane.angle, vane.rate, vane.added_torque, direction)
 
 
-@functools.cache
-def rig_source() -> str:
-    """Return the module of the entries ``fill`` and ``show``.
-
-    ``fill(y, slopes, parameters, inputs, direction)`` writes the slopes of the unknowns ``y`` of ``RigState``;
-    ``show(y, outputs, parameters, inputs, direction)`` writes the numbers of ``Observed``.
-    """
-    collector = SourceCollector(INLINE)
-    add = collector.add
-    arrays = {"given": ("parameters", RigNumbers), "state": ("y", RigState), "inputs": ("inputs", Inputs)}
-    cells = {
-        path: f"{array}[{number}]"
-        for name, (array, row) in arrays.items()
-        for number, path in enumerate(leaf_paths(row, name))
-    }
-    angle, rate, added_torque = (cells[f"inputs.vane.{field}"] for field in VaneInputs._fields)
-    begin = [
-        f"given = {row_expression(RigNumbers, 'given', cells, add)}",
-        f"state = {row_expression(RigState, 'state', cells, add)}",
-        f"openings = {row_expression(Openings, 'inputs.openings', cells, add)}",
-    ]
-    fill = [
-        f"rates = {add(rig_rates)}(given, openings, state, {angle}, {rate}, {added_torque}, direction)",
-        *(f"slopes[{number}] = rates.{field}" for number, field in enumerate(RigState._fields)),
-    ]
-    show = [
-        f"now = {add(observables)}(given, state, {angle}, {added_torque})",
-        *(f"outputs[{number}] = now.{path}" for number, path in enumerate(_OBSERVED_PATHS)),
-    ]
-    entries = []
-    for name, output, lines in (("fill", "slopes", fill), ("show", "outputs", show)):
-        types = dict.fromkeys(("y", output, "parameters", "inputs"), ARRAY) | {"direction": FLOAT}
-        entries.append(entry_text(name, types, begin + lines))
-    return "\n\n\n".join([HEADER, collector.text(), *entries])
+def observed_in(given: RigNumbers, state: RigState, inputs: Inputs) -> Observed:
+    """What a bench could observe in a state."""
+    now = observables(given, state, inputs.vane.angle, inputs.vane.added_torque)
+    return Observed(
+        pressure_1=now.node_1.pressure,
+        pressure_2=now.node_2.pressure,
+        torque=now.torque,
+        static_limit=now.static_limit,
+    )
 
 
 class CompiledRig:
@@ -95,9 +70,9 @@ class CompiledRig:
         parameters = np.array(numbers(given))
         self._state, self._rates = np.empty(len(RigState._fields)), np.empty(len(RigState._fields))
         self._observed, self._inputs = np.empty(len(Observed._fields)), np.zeros(len(leaf_paths(Inputs, "inputs")))
-        module = load_source(rig_source())
-        self._fill = with_arrays(module.fill, self._state, self._rates, parameters, self._inputs)
-        self._show = with_arrays(module.show, self._state, self._observed, parameters, self._inputs)
+        slopes, observed = row_functions(slopes_of, observed_in)
+        self._fill = with_arrays(slopes, parameters, self._state, self._inputs, self._rates)
+        self._show = with_arrays(observed, parameters, self._state, self._inputs, self._observed)
 
     def rates(self, state: Floats, openings: Openings, vane: VaneInputs, direction: float) -> Floats:
         """Return the slopes of the unknowns of ``RigState`` (unknowns,) [SI]; the array is written anew by each call.
@@ -113,5 +88,5 @@ class CompiledRig:
         """Return what a bench could observe in a state, the unknowns of ``RigState`` (unknowns,) [SI]."""
         self._state[:] = state
         self._inputs[len(Openings._fields) :] = vane
-        self._show(0.0)
+        self._show()
         return Observed._make(self._observed.tolist())

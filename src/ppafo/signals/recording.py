@@ -356,7 +356,16 @@ def _check_finite(recording: Recording, name: str, values: Floats) -> None:
 
 
 def _read_only(values: ArrayLike) -> Floats:
-    copy = np.array(values, dtype=np.float64)
+    given = np.ma.asanyarray(values) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    # NumPy makes numbers of times and texts, and of complex ones their real part.
+    if given.dtype.kind not in "biufO":
+        raise DataError(f"a channel is a plain list of numbers, not an array of {given.dtype}")
+    try:
+        copy = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DataError(f"a channel is a plain list of numbers: {error}") from error
+    # A masked value is none, whatever number stands behind the mask.
+    copy[np.ma.getmaskarray(given)] = np.nan
     if copy.ndim != 1:
         raise DataError(f"a channel is a plain list of numbers, not an array of {copy.ndim} dimensions")
     copy.setflags(write=False)

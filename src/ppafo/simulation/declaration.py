@@ -66,6 +66,7 @@ SENSORS = (_DELAY, *BANDWIDTH.quantities, *_OF_SIGNALS)
 THERMAL = "thermal"
 ISOTHERMAL = "isothermal"
 THERMAL_GAS = quantities_of(GasModel)
+WALL_AREA = "gas_model.wall_area_per_volume"
 
 RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)

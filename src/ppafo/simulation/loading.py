@@ -47,6 +47,7 @@ from ppafo.simulation.declaration import (
     SUPPLY_LINES,
     THERMAL,
     THERMAL_GAS,
+    WALL_AREA,
     Declared,
     Reading,
     changes_reach,
@@ -63,6 +64,7 @@ from ppafo.simulation.declaration import (
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.motion_kind import MOTIONS, Clock
 from ppafo.simulation.nominal import nominal_terms
+from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, is_of_device
 from ppafo.simulation.profiles import reference_problem
 from ppafo.simulation.scenario import (
@@ -383,7 +385,12 @@ def read_gas_model(reading: Reading) -> GasModel | None:
     """Return how the gas takes up heat in SI, None where it keeps its temperature."""
     if kind_at(reading.document, "gas_model") != THERMAL:
         return None
-    return GasModel(**reading.section("gas_model", THERMAL_GAS))
+    model = GasModel(**reading.section("gas_model", THERMAL_GAS))
+    if model.heat_transfer_coefficient > 0.0 and value_at(reading.document, WALL_AREA) is None:
+        raise ScenarioError(
+            f"{reading.file}: '{WALL_AREA}' is missing: gas takes up heat where heat_transfer_coefficient is above 0"
+        )
+    return model
 
 
 def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
@@ -473,6 +480,7 @@ def scenario_or_load(
         return load(scenario, overrides)
     if tuple(overrides):
         raise ScenarioError(f"{scenario.name}: overrides are for the name or file of a scenario, not for a loaded one")
+    check_parts(scenario)
     return scenario
 
 

@@ -4,16 +4,30 @@ from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
+from ppafo.arguments.values import shown
+from ppafo.arguments.words import taken_number
+from ppafo.errors import ScenarioError
 from ppafo.model.catalog import VALVES, device_effects
-from ppafo.model.declaration import Quantity
+from ppafo.model.controlled import CONTROLLED
+from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.kind import SECTION as EFFECT_SETTINGS
-from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, members
+from ppafo.parameters.declaration import AREA_FORM, ORIFICE, SONIC_FORM, is_within, limits_text, members
 from ppafo.parameters.device import Device, Orifice, SonicOrifice, held_in
 from ppafo.parameters.graph import Graph, holding, in_other_forms, left, paths_in, resolved
 from ppafo.parameters.overrides import one_path
 from ppafo.parameters.plant import number_under, part_of
 from ppafo.simulation.declaration import LOCKED_ANGLE, changes_reach
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import (
+    Control,
+    GasModel,
+    Initial,
+    Origin,
+    ProfileChoice,
+    RunSettings,
+    Scenario,
+    Sensors,
+    SupplyLine,
+)
 
 _DEVICE_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 _OF_DEVICE = (*_DEVICE_SECTIONS, "valve", EFFECT_SETTINGS)
@@ -25,6 +39,56 @@ _RATE, _PERIOD = "controller.rate", "controller.period"
 def chosen_path(path: str, scenario: Scenario) -> str:
     """Return the path with ``valve.`` in place of ``valves.NAME.`` where that is the valve of the scenario."""
     return one_path(path, scenario.device.valve_name)
+
+
+_OF_JOINT = ("actuator.", "friction.", "foot_plate.")
+_PARTS = {
+    "name": str,
+    "description": str,
+    "assumptions": tuple,
+    "run": RunSettings,
+    "device": Device,
+    "initial": Initial,
+    "controller": Control,
+    "reference": ProfileChoice,
+    "sensors": Sensors,
+    "origin": Origin,
+    "gas_model": GasModel,
+    "supply_line": SupplyLine,
+    "links": Mapping,
+}
+"""Class of each part of a scenario, whatever moves its ankle; two of them may be None."""
+
+
+def check_parts(scenario: Scenario) -> None:
+    """Refuse a scenario that was changed in Python to what no file could say: a foreign part, a number out of range."""
+
+    def refusal(path: str, value: Any, must: str) -> ScenarioError:
+        return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {must}")
+
+    for name, kind in _PARTS.items():
+        part = getattr(scenario, name)
+        if not isinstance(part, kind) and not (part is None and kind in (GasModel, SupplyLine)):
+            raise refusal(
+                name, part, "must be a text" if kind is str else f"must be an object of class {kind.__name__}"
+            )
+    if not hasattr(scenario.motion, "motion_kind"):
+        raise refusal("motion", scenario.motion, "must be a motion, such as FreeMotion")
+    if not isinstance(scenario.controlled, str) or scenario.controlled not in CONTROLLED:
+        raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
+    absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)} | {_RATE}
+    take = taken_number()
+    for path, quantity in declared_numbers(scenario).items():
+        if path in absent:
+            continue
+        value = number_under(scenario, _attributes(path, scenario))
+        try:
+            # An ankle without its device has no actuator, friction or plate, as no file can say.
+            is_good = is_within(take(value), quantity) or (value == 0.0 and path.startswith(_OF_JOINT))
+        except ValueError:
+            is_good = False
+        if not is_good:
+            raise refusal(path, value, range_rule(quantity, limits_text(quantity)))
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:

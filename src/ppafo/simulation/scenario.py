@@ -224,7 +224,9 @@ class GasModel:
     heat_transfer_coefficient: Annotated[
         float, Number("W/(m^2 K)", "between gas and walls; 0 is adiabatic", None, 0.0, 1.0e9)
     ]
-    wall_area_per_volume: Annotated[float, Number("1/m", "area of a chamber's walls over its volume", None, 0.0, 1.0e6)]
+    wall_area_per_volume: Annotated[
+        float, Number("1/m", "area of a chamber's walls over its volume; needed unless adiabatic", 0.0, 0.0, 1.0e6)
+    ] = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.documents.models import NAME, make_schema, one_of, optional, table
+from ppafo.documents.models import NAME, SchemaVersion, make_schema, one_of, optional, table
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration
@@ -138,7 +138,7 @@ def file_model(name: str, own: dict[str, Any], sections: Container[str] = declar
         "overrides": (list[str], Field(default_factory=list, description="such as 'valve.area=12.6mm^2'")),
     }
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME, max_length=_LONGEST_NAME)),
         "description": (str, Field("", description="what this file tries, and why")),
         "device": (table("Device", device), Field(description="the hardware")),

@@ -5,6 +5,7 @@ import errno
 import os
 import secrets
 import shutil
+import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
@@ -71,6 +72,28 @@ def add_files(folder: Path, contents: Mapping[str, bytes]) -> None:
                 (aside / name).replace(folder / name)
         finally:
             shutil.rmtree(aside, ignore_errors=True)
+
+
+def temporary_folder(purpose: str, contents: Mapping[str, bytes] | None = None) -> "tempfile.TemporaryDirectory[str]":
+    """Return a folder for temporary files, named for its ``purpose``, that holds these files, by path.
+
+    It goes away at the end of a ``with`` block, or with the last reference to it. DataError, and nothing is left, where
+    the folder cannot be made or a file not be written.
+    """
+    try:
+        made = tempfile.TemporaryDirectory(prefix=f"{purpose}-", ignore_cleanup_errors=True)
+        try:
+            for name, content in (contents or {}).items():
+                path = Path(made.name, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+        except OSError:
+            made.cleanup()
+            raise
+    except OSError as error:
+        remedy = "make room there, or set TMPDIR to another folder"
+        raise DataError(f"temporary files cannot be written: {reason(error)}; {remedy}") from error
+    return made
 
 
 def replace_folder(folder: Path, contents: Mapping[str, bytes]) -> None:

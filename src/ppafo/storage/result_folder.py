@@ -266,7 +266,7 @@ def read_document(folder: str | Path) -> dict[str, Any]:
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise DataError(f"{path}: is not of a ppafo result (its 'format' is not '{FORMAT}')")
-    if document.get("schema_version") != SCHEMA_VERSION:
+    if document.get("schema_version") is True or document.get("schema_version") != SCHEMA_VERSION:
         version = document.get("schema_version")
         raise DataError(f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}")
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):

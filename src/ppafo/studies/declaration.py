@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema
 
 MAXIMUM_RUNS = 2**32
 """Draws after which a Sobol sequence of 32 bits repeats; no other method needs a lower limit."""
@@ -207,7 +207,7 @@ VARIED = get_args(Varied)
 class StudyFile(StrictTable):
     """Layout of a study file."""
 
-    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
+    schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
     description: Annotated[str, Field(description="what this study asks, and why")] = ""
     configurations: Annotated[tuple[Configuration, ...], Field(strict=False, min_length=1)]

@@ -2,9 +2,7 @@
 
 import atexit
 import hashlib
-import shutil
 import sys
-import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,6 +10,7 @@ from pathlib import Path
 
 from ppafo.errors import KindError
 from ppafo.plugins import Plugin, add_plugin, named_plugins
+from ppafo.storage.files import temporary_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,10 +63,6 @@ def _has(path: Path, content: bytes) -> bool:
 @lru_cache(maxsize=32)
 def _written(sent: SentPlugin) -> str:
     """Write files into a temporary folder of this process, and return that."""
-    folder = tempfile.mkdtemp(prefix="ppafo-plugins-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    for name, content in sent.files:
-        path = Path(folder, name)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(content)
-    return folder
+    folder = temporary_folder("ppafo-plugins", dict(sent.files))
+    atexit.register(folder.cleanup)
+    return folder.name

@@ -4,6 +4,7 @@ pint reads them. Its answers for units in the files of the package are kept in `
 processes start without it; ``scripts/known_units.py`` writes that file.
 """
 
+import decimal
 import functools
 import json
 from decimal import Decimal
@@ -63,6 +64,16 @@ _DEFINITIONS = {
     "kgf": "kilogram_force = 9.80665 * newton = kgf",
     "percent": "percent = 0.01",
 }
+DECIMALS = decimal.Context(
+    prec=28,
+    rounding=decimal.ROUND_HALF_EVEN,
+    Emin=-999_999,
+    Emax=999_999,
+    capitals=1,
+    clamp=0,
+    traps=[decimal.InvalidOperation, decimal.DivisionByZero, decimal.Overflow],
+)
+"""Arithmetic of units, whatever a host program has set for its own decimals: every operation on them uses it."""
 PRESSURE = {"[mass]": 1, "[length]": -1, "[time]": -2}
 KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
 _KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, such as psi_g"
@@ -77,6 +88,10 @@ class ParsedUnit(NamedTuple):
     scale: Decimal
     offset: Decimal
     dimensions: dict[str, int]
+
+    def in_base(self, value: Decimal) -> Decimal:
+        """Value in base units of a value in this unit."""
+        return DECIMALS.add(DECIMALS.multiply(value, self.scale), self.offset)
 
 
 class UnknownUnitError(UnitError):
@@ -135,9 +150,11 @@ def unit_by_pint(unit: str) -> ParsedUnit:
     except pint.OffsetUnitCalculusError as error:  # milli of a temperature that has another zero
         raise UnitError(f"'{unit}': degC takes no prefix, nor does degF; give degC, degF or K") from error
     # Units are affine: their values at 0 and 1 give scale and offset.
-    zero, one = (_registry().Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
+    with decimal.localcontext(DECIMALS):
+        zero, one = (_registry().Quantity(Decimal(number), parsed).to_base_units().magnitude for number in (0, 1))
+        scale = one - zero
     powers = {name: round(float(str(power))) for name, power in parsed.dimensionality.items()}
-    return ParsedUnit(one - zero, zero, powers)
+    return ParsedUnit(scale, zero, powers)
 
 
 @functools.cache
@@ -146,6 +163,7 @@ def _registry() -> "pint.UnitRegistry[Any]":
     import pint
 
     # Decimals throughout, so that a unit's factor is what its definition says.
-    registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None, non_int_type=Decimal)
-    registry.load_definitions([*_PREFIXES, *_DEFINITIONS.values()])
+    with decimal.localcontext(DECIMALS):
+        registry: pint.UnitRegistry[Any] = pint.UnitRegistry(None, non_int_type=Decimal)
+        registry.load_definitions([*_PREFIXES, *_DEFINITIONS.values()])
     return registry

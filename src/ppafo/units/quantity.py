@@ -4,11 +4,12 @@ import difflib
 import functools
 import math
 import re
+from collections.abc import Iterable
 from decimal import Decimal
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import UnitError
-from ppafo.units.definitions import KINDS, PRESSURE, ParsedUnit, UnknownUnitError, parse_unit
+from ppafo.units.definitions import DECIMALS, KINDS, PRESSURE, ParsedUnit, UnknownUnitError, parse_unit
 from ppafo.units.reference import MASS_FLOW, flow_of, is_volume_flow, read_unit, without_condition
 from ppafo.units.spelling import as_product, quote, spellings, split_pressure_kind
 
@@ -23,26 +24,52 @@ def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
 
     Where it is not known what is wanted only another case of the same letters is meant.
     """
-    name, wanted = unknown.name, None if si_unit is None else parse_unit(si_unit)[0].dimensions
-    same = sorted(known for known in spellings() if known.lower() == name.lower())
-    near = [] if wanted is None else difflib.get_close_matches(name, sorted(spellings()), _TRIED, _NEAR)
-    same += [f"deg{name}"] if wanted is not None and f"deg{name}" in spellings() else []
+    name, is_wanted = unknown.name, si_unit is not None
+    near = difflib.get_close_matches(name, sorted(spellings()), _TRIED, _NEAR) if is_wanted else []
+    same = [*_in_other_case(name), *([f"deg{name}"] if is_wanted and f"deg{name}" in spellings() else [])]
     # nm for N m: a force has a capital letter.
     product = as_product(name.capitalize())
     same += [product] if product else []
-    for known in dict.fromkeys((*same, *near)):
-        unit = re.sub(rf"(?<![A-Za-zµ]){re.escape(name)}(?![A-Za-zµ])", known, unknown.unit)
+    meant = _that_fit(same, unknown.name, unknown.unit, kind, si_unit)
+    return _did_you_mean(meant or _that_fit(near, unknown.name, unknown.unit, kind, si_unit)[:1])
+
+
+def _hint_of_case(unit: str, si_unit: str) -> str:
+    """Return ``, did you mean 'kHz'?`` for ``KHz``, kelvin times hertz: what fits ``si_unit`` with the same letters."""
+    meant = [
+        other
+        for name in re.findall(r"[A-Za-zµ]+", unit)
+        for other in _that_fit(_in_other_case(name), name, unit, "", si_unit)
+    ]
+    return _did_you_mean(meant)
+
+
+def _in_other_case(name: str) -> list[str]:
+    return sorted(known for known in spellings() if known.lower() == name.lower() and known != name)
+
+
+def _that_fit(names: Iterable[str], name: str, unit: str, kind: str, si_unit: str | None) -> list[tuple[str, ...]]:
+    """Units with other names in the place of one that fit ``si_unit``, each with all endings that a pressure may have.
+
+    All that are units where it is None.
+    """
+    wanted = None if si_unit is None else parse_unit(si_unit)[0].dimensions
+    found = []
+    for known in dict.fromkeys(names):
+        meant = re.sub(rf"(?<![A-Za-zµ]){re.escape(name)}(?![A-Za-zµ])", known, unit)
         try:
-            dimensions = parse_unit(unit)[0].dimensions
+            dimensions = parse_unit(meant)[0].dimensions
         except UnitError:
             continue
         if wanted is None or dimensions == wanted:
-            kinds = (
-                _kinds(kind, si_unit) if dimensions == PRESSURE and si_unit in (_LEVEL, _DIFFERENCE, None) else ("",)
-            )
-            *others, last = (f"'{unit}{suffix}'" for suffix in kinds)
-            return f", did you mean {' or '.join(filter(None, (', '.join(others), last)))}?"
-    return ""
+            is_pressure = dimensions == PRESSURE and si_unit in (_LEVEL, _DIFFERENCE, None)
+            found.append(tuple(f"'{meant}{suffix}'" for suffix in (_kinds(kind, si_unit) if is_pressure else ("",))))
+    return found
+
+
+def _did_you_mean(meant: Iterable[tuple[str, ...]]) -> str:
+    *others, last = [unit for units in meant for unit in units] or [""]
+    return f", did you mean {' or '.join(filter(None, (', '.join(others), last)))}?" if last else ""
 
 
 def _kinds(kind: str, si_unit: str | None) -> tuple[str, ...]:
@@ -115,7 +142,7 @@ def to_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_AT
     """Return ``value`` in ``si_unit``: ``Pa_a`` for a pressure level, ``Pa_d`` for a pressure difference."""
     scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
     # In decimals: 8.4 g is the float nearest to 0.0084 kg, not one beside it.
-    exact = Decimal(repr(_finite(value, value))) * scale + offset
+    exact = DECIMALS.add(DECIMALS.multiply(_decimal(value), scale), offset)
     return _finite(float(exact) + (atmosphere if counts_from_atmosphere else 0.0), f"{value:g} {unit}")
 
 
@@ -123,7 +150,7 @@ def from_si(value: float, unit: str, si_unit: str, atmosphere: float = STANDARD_
     """Return the SI ``value`` in ``unit``: the inverse of ``to_si``."""
     scale, offset, counts_from_atmosphere = conversion(unit, si_unit)
     above = _finite(value, value) - (atmosphere if counts_from_atmosphere else 0.0)
-    return float((Decimal(repr(above)) - offset) / scale)
+    return float(DECIMALS.divide(DECIMALS.subtract(_decimal(above), offset), scale))
 
 
 def format_quantity(value: float, unit: str) -> str:
@@ -174,7 +201,7 @@ def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
 def base_value(value: float, unit: str) -> float:
     """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its own unit, whatever its dimension is."""
     parsed, kind = _read(unit, None)
-    base = float(Decimal(repr(_finite(value, value))) * parsed.scale + parsed.offset)
+    base = float(parsed.in_base(_decimal(value)))
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
 
 
@@ -197,7 +224,8 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     given, kind = _read(unit, si_unit)
     if given.dimensions != wanted.dimensions:
         given_text = f"unit '{unit}'" if unit else "a number without a unit"
-        raise UnitError(f"{given_text} does not fit: {_describe_unit(si_unit)}")
+        case = "" if kind else _hint_of_case(unit, si_unit)
+        raise UnitError(f"{given_text} does not fit{case}: {_describe_unit(si_unit)}")
     is_pressure = si_unit in (LEVEL, DIFFERENCE)
     if is_pressure and not kind:
         raise UnitError(f"'{unit}' does not say which pressure: {pressures_to_write(unit, si_unit)}")
@@ -206,7 +234,8 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
     counts_from_atmosphere = kind == "g" and si_unit == LEVEL
     if wanted.scale == 1 and wanted.offset == 0:
         return given.scale, given.offset, counts_from_atmosphere
-    return given.scale / wanted.scale, (given.offset - wanted.offset) / wanted.scale, counts_from_atmosphere
+    scale = DECIMALS.divide(given.scale, wanted.scale)
+    return scale, DECIMALS.divide(DECIMALS.subtract(given.offset, wanted.offset), wanted.scale), counts_from_atmosphere
 
 
 def _is_flow_without_mass(unit: str) -> bool:
@@ -230,6 +259,10 @@ def _describe_unit(si_unit: str) -> str:
             "flow q from p1 to p2 (absolute) is C = q/(p1 sqrt(1 - ((p2/p1 - b)/(1 - b))^2)), with b = critical_ratio"
         )
     return f"a unit like '{si_unit}' is needed" if si_unit else "a plain number without a unit is needed"
+
+
+def _decimal(value: float) -> Decimal:
+    return Decimal(repr(float(_finite(value, value))))
 
 
 def _finite(value: float, shown: object) -> float:

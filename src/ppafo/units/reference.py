@@ -18,7 +18,7 @@ from ppafo.constants import (
     STANDARD_REFERENCE_TEMPERATURE,
 )
 from ppafo.errors import UnitError, nearest_name
-from ppafo.units.definitions import PRESSURE, ParsedUnit, parse_unit
+from ppafo.units.definitions import DECIMALS, PRESSURE, ParsedUnit, parse_unit
 from ppafo.units.spelling import says_kind
 
 MASS_FLOW = {"[mass]": 1, "[time]": -1}
@@ -114,7 +114,7 @@ def read_unit(unit: str) -> tuple[ParsedUnit, str]:
         example = with_condition(unit, "", "air") if not gases else "L/min (ANR, air)"
         raise UnitError(f"'{unit}' {'does not say the gas' if not gases else 'says two gases'}: {_write(example)}")
     factor = Decimal(repr(density(condition, _molar_mass(gases[0]))))
-    return ParsedUnit(parsed.scale * factor, Decimal(0), MASS_FLOW), ""
+    return ParsedUnit(DECIMALS.multiply(parsed.scale, factor), Decimal(0), MASS_FLOW), ""
 
 
 def _write(example: str) -> str:
@@ -156,7 +156,7 @@ def condition_of(text: str, unit: str) -> Condition:
         if match is None:
             break
         parsed, kind = parse_unit(match[2])
-        value = Decimal(match[1].replace(",", ".")) * parsed.scale + parsed.offset
+        value = parsed.in_base(Decimal(match[1].replace(",", ".")))
         if parsed.dimensions == {"[temperature]": 1} and value > 0:
             temperature = float(value)
         elif parsed.dimensions == PRESSURE and kind in ("", "a") and value > 0:
@@ -190,4 +190,4 @@ def _molar_mass(word: str) -> float:
     parsed = None if match is None else parse_unit(match[2])[0]
     if match is None or parsed is None or parsed.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
         raise UnitError(f"'{word}' is no molar mass, such as '0.044 kg/mol'")
-    return float(Decimal(match[1]) * parsed.scale)
+    return float(parsed.in_base(Decimal(match[1])))

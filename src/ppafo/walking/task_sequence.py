@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, make_schema, one_of, optional, quote, table, validate
+from ppafo.documents.models import NAME, SchemaVersion, make_schema, one_of, optional, quote, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.engine.rows import leaves
 from ppafo.errors import ScenarioError, nearest_name
@@ -168,7 +168,7 @@ def _segment_table(kind: str) -> type[BaseModel]:
 @functools.cache
 def _task_sequence_table(segment: Any, name: str) -> type[BaseModel]:
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME, max_length=100)),
         "description": (str, Field("", description="who walks like this, and why it is tried")),
         "segment": (

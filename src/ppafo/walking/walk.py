@@ -24,6 +24,7 @@ from ppafo.model.leg import passive_torque
 from ppafo.parameters.device import Actuator, FootPlate, Friction
 from ppafo.parameters.graph import outside
 from ppafo.plugins import Plugins, name_plugins
+from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.plan import MAXIMUM_STEPS
 from ppafo.simulation.sampled import run_sampled
 from ppafo.simulation.scenario import Control, Scenario
@@ -85,6 +86,7 @@ def walk(
                 "overrides, a gait, a task sequence and a bottle go with a name or a file; a Scenario takes them in "
                 "load_walk"
             )
+        check_parts(scenario)
         chosen = scenario
     else:
         chosen = load_walk(scenario, overrides, gait=gait, task_sequence=task_sequence, bottle=bottle)

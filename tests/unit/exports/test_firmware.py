@@ -14,13 +14,14 @@ from ppafo.errors import ProgramError, ScenarioError
 from ppafo.processor.catalog import CATALOG
 from ppafo.processor.firmware import firmware, fixed_point_controller, proof
 from ppafo.processor.fixed_point import Readings
-from ppafo.processor.images import Target, built, missing_tools, processor_simulator, read_image, sizes
+from ppafo.processor.images import Target, make_firmware, missing_tools, processor_simulator, read_image, sizes
 from ppafo.processor.lock_step import PythonProcessor, compare_drawn, drawn_readings, run_on_processor
 from ppafo.processor.qemu import QemuSimulator
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
+from ppafo.storage.files import add_files
 from ppafo.translation.widths import Interval
 
 SCENARIOS = {
@@ -101,7 +102,8 @@ def test_drawn_readings_reach_edges_saturation_and_faults() -> None:
 @pytest.mark.parametrize("law", SCENARIOS)
 def test_the_c_of_a_law_decides_as_python_does_under_the_sanitizer(tmp_path: Path, law: str) -> None:
     scenario = scenario_of(law)
-    built(firmware(scenario), tmp_path, ("host", "checked"))
+    add_files(tmp_path, firmware(scenario))
+    make_firmware(tmp_path, ("host", "checked"))
     fixed = PythonProcessor(fixed_point_controller(scenario))
     lines, wanted = [], []
     for number, readings in enumerate(drawn_readings(int(fixed_point_controller(scenario).converter.top), 20_000, 5)):
@@ -180,7 +182,8 @@ def test_other_compilers_build_for_a_cortex_too(target: Target, compiler: str, t
             "PROCESSOR=",
         ],
     }
-    built(firmware(scenario_of("pid"), target.name), tmp_path, ["all", *given[compiler]])
+    add_files(tmp_path, firmware(scenario_of("pid"), target.name))
+    make_firmware(tmp_path, ["all", *given[compiler]])
     simulator = target.simulator(target, read_image(tmp_path, target))
     fixed = PythonProcessor(fixed_point_controller(scenario_of("pid")))
     for readings in drawn_readings(4095, 100, 3):
@@ -198,7 +201,8 @@ def test_a_processor_with_other_numbers_is_found_out(
     found = compare_drawn(scenario, 400, target=target.name)
     assert found.differences > 0
     assert "on the processor" in found.first_difference
-    built(wrong, tmp_path)
+    add_files(tmp_path, wrong)
+    make_firmware(tmp_path)
     assert sizes(tmp_path / "firmware.elf", target).flash > sizes(tmp_path / "simulated.elf", target).flash
 
 

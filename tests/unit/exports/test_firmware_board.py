@@ -11,9 +11,10 @@ import pytest
 from ppafo.processor.catalog import CORTEX_M0
 from ppafo.processor.firmware import firmware, fixed_point_controller
 from ppafo.processor.fixed_point import Readings
-from ppafo.processor.images import built, missing_tools, read_image
+from ppafo.processor.images import make_firmware, missing_tools, read_image
 from ppafo.processor.lock_step import PythonProcessor
 from ppafo.processor.qemu import Debugger
+from ppafo.storage.files import add_files
 from tests.unit.exports.test_firmware import scenario_of
 
 MISSING = missing_tools(CORTEX_M0)
@@ -41,7 +42,8 @@ class Board:
 
     def __init__(self, folder: Path, *overrides: str) -> None:
         files = firmware(scenario_of("pid", *overrides), CORTEX_M0.name)
-        built({**files, "converter_nrf51822.c": STAND_IN.encode()}, folder)
+        add_files(folder, {**files, "converter_nrf51822.c": STAND_IN.encode()})
+        make_firmware(folder)
         (folder / "firmware.elf").replace(folder / "simulated.elf")
         image = read_image(folder, CORTEX_M0)
         self.symbols = {name: address & ~1 for name, address in image.symbols.items()}

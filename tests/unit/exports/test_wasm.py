@@ -97,14 +97,6 @@ def test_what_would_need_another_program_is_said_and_refused() -> None:
     assert named == list(kept), "each by its name"
 
 
-def test_the_programs_of_the_package_are_those_of_its_physics() -> None:
-    index = json.loads((FOLDER / wasm.INDEX).read_text())
-    shipped = (*list_scenarios(), *list_walks())
-    texts = {name: wasm.source_of(library_of(load_scenario(name))) for name in shipped}
-    missing = [name for name, text in texts.items() if wasm.digest_of(text) not in index["programs"]]
-    assert missing == [], "python scripts/wasm_programs.py builds them anew"
-
-
 @pytest.mark.thorough
 def test_the_programs_of_the_package_are_what_the_compiler_makes_of_its_physics() -> None:
     index = json.loads((FOLDER / wasm.INDEX).read_text())

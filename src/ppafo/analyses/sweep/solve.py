@@ -10,7 +10,6 @@ import json
 import math
 import os
 import platform
-import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -32,6 +31,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
+from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.storage.places import place_at
 from ppafo.studies.distributions import Floats
@@ -236,7 +236,7 @@ def sweep(
 
         # Before a folder is made: a wrong address must leave nothing.
         check_scheduler(scheduler)
-    kept = tempfile.TemporaryDirectory(prefix="ppafo-study-") if out is None else None
+    kept = temporary_folder("ppafo-study") if out is None else None
     location = place_at(kept.name if kept is not None else str(out))
     store = Store.claim(chosen, location, agreed, threads)
     _work(Task(chosen, location.address, threads), store, scheduler, progress)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.arguments import Overrides, checked
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
@@ -91,7 +91,7 @@ class Effort(StrictTable):
 class TuningFile(StrictTable):
     """Layout of a tuning file."""
 
-    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
+    schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
     description: str = ""
     scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]

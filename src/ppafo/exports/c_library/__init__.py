@@ -120,7 +120,12 @@ _LIBRARIES = {VANE: scenario_library, WALK: walk_library}
 
 
 def library_of(scenario: Scenario) -> Library:
-    """The library of a scenario or a walk."""
+    """The library of a scenario or a walk; ProgramError where an object of Python controls it."""
+    if scenario.controller.is_outside:
+        raise ProgramError(
+            f"{scenario.name}: a controller that is an object of Python cannot be exported; export the plant alone, or "
+            "write the law as a kind of controller"
+        )
     return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 
 

@@ -1,14 +1,14 @@
 """From settings to the numbers of a run: how that function is written for any device, and what a scenario needs."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, final
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.engine.entries import indent
 from ppafo.engine.program import Program
-from ppafo.engine.rows import leaf_paths, leaves, numbers, row_expression
+from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.scheme.pneumatics import is_slow
@@ -88,38 +88,6 @@ def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
     return f"{collector.add(term.function)}({', '.join(arguments)})"
 
 
-def _written(sign: str, is_reflected: bool = False) -> "Callable[[Written, Written | float], Written]":
-    """An operator that writes its sign between two numbers; a reflected one has the other number first."""
-
-    def operator(number: "Written", other: "Written | float") -> "Written":
-        first, second = (other, number) if is_reflected else (number, other)
-        return Written(f"({_text(first)} {sign} {_text(second)})")
-
-    return operator
-
-
-@dataclass(frozen=True, slots=True)
-class Written:
-    """A number as text: arithmetic of Python on it is written, operation by operation."""
-
-    text: str
-
-    __mul__ = _written("*")
-    __rmul__ = _written("*", is_reflected=True)
-    __add__ = _written("+")
-    __radd__ = _written("+", is_reflected=True)
-    __rsub__ = _written("-", is_reflected=True)
-    __rtruediv__ = _written("/", is_reflected=True)
-
-    def sqrt(self) -> "Written":
-        """The root, by the name under which NumPy looks for it."""
-        return Written(f"math.sqrt({self.text})")
-
-
-def _text(number: Written | float) -> str:
-    return number.text if isinstance(number, Written) else repr(float(number))
-
-
 @final
 class Writing:
     """Writes lines for one device and program; what they call is gathered by ``add``."""
@@ -171,8 +139,8 @@ class Writing:
         return {name: c_identifier(f"{section}.{name}") for name in names}
 
     def constant(self, row: Any, path: str) -> str:
-        """A NamedTuple of numbers that are known, or ``Written``."""
-        cells = dict(zip(leaf_paths(type(row), path), map(_text, leaves(row)), strict=True))
+        """A NamedTuple of numbers that are known."""
+        cells = dict(zip(leaf_paths(type(row), path), map(repr, numbers(row)), strict=True))
         return row_expression(type(row), path, cells, self.add)
 
     def kind(self, section: str, kind: Any, known: Mapping[str, str] | None = None) -> str:

@@ -4,12 +4,12 @@ import importlib.util
 import platform
 import shutil
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ppafo.errors import ProgramError
+from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
 
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fwrapv")
@@ -59,9 +59,7 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
     """
     # No -march: a unit runs on processors that nobody here has seen.
     command = [*compiler_for(name), *FLAGS, *HIDDEN]
-    with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
-        for file, content in sources.items():
-            (Path(folder) / file).write_bytes(content)
+    with temporary_folder("ppafo", sources) as folder:
         library = Path(folder) / f"unit{PLATFORMS[name].suffix}"
         # Windows has the mathematics in its C library.
         mathematics = [] if name == "win64" else ["-lm"]
@@ -69,7 +67,7 @@ def build(name: str, sources: Mapping[str, bytes], main: str) -> bytes:
         if done.returncode != 0:
             raise ProgramError(f"{command[0]} does not build the library for {name}: {complaint(done)}")
         if not library.is_file():
-            raise ProgramError(f"{command[0]} says that all is well, but made no library for {name}; {_ANOTHER}")
+            raise ProgramError(f"{command[0]} returned 0 but made no library for {name}; {_ANOTHER}")
         return library.read_bytes()
 
 

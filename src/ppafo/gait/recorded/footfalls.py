@@ -278,11 +278,21 @@ _COVERED = 0.9
 
 
 def strides_within(signal: Signal, strides: Sequence[Stride]) -> list[Stride]:
-    """Return the strides that lie within a signal, to half a sample."""
+    """Return the strides that lie within a signal, to half a sample, and in which no sample of it was lost."""
     slack = 0.5 / signal.rate
     return [
-        stride for stride in strides if stride.start >= signal.time[0] - slack and stride.end <= signal.time[-1] + slack
+        stride
+        for stride in strides
+        if stride.start >= signal.time[0] - slack and stride.end <= signal.time[-1] + slack
+        if not lost_in(signal, stride)
     ]
+
+
+def lost_in(signal: Signal, stride: Stride) -> int:
+    """Number of samples of a motion that were lost in a stride."""
+    if signal.lost is None:
+        return 0
+    return int(np.count_nonzero(signal.lost & (signal.time >= stride.start) & (signal.time <= stride.end)))
 
 
 LEAST_STRIDES = 2
@@ -315,7 +325,8 @@ def find_footfalls(
     usable = usable_strides(walk, footfalls.strides)
     if len(usable) >= (1 if footfalls.is_overground else least) or least > LEAST_STRIDES:
         return footfalls
-    cycle = wrap_cycle(walk)
+    # A cycle must not wrap around what was bridged.
+    cycle = None if any(signal.lost is not None for signal in walk.values()) else wrap_cycle(walk)
     if cycle is None:
         return footfalls
     # Three cycles in a row have one whole stride in the middle, wherever the record begins.

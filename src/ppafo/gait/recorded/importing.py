@@ -1,5 +1,6 @@
 """Import of a gait from recorded files: strides found and chosen, checks, mean curves and their series."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,6 +30,7 @@ from ppafo.gait.recorded.footfalls import (
     Footfalls,
     Stride,
     find_footfalls,
+    lost_in,
     strides_of_curve,
     strides_within,
     usable_strides,
@@ -36,8 +38,8 @@ from ppafo.gait.recorded.footfalls import (
 from ppafo.gait.recorded.mapping import ImportSettings, KneeMap, check_settings
 from ppafo.gait.recorded.source import Source, of_largest_one, read_source
 from ppafo.gait.recorded.strides import Strides, of_usual_time, without_drop_outs, without_odd_shapes
-from ppafo.gait.recorded.table import MotionTable
-from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, low_pass
+from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
+from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, lost_span, low_pass
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,6 +116,9 @@ def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[
     walk, events = footfalls.walk, footfalls.events
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
     strides = of_usual_time(usable_strides(walk, footfalls.strides), least)
+    counts = [(stride, max(lost_in(walk[name], stride) for name in REQUIRED)) for stride in footfalls.strides]
+    lost = [(stride, f"{count_of(count, 'frame')} of its markers or angles lost") for stride, count in counts if count]
+    strides = replace(strides, left_out=(*strides.left_out, *lost))
     with noted_in(wrong):
         _check_enough(strides, footfalls.strides, {name: walk[name] for name in (*REQUIRED, events) if name in walk})
     if not strides.taken:
@@ -229,6 +234,16 @@ def _check_enough(strides: Strides, usable: list[Stride], walk: Mapping[str, Sig
     events = (
         f"{len(usable)} in the events" if usable else f"no heel strikes were found in {where}: is it the right column?"
     )
+    longest = max(lost_span(signal) for signal in walk.values())
+    if longest > 0.0:
+        # Rounded up, so that the value in the remedy fills the gap.
+        needed = math.ceil(100.0 * longest - 1e-6) / 100.0
+        filled = f"fill the gaps (--fill-gaps '{needed:g} s')"
+        remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
+        raise DataError(
+            f"{walk['shank_angle'].file}: has {count} without a lost sample, {least} are needed; {remedy}, give "
+            "a longer recording, or accept fewer with --minimum-strides"
+        )
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
         "give a longer recording, or accept fewer with --minimum-strides"

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from ppafo.documents.models import NAME, StrictTable, Text, make_schema, read_model
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, UnitError, raise_noted, refused_as
 from ppafo.gait.recorded.table import LONGEST_FILLED
@@ -129,7 +129,7 @@ class KneeMap(StrictTable):
 class GaitMap(StrictTable):
     """What the columns of recorded files mean; a curve that is not named is not imported."""
 
-    schema_version: Annotated[Literal[1], Field(description="version of this layout")] = 1
+    schema_version: SchemaVersion = 1
     shank_angle: ShankMap
     ankle_angle: AngleMap
     ankle_moment: MomentMap | None = None

@@ -10,9 +10,10 @@ from ppafo.errors import DataError, PpafoError, nearest_name, noted_in, one_line
 from ppafo.gait.plausible import SignSource
 from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
 from ppafo.gait.recorded.form import Convention, GaitForm
-from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names, unsaid_axes
-from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps
-from ppafo.gait.recorded.walk import Person, Signal, walk_signals
+from ppafo.gait.recorded.forms.markers import convention_of_map
+from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names
+from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
+from ppafo.gait.recorded.walk import LOADS, Person, Signal, walk_signals
 from ppafo.kinds import Kinds
 from ppafo.units import format_quantity
 
@@ -24,6 +25,10 @@ FORMS: Kinds[GaitForm] = Kinds(
     GaitForm,
     {
         "opensim": "ppafo.gait.recorded.forms.opensim:FORM",
+        "nexus": "ppafo.gait.recorded.forms.motion_capture:NEXUS",
+        "qualisys": "ppafo.gait.recorded.forms.motion_capture:QUALISYS",
+        "motive": "ppafo.gait.recorded.forms.motion_capture:MOTIVE",
+        "dflow": "ppafo.gait.recorded.forms.motion_capture:DFLOW",
         "csv": "ppafo.gait.recorded.forms.comma_separated:FORM",
         "c3d": "ppafo.gait.recorded.forms.c3d:FORM",
         "trc": "ppafo.gait.recorded.forms.markers:TRC",
@@ -135,16 +140,18 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     convention = (
         find_convention(tables, settings.side, person.body_mass)
         if settings.columns is None
-        else Convention(settings.columns)
+        else convention_of_map(settings.columns, tables, settings.side)
     )
     columns = convention.columns
     if settings.ankle_neutral is not None:
         neutral = {"neutral": format_quantity(settings.ankle_neutral, "rad")}
         columns = columns.model_copy(update={"ankle_angle": columns.ankle_angle.model_copy(update=neutral)})
-    mapped = [getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"]
-    names = [name.removeprefix("-") for mapping in mapped if mapping is not None for name in column_names(mapping)]
-    # Only the columns in use: a gap elsewhere needs no word.
-    tables = [fill_gaps(table, names, settings.longest_gap) for table in tables]
+    # Only the columns in use: a gap elsewhere needs no word. A load of exactly 0 is a foot off the plate.
+    mapped = {name: getattr(columns, name) for name in GaitMap.model_fields if name != "schema_version"}
+    used = {name: column_names(curve) for name, curve in mapped.items() if curve is not None}
+    names = [column.removeprefix("-") for terms in used.values() for column in terms]
+    moved = [column.removeprefix("-") for name, terms in used.items() if name not in LOADS for column in terms]
+    tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
     walk = walk_signals(tables, columns, person, settings.columns is None, wrong)
     if settings.body_mass is None:
         walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
@@ -155,7 +162,6 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
             said += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
-    said += [] if settings.columns is None else unsaid_axes(settings.columns)
     signs_from: SignSource = "columns" if settings.columns is None else "map"
     return Source(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
 

@@ -108,8 +108,10 @@ def without_drop_outs(
 
 def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return start and end [s] of all stretches with one value that cover more than 0.1 s of the spans."""
-    moves = np.flatnonzero(np.diff(values) != 0.0)
-    if moves.size == 0:
+    steps = np.diff(values)
+    # A gap ends a stretch, too, but a column with gaps alone never moves.
+    moves = np.flatnonzero(steps != 0.0)
+    if not np.any(np.abs(steps) > 0.0):
         return []
     starts, ends = np.concatenate([[0], moves + 1]), np.concatenate([moves, [values.size - 1]])
     long = time[ends] - time[starts] > LONGEST_HELD

@@ -5,12 +5,17 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 
 STRIKE, OFF = "foot strike", "foot off"
 """Kinds of events."""
+
+AXES = "xyz"
+_COORDINATES = (".x", ".y", ".z")
+"""Ends of the columns of a marker, ``LABEL.x``."""
 
 Events = dict[tuple[str, str], list[float]]
 
@@ -53,9 +58,10 @@ _LARGEST_JUMP = 3.0
 def cut_table(
     table: MotionTable, longest_gap: float = 0.0, start: float | None = None, end: float | None = None
 ) -> MotionTable:
-    """Return a table from ``start`` to ``end`` [s], whose clock runs without a gap there.
+    """Return a table from ``start`` to ``end`` [s]; rows that are missing are remarked.
 
-    Rows missing for no longer than ``longest_gap`` [s] are bridged and remarked; DataError for longer ones.
+    Those missing for no longer than ``longest_gap`` [s] are bridged; a longer gap of the clock gets a row without
+    numbers, so that the strides across it are left out.
     """
     if table.time.size < 3:
         raise DataError(f"{table.file}: has {table.time.size} rows; a stride needs several tens")
@@ -66,15 +72,18 @@ def cut_table(
     # Gaps outside of what is used do not matter.
     seen = (table.time[:-1] >= low) & (table.time[1:] <= high)
     jumps = np.flatnonzero(seen & (steps > _LARGEST_JUMP * median)).tolist()
-    for index in jumps:
-        if steps[index] > longest_gap + 1.5 * median:
-            raise DataError(
-                f"{table.file}: the time jumps in row {index + 2} from {table.time[index]:g} s to "
-                f"{table.time[index + 1]:g} s, the usual interval is {median:.3g} s; cut the file there or fill the gap"
-                " (--start, --end, --fill-gaps)"
-            )
-    said = [f"rows from {table.time[i]:g} to {table.time[i + 1]:g} s are missing and were bridged" for i in jumps]
+    long = [index for index in jumps if steps[index] > longest_gap + 1.5 * median]
+    said = [
+        f"rows from {table.time[i]:g} to {table.time[i + 1]:g} s are missing"
+        + ("" if i in long else " and were bridged")
+        for i in jumps
+    ]
     table = replace(table, remarks=(*table.remarks, *said))
+    if long:
+        after = np.array(long) + 1
+        middles = 0.5 * (table.time[long] + table.time[after])
+        columns = {name: np.insert(values, after, np.nan) for name, values in table.columns.items()}
+        table = replace(table, time=np.insert(table.time, after, middles), columns=columns)
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
@@ -83,6 +92,57 @@ def cut_table(
         )
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)
+
+
+MOST_ACCELERATION = 50.0
+"""Acceleration [m/s^2] that no marker on a leg has as it begins to move from rest."""
+_LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+
+
+def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTable:
+    """Return the table with NaN where a marker of these columns was not seen, and a remark on each such marker.
+
+    Not seen is a marker with a coordinate that is no number, with all coordinates exactly 0, or held at its last place
+    until it is found again: equal to the last bit for two frames or more, then further away than a marker at rest
+    comes in one interval, ``MOST_ACCELERATION`` times its square [m].
+    """
+    columns, said = dict(table.columns), []
+    labels = dict.fromkeys(name[:-2] for name in names if name[-2:] in _COORDINATES)
+    interval = float(np.median(np.diff(table.time))) if table.time.size > 1 else 0.0
+    for label in labels:
+        own = [f"{label}.{axis}" for axis in AXES if f"{label}.{axis}" in columns]
+        if len(own) < 2:
+            continue
+        # Most laboratories write millimetres, also where the file does not say so.
+        at = np.array([columns[name] for name in own]) * _LENGTHS.get(table.units.get(own[0], ""), 0.001)
+        recorded, zero = np.isfinite(at).all(axis=0), (at == 0.0).all(axis=0)
+        causes = {
+            "not recorded": ~recorded,
+            # A marker that is 0 throughout stands at the origin.
+            "all coordinates 0": zero & bool((recorded & ~zero).any()),
+            "held at its last place": _held(at, MOST_ACCELERATION * interval**2),
+        }
+        lost = {cause: frames for cause, frames in causes.items() if frames.any()}
+        if not lost:
+            continue
+        gap = np.logical_or.reduce(list(lost.values()))
+        for name in own:
+            columns[name] = np.where(gap, np.nan, columns[name])
+        how = " and ".join(lost)
+        said.append(f"marker '{label}' was lost in {np.count_nonzero(gap)} of {table.time.size} frames ({how})")
+    return replace(table, columns=columns, remarks=(*table.remarks, *said))
+
+
+def _held(at: Floats, furthest: float) -> NDArray[np.bool_]:
+    """Return the frames in which a marker (coordinates, frames) [m] repeats its last place before it jumps."""
+    steps = np.linalg.norm(np.diff(at, axis=1), axis=0)
+    held = np.zeros(at.shape[1], dtype=np.bool_)
+    moves = np.flatnonzero(steps != 0.0)
+    for before, after in pairwise(moves.tolist()):
+        # Frames before + 1 to after have one place, of which the first was seen.
+        if after - before > 2 and steps[after] > furthest:
+            held[before + 2 : after + 1] = True
+    return held
 
 
 LONGEST_FILLED = 0.25

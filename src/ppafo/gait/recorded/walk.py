@@ -4,7 +4,6 @@ Each is read from the one table that has its columns, from lines between markers
 that turns against it), or, for the knee, from hip and thigh.
 """
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -33,7 +32,7 @@ from ppafo.gait.recorded.mapping import (
     column_names,
 )
 from ppafo.gait.recorded.near_columns import nearest_column
-from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
+from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
 
@@ -51,7 +50,8 @@ class Signal:
 
     ``is_position``: a position [m], of which the gait has the acceleration.
     ``columns`` are the file's columns behind it. ``absent`` tells where a load was not measured, and counts as 0; None
-    where it always was.
+    where it always was. ``lost`` tells where a motion was not recorded, and is bridged by a straight line; None where
+    it always was.
     """
 
     file: str
@@ -60,6 +60,7 @@ class Signal:
     is_position: bool = False
     columns: tuple[str, ...] = ()
     absent: NDArray[np.bool_] | None = None
+    lost: NDArray[np.bool_] | None = None
 
     @property
     def rate(self) -> float:
@@ -68,10 +69,14 @@ class Signal:
 
 
 def without_ends(signal: Signal) -> Signal:
-    """Return a motion from its first to its last number: a marker that comes into view or leaves it."""
+    """Return a motion from its first to its last number, with gaps bridged by straight lines and marked as lost."""
     known = np.flatnonzero(np.isfinite(signal.values))
     inside = slice(int(known[0]), int(known[-1]) + 1)
-    return replace(signal, time=signal.time[inside], values=signal.values[inside])
+    time, values = signal.time[inside], signal.values[inside]
+    gaps = ~np.isfinite(values)
+    if not gaps.any():
+        return replace(signal, time=time, values=values)
+    return replace(signal, time=time, values=np.interp(time, time[~gaps], values[~gaps]), lost=gaps)
 
 
 def with_absence(signal: Signal) -> Signal:
@@ -126,7 +131,7 @@ class CurveColumns:
         for sign, name in self.terms:
             if not self.may_be_absent:
                 with noted_in(wrong):
-                    check_finite(self.table.columns[name], f"{self.table.file}: column {name!r}", self.table.time)
+                    check_recorded(self.table.columns[name], f"{self.table.file}: column {name!r}")
             with noted_in(wrong):
                 values, chosen = self._column(name, stated, si_units)
                 total += sign * values
@@ -152,24 +157,17 @@ class CurveColumns:
         raise DataError(f"{where} [{unit}]: {problem}")
 
 
-def check_finite(values: Floats, where: str, time: Floats) -> None:
-    """Raise DataError for a column with a gap within its ``time`` [s]; ``place`` is what the message calls it."""
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size == 0:
+def check_recorded(values: Floats, where: str) -> None:
+    """Raise DataError for a column without a number; ``where`` is its name in the message."""
+    if not np.isfinite(values).any():
         raise DataError(f"{where} contains no numbers; use another file, or map another column")
-    first = int(known[0])
-    bad = first + np.flatnonzero(~np.isfinite(values[first : int(known[-1]) + 1]))
-    if bad.size:
-        row, longest = int(bad[0]), float(np.max(np.diff(time[known])))
-        # Rounded up, so that the value in the remedy fills the gap.
-        needed = math.ceil(100.0 * longest - 1e-6) / 100.0
-        remedy = f"(--fill-gaps '{needed:g} s', or --start, --end)"
-        if longest > LONGEST_FILLED:
-            remedy = f"(--start, --end): {longest:.3g} s are too long to be filled here"
-        raise DataError(
-            f"{where} has a gap of {bad.size} samples, the first in row {row + 1} at {time[row]:g} s; "
-            f"fill it or cut the file there {remedy}"
-        )
+
+
+def lost_span(signal: Signal) -> float:
+    """Length of the longest gap of a motion [s], from the last sample before it to the first one after it."""
+    if signal.lost is None:
+        return 0.0
+    return float(np.max(np.diff(signal.time[~signal.lost])))
 
 
 def find_columns(
@@ -228,7 +226,7 @@ def between_markers(
     """Return how far the second marker is ahead of the first and above it, in the unit of the file."""
     marker = {name: columns.table.columns[name] for _, name in columns.terms}
     for name, values in marker.items():
-        check_finite(values, f"{columns.table.file}: column {name!r}", columns.table.time)
+        check_recorded(values, f"{columns.table.file}: column {name!r}")
     axis, vertical = mapped.forward.removeprefix("-"), mapped.vertical
     sign = -1.0 if mapped.forward.startswith("-") else 1.0
     ahead = sign * (marker[f"{second}.{axis}"] - marker[f"{first}.{axis}"])
@@ -243,10 +241,13 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
     inside = (seen.time >= shank.time[0]) & (seen.time <= shank.time[-1])
     time, values = seen.time[inside], seen.values[inside]
     lean = np.interp(time, shank.time, shank.values)
+    lost = np.zeros(time.size, dtype=np.bool_) if seen.lost is None else seen.lost[inside]
+    if shank.lost is not None:
+        lost = lost | (np.interp(time, shank.time, shank.lost.astype(np.float64)) > 0.0)
     flat = np.zeros(time.size, dtype=np.bool_)
     if time.size >= 3:
         # Flat: the foot hardly turns while the shank leans over it. The median of these samples is the zero.
-        flat = (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0)
+        flat = (np.abs(np.gradient(values, time)) < _SLOW) & (np.gradient(lean, time) < 0.0) & ~lost
     # Less than a tenth of a second of flat foot may be a pause of the swing.
     if np.count_nonzero(flat) < _LEAST_FLAT * seen.rate:
         raise DataError(
@@ -256,7 +257,7 @@ def foot_markers_angle(columns: CurveColumns, mapped: AngleMap, shank: Signal) -
         )
     sign, neutral = mapped.sign_and_neutral()
     angle = 0.5 * np.pi + lean - (values - float(np.median(values[flat]))) - sign * neutral
-    return Signal(columns.table.file, time, angle)
+    return Signal(columns.table.file, time, angle, lost=lost if lost.any() else None)
 
 
 THIGH_FRACTION = 0.245

@@ -68,7 +68,6 @@ import json
 import math
 import re
 import sys
-import tempfile
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -102,6 +101,7 @@ from ppafo.simulation.loading import parameter_set_of
 from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.scenario import Scenario
+from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
 from ppafo.units import split_pressure_kind, to_si
 from ppafo.version import __version__
@@ -416,15 +416,14 @@ def check_can_build() -> None:
 def build(text: str) -> bytes:
     """A module of a translation unit. ProgramError where ziglang is not there, or refuses."""
     check_can_build()
-    with tempfile.TemporaryDirectory(prefix="ppafo-", ignore_cleanup_errors=True) as folder:
-        for name, content in {"module.c": text, "math.h": template(__name__, "math.h")}.items():
-            (Path(folder) / name).write_text(content, encoding="utf-8")
+    sources = {"module.c": text.encode(), "math.h": template(__name__, "math.h").encode()}
+    with temporary_folder("ppafo", sources) as folder:
         line = [sys.executable, "-m", "ziglang", "cc", *FLAGS, "module.c", "-o", "module.wasm"]
         done, made = asked(line, _HOW_TO_INSTALL, folder, Path(folder)), Path(folder) / "module.wasm"
         if done.returncode != 0:
             raise ProgramError(f"ziglang does not build the module: {complaint(done)}")
         if not made.is_file():
-            raise ProgramError("ziglang says that all is well, but made no module")
+            raise ProgramError("ziglang returned 0 but made no module")
         return made.read_bytes()
 
 

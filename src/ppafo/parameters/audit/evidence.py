@@ -16,6 +16,7 @@ from ppafo.parameters.device import Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.units import from_si
+from ppafo.units.definitions import DECIMALS
 
 Severity = Literal["error", "warning", "note"]
 
@@ -189,7 +190,7 @@ def digits(value: float) -> Interval:
 
 
 def _half_digit(value: float) -> float:
-    exponent = Decimal(repr(value)).normalize().as_tuple().exponent
+    exponent = Decimal(repr(value)).normalize(DECIMALS).as_tuple().exponent
     return 0.5 * 10.0 ** min(int(exponent), 0)
 
 

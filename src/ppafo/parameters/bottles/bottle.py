@@ -12,12 +12,12 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, Field
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.documents.models import NAME, make_schema, optional, read_model, table
+from ppafo.documents.models import NAME, SchemaVersion, make_schema, optional, read_model, table
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as, said_missing
 from ppafo.model.cold_gas import ColdSupply, Passage
@@ -201,7 +201,7 @@ WARMING = (*(f"regulator.{quantity.name}" for quantity in BODY), *(f"hose.{quant
 def bottle_file() -> type[BaseModel]:
     """Return the layout of the file of a bottle."""
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME)),
         "title": (str, Field(min_length=1)),
         "notes": (str, ""),

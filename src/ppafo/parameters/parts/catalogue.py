@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, StrictTable, make_schema, one_of, optional, table, validate
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, make_schema, one_of, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES
@@ -172,7 +172,7 @@ def _part_table(title: str, group: str, quantities: tuple[Quantity, ...], extra:
 
 def _catalogue_file() -> type[BaseModel]:
     fields: dict[str, Any] = {
-        "schema_version": (Literal[1], Field(description="version of this layout")),
+        "schema_version": (SchemaVersion, ...),
         "name": (str, Field(pattern=NAME)),
         "title": (str, Field(min_length=1)),
         "notes": (str, ""),

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, Texts, make_schema, read_model
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ScenarioError, first_twice
 
@@ -51,7 +51,7 @@ class ClaimEntry(StrictTable):
 class PublicationFile(StrictTable):
     """Layout of the file of a publication."""
 
-    schema_version: Literal[1] = Field(description="version of this layout")
+    schema_version: SchemaVersion
     name: str = Field(pattern=NAME)
     title: Text = Field(description="what it is about")
     citation: Text = Field(description="authors, journal, year, doi where known")

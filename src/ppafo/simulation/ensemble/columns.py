@@ -12,7 +12,7 @@ from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import either, in_two_forms, one_path
-from ppafo.simulation.declaration import TEXTS
+from ppafo.simulation.declaration import TEXTS, WALL_AREA
 from ppafo.simulation.numbers import ORIFICES, declared_numbers, moving_together, other_form
 from ppafo.simulation.scenario import Scenario
 
@@ -80,6 +80,10 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
             raise ScenarioError(
                 f"{base.name}: {section} is given in the other form; to vary {' or '.join(form)} give a column for both"
             )
+    # An adiabatic scenario need not say its area, and runs that take up heat would go on as if they had none.
+    gas, heat_varies = base.gas_model, "gas_model.heat_transfer_coefficient" in values
+    if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
+        raise ScenarioError(f"{base.name}: its heat transfer varies, and '{WALL_AREA}' is 0: give the area")
     every = moving_together(base, absolute(base, values, gauge))
     return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
 

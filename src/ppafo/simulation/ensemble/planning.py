@@ -15,12 +15,14 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at
 from ppafo.model.declaration import range_rule
 from ppafo.parameters.building import actuator_problem, beyond_pressures, consistency, growth_and_problem
+from ppafo.parameters.declaration import limits_text
 from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.ensemble.columns import Columns
 from ppafo.simulation.motion_kind import Clock, MotionKind
-from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.numbers import declared_numbers, with_numbers
+from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 
@@ -110,7 +112,9 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
             return f"{said}: is not a finite number"
         if path in _WHOLE and values[run] != np.floor(values[run]):
             return f"{said}: must be a whole number"
-        return f"{said}: {range_rule(quantity, limits(quantity, STANDARD_ATMOSPHERE))}"
+        # In the words of the file that has the number: a parameter set's, or the scenario's.
+        allowed = limits_text(quantity) if is_of_device(path) else limits(quantity, STANDARD_ATMOSPHERE)
+        return f"{said}: {range_rule(quantity, allowed)}"
 
     above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
     is_good = np.isfinite(values) & above & (values <= quantity.maximum)
@@ -168,9 +172,12 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
 
     def problem(path: str, relation: str, other: str, holds: Any) -> Problem:
         first, second = operator.attrgetter(path, other)(scenario.device)
-        return np.logical_not(
-            holds
-        ), lambda run: f"{path} = {at(first, run):.9g} must be {relation} {other} = {at(second, run):.9g} (SI units)"
+
+        def line(run: int) -> str:
+            unit = declared_numbers(scenario)[path].unit
+            return f"{path} = {at(first, run):.9g} {unit} must be {relation} {other} = {at(second, run):.9g} {unit}"
+
+        return np.logical_not(holds), line
 
     return tuple(problem(*rule) for rule in consistency(scenario.device))
 

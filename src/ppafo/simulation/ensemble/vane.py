@@ -49,7 +49,8 @@ def _beyond_the_stops(scenario: Scenario) -> Problem:
     def angle_line(run: int) -> str:
         low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
         path = path_of_locked_angle(scenario) or LOCKED_ANGLE
-        return f"{path} = {quantity_text(at(level, run), 'rad')}: must be between the stops, {low} to {high}"
+        said = f"{path} = {quantity_text(at(level, run), 'rad')}"
+        return f"{said}: must be between the stops of {scenario.device.name}, {low} to {high}"
 
     return _is_beyond(stops_of(scenario.device), profile), angle_line
 

@@ -4,14 +4,14 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.models import NAME, StrictTable, Text, Texts
+from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts
 from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, StudyError, UnitError, refused_as
 from ppafo.loading import reloaded
@@ -193,7 +193,7 @@ class PressureTable(StrictTable):
 class SizingFile(StrictTable):
     """Layout of a sizing file: a design that follows a torque profile."""
 
-    schema_version: Annotated[Literal[1], Field(description="version of this layout")]
+    schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
     description: str = ""
     scenario: Annotated[Text, Field(description="device, motion, controller and sensors: a name, or a path")]

@@ -5,24 +5,23 @@ A CSV file need not have the header ``name [unit]``: names alone or with the uni
 
 import re
 from pathlib import Path
-from typing import Literal
 
-from ppafo.documents.regular_file import decoded
-from ppafo.errors import DataError, one_line, refused_as
+from ppafo.errors import DataError, UnitError, one_line, refused_as
+from ppafo.gait.recorded.delimited import Block, Cells, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.storage.column_map import ColumnMap, MappedChannel
-from ppafo.storage.comma_separated import kind_of_comments, read_csv
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
-from ppafo.storage.files import read_bytes
-from ppafo.storage.foreign import read_foreign
+from ppafo.storage.comma_separated import kind_of_comments
+from ppafo.units import to_si
 
-_DELIMITERS: dict[str, Literal["comma", "semicolon", "tab"]] = {",": "comma", ";": "semicolon", "\t": "tab"}
+_DELIMITERS = ",;\t"
 
 _NAME = re.compile(r"(.*?)\s*(?:[\[(]\s*([^\])]*?)\s*[\])])?")
 
 _TIMES = {"time": "s", "t": "s", "time_s": "s", "time_ms": "ms"}
+
+_COUNTERS = ("", "index", "frame", "frame#", "framenumber", "frame number", "sample")
+"""Names of columns that count rows, in small letters; the first is pandas' index."""
 
 _LONGEST_SHOWN = 40
 """Letters of a name that a message shows."""
@@ -30,18 +29,7 @@ _LONGEST_SHOWN = 40
 
 def _recognises(path: str | Path) -> bool:
     """Recognise a table by its suffix; a .txt file may be one of markers, which says so in its first line."""
-    return Path(path).suffix.lower() != ".txt" or not _text(path).startswith("PathFileType")
-
-
-def _read(path: str | Path) -> MotionTable:
-    """Return a table of this package, or a plain one."""
-    if is_plain(path):
-        return read_plain_csv(path)
-    _check_first_name(path, _named_columns(_header(path))[0][0])
-    recording = read_csv(path)
-    columns = {name: recording[name] for name in recording.names}
-    units = {name: recording.unit(name) for name in recording.names}
-    return MotionTable(str(path), recording.time, columns, units, kind=recording.kind)
+    return Path(path).suffix.lower() != ".txt" or not _header(path).startswith("PathFileType")
 
 
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
@@ -73,36 +61,31 @@ def _delimiter(header: str) -> str:
 
 
 def read_plain_csv(path: str | Path) -> MotionTable:
-    """Return the table of a plain CSV file; units are empty where the header does not state one.
+    """Motion table of a CSV file; units are empty where the header does not state one, gaps are NaN.
 
-    DataError names the line of what cannot be read.
+    Columns before the time that count rows, of pandas or of frames, are not read. Raises DataError with the line of
+    what cannot be read.
     """
+    lines = lines_of(path)
+    first = next((number for number, line in enumerate(lines) if line.strip() and not line.startswith("#")), 0)
     header = _header(path)
     delimiter, pairs = _delimiter(header), _named_columns(header)
     names, units = [name for name, _ in pairs], [unit for _, unit in pairs]
-    _check_first_name(path, names[0])
-    if "" in names:
+    at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
+    if not all(name.lower() in _COUNTERS for name in names[:at]):
+        at = 0
+    _check_first_name(path, names[at])
+    if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; every column needs a name of its own")
-    written, names = names, told_apart(names)
-    channels = {f"c{number}": MappedChannel(column=number + 1) for number in range(1, len(names))}
-    channels["time"] = MappedChannel(column=1, unit=units[0] or _TIMES[names[0].lower()])
-    mapped = ColumnMap(
-        delimiter=_DELIMITERS[delimiter],
-        # A decimal comma shows only where commas do not separate the cells.
-        decimal="point" if delimiter == "," or not re.search(r"\d,\d", _text(path)) else "comma",
-        channels=channels,
-    )
-    recording = read_foreign(path, mapped)
-    twins = doubled(written[1:], names[1:])
-    named = {name: recording[f"c{number}"] for number, name in enumerate(names) if number > 0}
-    columns = without_copies(named, twins)
-    stated = dict(zip((*names, *written), (*units, *units), strict=True))
+    # A decimal comma shows only where commas do not separate the cells.
+    has_comma = delimiter != "," and any(re.search(r"\d,\d", line) for line in lines[first + 1 :])
     with refused_as(DataError, str(path), DataError):
-        kind = kind_of_comments(line for line in _text(path).splitlines() if line.startswith("#"))
-    remarks = tuple(said_of_doubled(twins, columns, "columns"))
-    return MotionTable(
-        str(path), recording.time, columns, {name: stated[name] for name in columns}, kind=kind, remarks=remarks
-    )
+        kind = kind_of_comments(line for line in lines if line.startswith("#"))
+    with refused_as(DataError, f"{path}: column {names[at]!r}", UnitError):
+        seconds = to_si(1.0, units[at] or _TIMES[names[at].lower()], "s")
+    block = Block(lines, first + 1, delimiter, "," if has_comma else ".", is_ragged=False)
+    cells = Cells([*[""] * at, *names[at:]], units)
+    return table_of(path, block, cells, names[at], seconds=seconds, kind=kind)
 
 
 def _check_first_name(path: str | Path, name: str) -> None:
@@ -114,23 +97,14 @@ def _check_first_name(path: str | Path, name: str) -> None:
 
 
 def _header(path: str | Path) -> str:
-    lines = (line for line in _text(path).splitlines() if line.strip() and not line.startswith("#"))
-    return next(lines, "")
-
-
-def _text(path: str | Path) -> str:
-    content = read_bytes(path)
-    try:
-        return decoded(content)
-    except UnicodeDecodeError:
-        return content.decode("utf-8", errors="replace")
+    return next((line for line in lines_of(path) if line.strip() and not line.startswith("#")), "")
 
 
 FORM = GaitForm(
     name="csv",
     summary="CSV files with the names and signs of this package, or others with a gait map",
     suffixes=(".csv", ".txt", ".tsv"),
-    read=_read,
+    read=read_plain_csv,
     recognises=_recognises,
     convention=_convention,
     is_whole=True,

@@ -9,7 +9,18 @@ import numpy as np
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded.form import Convention, GaitForm
-from ppafo.gait.recorded.mapping import AngleMap, Axis, ForceMap, GaitMap, KneeMap, MomentMap, ShankMap, Side, Vertical
+from ppafo.gait.recorded.mapping import (
+    AngleMap,
+    Axis,
+    ForceMap,
+    GaitMap,
+    KneeMap,
+    MomentMap,
+    ShankMap,
+    Side,
+    Vertical,
+    unsaid_axes,
+)
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
@@ -17,6 +28,8 @@ from ppafo.storage.trc import read_trc
 
 PLATE = "force plate "
 """Columns ``force plate 1.x``, ``.y``, ``.z`` [N]: the plate's force in the axes of the laboratory."""
+
+_AXIS_KEYS = {"forward", "vertical"}
 
 _FORWARDS: tuple[Axis, ...] = ("x", "y", "z", "-x", "-y", "-z")
 
@@ -60,6 +73,37 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     )
     plates = tuple(name for name in table.columns if name.startswith(PLATE) and name.endswith(f".{vertical}"))
     return Convention(columns, plates, (*remarks, *said, *units))
+
+
+def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Side) -> Convention:
+    """Return the map of a user with what it does not say, found in the markers: axes of the laboratory, force plates.
+
+    Plates are offered where the map names no vertical force.
+    """
+    shank = columns.shank_angle
+    table = next((table for table in tables if f"{shank.knee}.x" in table.columns), None)
+    if table is None or shank.knee is None or shank.ankle is None:
+        return Convention(columns, (), tuple(unsaid_axes(columns)))
+    labels = list(dict.fromkeys(name.rpartition(".")[0] for name in table.columns if "." in name))
+    mapped: dict[str, ShankMap | AngleMap] = {"shank_angle": shank, "ankle_angle": columns.ankle_angle}
+    unsaid = [name for name, each in mapped.items() if each.terms is None and not each.model_fields_set >= _AXIS_KEYS]
+    remarks: tuple[str, ...] = ()
+    if unsaid and _point(table, shank.knee) is not None:
+        forward, vertical, remarks = _axes(table, shank.knee, shank.ankle, side[0], labels)
+        found = {"forward": forward, "vertical": vertical}
+        changed = {
+            name: mapped[name].model_copy(
+                update={key: value for key, value in found.items() if key not in mapped[name].model_fields_set}
+            )
+            for name in unsaid
+        }
+        columns = columns.model_copy(update=changed)
+    else:
+        remarks = tuple(unsaid_axes(columns))
+    vertical = columns.shank_angle.vertical
+    is_free = columns.vertical_force is None
+    plates = tuple(name for name in table.columns if is_free and name.startswith(PLATE) and name.endswith(vertical))
+    return Convention(columns, plates, remarks)
 
 
 def _pair(labels: Sequence[str], foot: str) -> tuple[str, str]:

@@ -1,0 +1,61 @@
+"""Plain functions of rows and numbers, called with arrays: compiled, or run by Python where no compiler works."""
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import Any, get_type_hints
+
+from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
+from ppafo.engine.in_python import PythonFunctions
+from ppafo.engine.loading import compiled
+from ppafo.engine.rows import is_row, leaf_paths, leaves, rebuilt, row_expression
+from ppafo.engine.source_text import SourceCollector
+from ppafo.model.declaration import PlainFunction
+
+
+def row_functions(*functions: PlainFunction) -> list[Callable[..., None]]:
+    """Return each function as one of arrays: of the numbers of its rows, then of its result, then its own numbers.
+
+    Its parameters are annotated as NamedTuple classes of floats or as ``float``, its result as a NamedTuple class,
+    whose numbers are written into the array.
+    """
+    module = compiled(row_source(functions))
+    if module is None:
+        return [_by_python(function) for function in functions]
+    return [getattr(module, _entry_name(function)) for function in functions]
+
+
+def _entry_name(function: PlainFunction) -> str:
+    return f"call_{function.__name__}"
+
+
+@cache
+def row_source(functions: Sequence[PlainFunction]) -> str:
+    """Return the module whose entries are functions of arrays, as ``row_functions`` has them."""
+    collector, entries = SourceCollector(INLINE), []
+    for function in functions:
+        hints = get_type_hints(function)
+        result = hints.pop("return")
+        rows = {name: kind for name, kind in hints.items() if is_row(kind)}
+        lines = []
+        for name, kind in rows.items():
+            cells = {path: f"row_{name}[{place}]" for place, path in enumerate(leaf_paths(kind, name))}
+            lines.append(f"{name} = {row_expression(kind, name, cells, collector.add)}")
+        lines.append(f"found = {collector.add(function)}({', '.join(hints)})")
+        lines += [f"result[{place}] = {path}" for place, path in enumerate(leaf_paths(result, "found"))]
+        types = {f"row_{name}": ARRAY for name in rows} | {"result": ARRAY}
+        types |= dict.fromkeys((name for name in hints if name not in rows), FLOAT)
+        entries.append(entry_text(_entry_name(function), types, lines))
+    return "\n\n\n".join([HEADER, collector.text(), *entries])
+
+
+def _by_python(function: PlainFunction) -> Callable[..., None]:
+    """Return a function of arrays that Python runs, with what compiled code gives where Python would raise."""
+    kinds = [kind for name, kind in get_type_hints(function).items() if name != "return"]
+    own, rows = PythonFunctions({}, {}, {}, goes_on=True).of(function), sum(map(is_row, kinds))
+
+    def called(*given: Any) -> None:
+        arrays, result, rest = iter(given[:rows]), given[rows], iter(given[rows + 1 :])
+        arguments = (rebuilt(kind, next(arrays).tolist()) if is_row(kind) else next(rest) for kind in kinds)
+        result[:] = leaves(own(*arguments))
+
+    return called

@@ -1,0 +1,148 @@
+"""Delimited text tables of motion: rows of numbers below a header of any form, gaps as NaN."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.documents.regular_file import decoded
+from ppafo.errors import DataError
+from ppafo.gait.recorded.table import MotionTable
+from ppafo.signals.recording import Floats
+from ppafo.storage.comma_separated import SPLIT_NUMBERS
+from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
+from ppafo.storage.files import read_bytes
+from ppafo.storage.text_table import check_growing, number_in
+
+UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
+"""Cells of a sample that was not recorded, in small letters."""
+
+
+class Cells(NamedTuple):
+    """Columns of a table by their place in a row: name ("" to skip) and unit ("" where the file does not state it)."""
+
+    names: Sequence[str]
+    units: Sequence[str]
+
+
+class Block(NamedTuple):
+    """Rows of numbers in a text file.
+
+    ``first`` is the index of the first row among the lines, ``decimal`` the decimal mark. With ``is_ragged`` cells may
+    be missing at the end of a row, as of markers that were not seen.
+    """
+
+    lines: Sequence[str]
+    first: int
+    delimiter: str
+    decimal: str = "."
+    is_ragged: bool = True
+
+
+def lines_of(path: str | Path) -> list[str]:
+    """Lines of a text file with any line ends; characters that are no UTF-8 are replaced."""
+    content = read_bytes(path)
+    try:
+        text = decoded(content)
+    except UnicodeDecodeError:
+        text = content.decode("utf-8", errors="replace")
+    return text.splitlines()
+
+
+def cells_of(line: str, delimiter: str) -> list[str]:
+    """Cells of a line without blanks and quotation marks around them."""
+    return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
+
+
+def rows_of(block: Block, cells: Cells, clock: Sequence[int] = ()) -> tuple[Floats, list[int]]:
+    """Numbers of a block, shape (rows, named columns), NaN for a sample that was not recorded, and lines from 1.
+
+    ``clock`` are the named columns in which every row needs a number. Raises DataError, with line and column, for a
+    cell that is no number.
+    """
+    kept = [place for place, name in enumerate(cells.names) if name]
+    labels = [cells.names[place] for place in kept]
+    width = len(cells.names)
+    rows: list[list[float]] = []
+    numbers: list[int] = []
+    for number, line in enumerate(block.lines[block.first :], block.first + 1):
+        if line.startswith("#") or not line.strip():
+            continue
+        row = cells_of(line, block.delimiter)
+        while len(row) > width and not row[-1]:
+            row.pop()
+        if len(row) > width or (len(row) < width and not block.is_ragged):
+            remedy = f"; {SPLIT_NUMBERS}" if block.delimiter == "," and len(row) == 2 * width else ""
+            raise DataError(f"line {number} has {len(row)} values for {width} columns{remedy}")
+        row += [""] * (width - len(row))
+        if block.decimal != ".":
+            row = [cell.replace(block.decimal, ".") for cell in row]
+        rows.append(
+            [
+                number_in(row[place], number, label, () if index in clock else UNSEEN)
+                for index, (place, label) in enumerate(zip(kept, labels, strict=True))
+            ]
+        )
+        numbers.append(number)
+    if not rows:
+        raise DataError("has no rows of numbers")
+    return np.array(rows), numbers
+
+
+class PerFrame(NamedTuple):
+    """Clock of a table whose column ``name`` counts frames from 1, at a rate [Hz]."""
+
+    name: str
+    rate: float
+
+
+class PerRow(NamedTuple):
+    """Clock of a table with a row for each frame, at a rate [Hz]."""
+
+    rate: float
+
+
+Clock = str | PerFrame | PerRow
+"""Clock of a table: its column of time, or frames at a rate."""
+
+
+def table_of(
+    path: str | Path,
+    block: Block,
+    cells: Cells,
+    clock: Clock,
+    *,
+    seconds: float = 1.0,
+    noun: str = "columns",
+    kind: str = "measured",
+) -> MotionTable:
+    """Motion table of a block, whose column of time is in units of ``seconds`` [s]. Columns need not have own names.
+
+    Raises DataError, with file, line and column, for what cannot be read.
+    """
+    written = [name for name in cells.names if name]
+    apart = told_apart(written)
+    own = iter(apart)
+    named = Cells([next(own) if name else "" for name in cells.names], cells.units)
+    timed = "" if isinstance(clock, PerRow) else clock.name if isinstance(clock, PerFrame) else clock
+    at = written.index(timed) if timed else None
+    try:
+        values, numbers = rows_of(block, named, () if at is None else (at,))
+        time: Floats = np.arange(len(values), dtype=np.float64) if at is None else values[:, at]
+        if isinstance(clock, str):
+            time = time * seconds
+        else:
+            time = (time - (1.0 if isinstance(clock, PerFrame) else 0.0)) / clock.rate
+        check_growing(time, numbers)
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
+    twins = {name: others for name, others in doubled(written, apart).items() if name != timed}
+    columns = without_copies(
+        {name: values[:, place] for place, name in enumerate(apart) if place != at},
+        twins,
+    )
+    units = [unit for name, unit in zip(cells.names, cells.units, strict=True) if name]
+    stated = dict(zip((*apart, *written), (*units, *units), strict=True))
+    remarks = tuple(said_of_doubled(twins, columns, noun))
+    return MotionTable(str(path), time, columns, {name: stated[name] for name in columns}, kind=kind, remarks=remarks)

@@ -1,0 +1,237 @@
+"""Text exports of motion capture: Vicon Nexus CSV, Qualisys TSV, OptiTrack Motive CSV and D-Flow text.
+
+Each is known by its first line, which states the frame rate or the clock; markers become columns ``LABEL.x``, ``.y``
+and ``.z``, without the subject's name before a colon.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.errors import DataError, one_line
+from ppafo.gait.recorded.delimited import Block, Cells, Clock, PerFrame, PerRow, cells_of, lines_of, rows_of, table_of
+from ppafo.gait.recorded.form import FileReader, GaitForm
+from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
+from ppafo.gait.recorded.table import AXES, MotionTable
+from ppafo.signals.recording import Floats
+
+_NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
+"""Blocks of a Nexus export: markers, angles and moments of models; force plates and other analog channels."""
+_LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
+_DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
+_DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
+
+
+def _first_cell(path: str | Path, delimiters: str = ",;\t") -> str:
+    """First cell of a text file; empty for a file that is no text."""
+    line = next((line for line in lines_of(path) if line.strip()), "")
+    return re.split(f"[{delimiters}]", line, maxsplit=1)[0].strip().strip('"').strip()
+
+
+def _bare(label: str) -> str:
+    return label.rpartition(":")[2].strip()
+
+
+def _delimiter_of(line: str) -> str:
+    return max(",;\t", key=line.count)
+
+
+def _head_of(line: str) -> str:
+    """Cell of a line that has one cell alone, without the delimiters behind it."""
+    return line.strip().rstrip(",;\t").strip('"').strip()
+
+
+def _rate_in(path: str | Path, cell: str, line: int) -> float:
+    try:
+        rate = float(cell)
+    except ValueError:
+        rate = 0.0
+    if not 0.0 < rate < np.inf:
+        raise DataError(
+            f"{path}: line {line}: the frame rate is {one_line(cell)[:20]!r}; it must be a number above 0 Hz"
+        )
+    return rate
+
+
+class _NexusBlock(NamedTuple):
+    """Block of a Nexus export: rate [Hz], label, axis and unit of every column, and its rows."""
+
+    rate: float
+    labels: list[str]
+    axes: list[str]
+    units: list[str]
+    rows: Block
+
+
+def _read_nexus(path: str | Path) -> MotionTable:
+    """Return markers, outputs of models and force plates of a Vicon Nexus CSV export.
+
+    A block has its kind, its rate [Hz], labels, ``Frame, Sub Frame, X, Y, Z, ...``, units, and rows up to a blank line.
+    """
+    lines = lines_of(path)
+    blocks = [
+        (_head_of(line), _nexus_block(path, lines, start))
+        for start, line in enumerate(lines)
+        if _head_of(line) in (*_NEXUS_MOTION, _NEXUS_DEVICES)
+    ]
+    motions = [_nexus_motion(path, block) for kind, block in blocks if kind != _NEXUS_DEVICES]
+    if not motions:
+        raise DataError(f"{path}: has no block 'Trajectories' or 'Model Outputs'; export the trajectories from Nexus")
+    whole = motions[0]
+    for table in motions[1:]:
+        if table.time.size == whole.time.size:
+            whole = _joined(whole, table.columns, table.units)
+    for kind, block in blocks:
+        if kind == _NEXUS_DEVICES:
+            forces = _nexus_forces(path, block, whole.time)
+            whole = _joined(whole, forces, dict.fromkeys(forces, "N"))
+    return whole
+
+
+def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[str, str]) -> MotionTable:
+    return replace(table, columns={**columns, **table.columns}, units={**units, **table.units})
+
+
+def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
+    """Return the block that begins at the line of its kind; DataError where its header is no header."""
+    head = lines[start + 1 : start + 5]
+    delimiter = _delimiter_of(head[2]) if len(head) == 4 else ","
+    axes = cells_of(head[2], delimiter) if len(head) == 4 else []
+    if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
+        raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame', as Nexus writes it")
+    labels, last = [], ""
+    written = cells_of(head[1], delimiter)
+    for label in [*written, *[""] * len(axes)][: len(axes)]:
+        # A label stands above the first of its columns.
+        last = label or last
+        labels.append(last)
+    units = [*cells_of(head[3], delimiter), *[""] * len(axes)][: len(axes)]
+    rate = _rate_in(path, cells_of(head[0], delimiter)[0], start + 2)
+    end = next((n for n in range(start + 5, len(lines)) if not lines[n].strip(",;\t ")), len(lines))
+    return _NexusBlock(rate, labels, axes, units, Block(lines[:end], start + 5, delimiter))
+
+
+def _nexus_motion(path: str | Path, block: _NexusBlock) -> MotionTable:
+    # Velocities and accelerations, X' and X'', are not read.
+    names = [
+        f"{_bare(label)}.{axis.lower()}" if label and axis.lower() in AXES else ""
+        for label, axis in zip(block.labels, block.axes, strict=True)
+    ]
+    return table_of(
+        path, block.rows, Cells(["Frame", *names[1:]], block.units), PerFrame("Frame", block.rate), noun="markers"
+    )
+
+
+def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[str, Floats]:
+    """Return the forces [N] of plates at the times of the frames [s], upwards above 0, by ``force plate 1.x``."""
+    plates = list(dict.fromkeys(label for label in block.labels if label.lower().endswith("force")))
+    names = [
+        f"{PLATE}{plates.index(label) + 1}.{axis[1].lower()}"
+        if label in plates and axis.lower() in ("fx", "fy", "fz")
+        else ""
+        for label, axis in zip(block.labels, block.axes, strict=True)
+    ]
+    if not any(names):
+        return {}
+    try:
+        values, _ = rows_of(block.rows, Cells(names, block.units))
+    except DataError as error:
+        raise DataError(f"{path}: {error}") from error
+    # Devices are sampled faster than markers, from the same first frame.
+    at = np.clip(np.rint((time - time[0]) * block.rate).astype(np.int64), 0, len(values) - 1)
+    forces = dict(zip((name for name in names if name), values[at].T, strict=True))
+    for number in range(1, len(plates) + 1):
+        own = {name: force for name, force in forces.items() if name.startswith(f"{PLATE}{number}.")}
+        # Some laboratories store what the plate feels, some what it gives back.
+        if own and max((float(np.nansum(force)) for force in own.values()), key=abs) < 0.0:
+            forces |= {name: -force for name, force in own.items()}
+    return forces
+
+
+def _read_qualisys(path: str | Path) -> MotionTable:
+    """Return the markers of a Qualisys TSV export: keys and values, names of markers, and rows [mm]."""
+    lines = lines_of(path)
+    keys = {cells[0]: (number, cells[1:]) for number, cells in enumerate(cells_of(line, "\t") for line in lines)}
+    if "MARKER_NAMES" not in keys:
+        raise DataError(f"{path}: has no line MARKER_NAMES; export the 3D data of Qualisys as TSV")
+    at, labels = keys["MARKER_NAMES"]
+    labels = [_bare(label) for label in labels if label]
+    line, (rate, *_) = keys.get("FREQUENCY", (0, ["not there"]))
+    names = [f"{label}.{axis}" for label in labels for axis in AXES]
+    first = next((n for n in range(at + 1, len(lines)) if _is_number(cells_of(lines[n], "\t")[0])), len(lines))
+    width = len(cells_of(lines[first], "\t")) if first < len(lines) else 0
+    # Newer exports have a header line, and the number of the frame and the time before the markers.
+    is_counted = cells_of(lines[first - 1], "\t")[:2] == ["Frame", "Time"]
+    before = ["", "time"] if is_counted else []
+    block = Block(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
+    cells = Cells([*before, *names], [*["", "s"][: len(before)], *["mm"] * len(names)])
+    if width < len(before) + len(names) - 2:
+        raise DataError(f"{path}: line {first + 1} has {width} values for {len(labels)} markers")
+    clock: Clock = "time" if is_counted else PerRow(_rate_in(path, rate, line + 1))
+    return table_of(path, block, cells, clock, noun="markers")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _read_motive(path: str | Path) -> MotionTable:
+    """Return the markers of an OptiTrack Motive CSV export; bones and rigid bodies are not read."""
+    lines = lines_of(path)
+    head = cells_of(lines[0], ",")
+    stated = dict(zip(head[::2], head[1::2], strict=False))
+    unit = _LENGTHS.get(stated.get("Length Units", ""), "")
+    at = next((n for n, line in enumerate(lines) if cells_of(line, ",")[:1] == ["Frame"]), -1)
+    above = [cells_of(line, ",") for line in lines[1 : max(at, 1)] if line.strip(", \t")]
+    rows = {cells[1]: cells for cells in above if len(cells) > 1 and cells[1]}
+    if at < 0 or "Name" not in rows:
+        raise DataError(f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the names of its markers")
+    axes, quantities = cells_of(lines[at], ","), above[-1]
+    kinds, labels = rows.get("Type", rows["Name"]), rows["Name"]
+    names = []
+    for place, axis in enumerate(axes):
+        kind, label, quantity = (cells[place] if place < len(cells) else "" for cells in (kinds, labels, quantities))
+        is_marker = "marker" in kind.lower() and quantity.lower() == "position" and axis.lower() in AXES
+        names.append(f"{_bare(label)}.{axis.lower()}" if is_marker else "")
+    names[1] = "time"
+    return table_of(
+        path, Block(lines, at + 1, ","), Cells(names, ["", "s", *[unit] * (len(names) - 2)]), "time", noun="markers"
+    )
+
+
+def _read_dflow(path: str | Path) -> MotionTable:
+    """Return markers and force plates of a D-Flow text file: ``TimeStamp``, ``FrameNumber``, ``LABEL.PosX``, ..."""
+    lines = lines_of(path)
+    names, units = [], []
+    for cell in cells_of(lines[0].lstrip("% "), "\t"):
+        column = _DFLOW_COLUMN.fullmatch(cell)
+        is_marker = column is not None and column[2] == "Pos"
+        names.append(f"{_bare(column[1])}.{column[3].lower()}" if column is not None and is_marker else cell)
+        units.append(_DFLOW[column[2]] if column is not None else "")
+    names = ["" if name == "FrameNumber" else name for name in names]
+    return table_of(path, Block(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
+
+
+def _form(name: str, summary: str, first: Sequence[str], read: FileReader) -> GaitForm:
+    return GaitForm(
+        name=name,
+        summary=summary,
+        suffixes=(".csv", ".txt", ".tsv"),
+        read=read,
+        recognises=lambda path: _first_cell(path) in first,
+        convention=marker_convention,
+    )
+
+
+NEXUS = _form("nexus", "CSV exports of Vicon Nexus", (*_NEXUS_MOTION, _NEXUS_DEVICES), _read_nexus)
+QUALISYS = _form("qualisys", "TSV exports of Qualisys Track Manager", ("NO_OF_FRAMES",), _read_qualisys)
+MOTIVE = _form("motive", "CSV exports of OptiTrack Motive", ("Format Version",), _read_motive)
+DFLOW = _form("dflow", "text files of D-Flow", ("TimeStamp", "% TimeStamp"), _read_dflow)

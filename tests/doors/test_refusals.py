@@ -1,0 +1,123 @@
+"""What cannot be run or exported is refused by every door, in the same words and by the same name."""
+
+import ctypes
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.errors import PpafoError
+from ppafo.exports.c_library import c_library
+from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.fmu.interface import closed_loop
+from ppafo.exports.fmu.platforms import host_platform
+from ppafo.exports.fmu.unit import functional_unit
+from ppafo.loading import load_scenario
+from ppafo.page.wasm import module_of
+from ppafo.simulation.ensemble import REFUSED as REFUSED_RUN
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.numbers import declared_numbers
+from scripts.instances import Instance
+from tests.built_once import shared_library
+from tests.doors.table import NOT_EXPORTED, REFUSED, VANE_BASE
+from tests.modules_under_node import REFUSED as REFUSED_IN_MODULE
+from tests.modules_under_node import driven
+
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
+refused = pytest.mark.parametrize(("path", "value", "named"), REFUSED, ids=[path for path, _, _ in REFUSED])
+
+
+def words_of(path: str, value: float) -> str:
+    """What Python says of a number that cannot be."""
+    unit = declared_numbers(load_scenario(VANE_BASE))[path].unit
+    with pytest.raises(PpafoError) as refusal:
+        load_scenario(VANE_BASE, [f"{path}={value!r} {unit}"])
+    said = str(refusal.value)
+    assert "\n" not in said
+    return said
+
+
+def rule_in(said: str) -> str:
+    """What a message says must be, without the numbers, whose unit is that of the file."""
+    return re.sub(r"= .*", "", "must" + said.partition("must")[2])
+
+
+@refused
+def test_an_ensemble_refuses_a_run_in_the_words_of_python(path: str, value: float, named: str) -> None:
+    said = words_of(path, value)
+    assert re.search(rf"(?:{named}|{named.replace('valve.', 'valves.proportional.')}) ?=", said)
+    found = run_ensemble(load_scenario(VANE_BASE), {path: np.array([value])}, ["peak_torque"])
+    assert found.status.tolist() == [REFUSED_RUN]
+    assert f"{named} =" in found.reasons[0] or f"{named}=" in found.reasons[0]
+    assert rule_in(found.reasons[0]) == rule_in(said)
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """The library in C."""
+    folder = tmp_path_factory.mktemp("library")
+    for name, content in c_library(load_scenario(VANE_BASE)).items():
+        (folder / name).write_bytes(content)
+    return ctypes.CDLL(str(shared_library(folder / f"{c_identifier(VANE_BASE)}.c", "-O0", "-ffp-contract=off")))
+
+
+@needs_gcc
+@refused
+def test_a_library_names_the_setting_that_python_names(
+    library: ctypes.CDLL, path: str, value: float, named: str
+) -> None:
+    own = c_identifier(VANE_BASE)
+    names = [item["key"] for item in module_of(load_scenario(VANE_BASE)).description["settings"]]
+    settings = (ctypes.c_double * len(names))()
+    library[f"{own}_defaults"](settings)
+    settings[names.index(path)] = value
+    bad = library[f"{own}_bad_setting"]
+    bad.restype = ctypes.c_char_p
+    assert bad(settings).decode() == c_identifier(named)
+
+
+@pytest.fixture(scope="module")
+def unit(quick_units: None, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The unit of FMI 2."""
+    ((name, content),) = functional_unit(closed_loop(load_scenario(VANE_BASE)), 2, ["linux64"]).items()
+    file = tmp_path_factory.mktemp("unit") / name
+    file.write_bytes(content)
+    return str(file)
+
+
+@pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone")
+@refused
+def test_a_unit_names_the_parameter_that_python_names(
+    unit: str, path: str, value: float, named: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install -e .[dev])")
+    with pytest.raises(Exception, match="ExitInitializationMode"):
+        Instance(unit, {path: value})
+    assert named in capfd.readouterr().out
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+def test_a_module_of_the_page_names_the_settings_that_python_names() -> None:
+    module = module_of(load_scenario(VANE_BASE))
+    keys = [item["key"] for item in module.description["settings"]]
+    settings = np.tile([item["value"] for item in module.description["settings"]], (len(REFUSED), 1))
+    for row, (path, value, _) in zip(settings, REFUSED, strict=True):
+        row[keys.index(path)] = value
+    given = driven(module, settings)
+    assert [keys[ran.checked] for ran in given.runs] == [named for _, _, named in REFUSED]
+    assert {ran.status for ran in given.runs} == {REFUSED_IN_MODULE}
+
+
+@pytest.mark.parametrize("what", NOT_EXPORTED)
+def test_what_does_not_leave_python_is_refused_by_every_export_in_the_same_words(what: str, tmp_path: Path) -> None:
+    scenario = NOT_EXPORTED[what].load()
+    said = set()
+    for door in (c_library, closed_loop, module_of):
+        with pytest.raises(PpafoError) as refusal:
+            door(scenario)
+        said.add(str(refusal.value))
+    (line,) = said
+    assert line.startswith(f"{scenario.name}: ")
+    assert "\n" not in line

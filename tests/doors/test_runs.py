@@ -1,0 +1,83 @@
+"""The doors of Python: compiled code, an ensemble, a result that was stored and read again, one that was pickled."""
+
+import json
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ppafo.engine.channels import TRACED
+from ppafo.engine.loading import PYTHON
+from ppafo.measuring import evaluate
+from ppafo.running import simulate
+from ppafo.simulation.ensemble import COMPLETED, run_ensemble
+from ppafo.simulation.ensemble.running import offered
+from ppafo.storage import read_recording
+from tests.doors.of_python import (
+    answer_of,
+    assert_near_metrics,
+    assert_same_channels,
+    compiled_result,
+    parameters,
+    python_answer,
+    run_by,
+    scenario_of,
+)
+from tests.doors.table import Case
+
+VARIED = "supply.pressure"
+
+
+@pytest.mark.parametrize("case", parameters())
+def test_compiled_code_has_the_bits_of_python(case: Case) -> None:
+    answer, found = python_answer(case), answer_of(compiled_result(case))
+    assert found.ended == answer.ended
+    assert found.time.tobytes() == answer.time.tobytes()
+    assert list(found.channels) == list(answer.channels)
+    assert_same_channels(found.channels, answer)
+    assert found.metrics == answer.metrics
+
+
+@pytest.mark.parametrize("case", parameters())
+def test_a_run_of_an_ensemble_has_the_bits_of_the_run_alone(case: Case) -> None:
+    """Among others, of which one has another supply; those of short cases are run by Python, which is quick enough."""
+    answer, scenario = python_answer(case), scenario_of(case)
+    # What follows torques is measured of a walk too, but is not among the metrics of one.
+    metrics = [name for name in offered(scenario) if name in answer.metrics or not case.walks]
+    bands = [name for name in TRACED if name in answer.channels]
+    pressure = scenario.device.supply.pressure
+    with run_by(PYTHON if case.suite == "short" else ""):
+        found = run_ensemble(scenario, {VARIED: np.array([1.01 * pressure, pressure])}, metrics, bands)
+    assert found.status[1] == COMPLETED, found.reasons
+    assert_same_channels({name: trace[:, 1] for name, trace in found.traces.items()}, answer)
+    assert_near_metrics({name: float(values[1]) for name, values in found.metrics.items()}, answer)
+    assert any(found.traces[name][-1, 0] != found.traces[name][-1, 1] for name in bands), "the supply acts"
+
+
+@pytest.mark.parametrize("case", parameters())
+def test_a_result_that_was_stored_is_read_with_its_bits(case: Case, tmp_path: Path) -> None:
+    answer = python_answer(case)
+    folder = compiled_result(case).save(tmp_path / "result")
+    for name in ("recording.nc", "recording.csv"):
+        recording = read_recording(folder / name)
+        assert recording.time.tobytes() == answer.time.tobytes()
+        assert set(recording.names) == set(answer.channels)
+        assert_same_channels({channel: recording[channel] for channel in recording.names}, answer)
+    document = json.loads((folder / "run.json").read_text(encoding="utf-8"))
+    written = {name: metric["value"] for name, metric in document["metrics"].items()}
+    assert written == {name: None if math.isnan(value) else value for name, value in answer.metrics.items()}
+    measured = {name: metric.value for name, metric in evaluate(folder).items()}
+    assert_near_metrics({name: measured[name] for name in measured if name in answer.metrics or not case.walks}, answer)
+
+
+@pytest.mark.parametrize("case", parameters())
+def test_a_result_and_a_scenario_that_were_pickled_are_the_same(case: Case) -> None:
+    answer = python_answer(case)
+    result = pickle.loads(pickle.dumps(compiled_result(case)))
+    with run_by(""):
+        again = simulate(pickle.loads(pickle.dumps(scenario_of(case))))
+    for found in (answer_of(result), answer_of(again)):
+        assert_same_channels(found.channels, answer)
+        assert found.metrics == answer.metrics

@@ -1,0 +1,159 @@
+"""Values that Python programs hand in: masked arrays, times, enumerations, tables, proxies, changed scenarios."""
+
+import enum
+import itertools
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pytest
+from pandas import DataFrame, Series
+
+import ppafo
+from ppafo import ArgumentError, Channel, DataError, ScenarioError
+from ppafo.arguments.words import taken_document, taken_overrides, taken_text
+from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.loading import scenario_from_dict
+from ppafo.simulation.scenario import Sensors
+
+TASK = "torque-task-proportional"
+MASKED = np.ma.array([3.0, 4.0], mask=[True, False])
+
+
+class Word(str, enum.Enum):  # noqa: UP042  # its str() is not its text, as in many programs
+    PRESSURE = "supply.pressure"
+    SIXTY = "60 psi_g"
+    TASK = "torque-task-proportional"
+
+
+class Shouting(str):
+    def __str__(self) -> str:
+        return self.upper()
+
+
+def document() -> dict[str, Any]:
+    return tomllib.loads((files("ppafo") / "scenarios" / f"{TASK}.toml").read_text("utf-8"))
+
+
+def test_an_enumeration_of_texts_and_any_other_subclass_count_as_their_text() -> None:
+    assert taken_overrides({Word.PRESSURE: Word.SIXTY}) == ("supply.pressure=60 psi_g",)
+    assert taken_overrides([Shouting("a.b=2 mm")]) == ("a.b=2 mm",)
+    assert type(taken_text(Word.TASK)) is str
+    assert ppafo.load_scenario(Word.TASK, {Word.PRESSURE: Shouting("60 psi_g")}) == ppafo.load_scenario(
+        TASK, ["supply.pressure=60 psi_g"]
+    )
+    content = {**document(), "name": Word.TASK}
+    assert ppafo.scenario_from_dict(content).name == TASK
+
+
+@pytest.mark.parametrize("number", [np.ma.masked, MASKED[0], np.ma.array(3.0, mask=True), np.timedelta64(3)])
+def test_a_masked_number_and_a_time_of_numpy_are_no_number(number: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"^overrides: run\.duration = .*: must be a finite number in SI units"):
+        ppafo.load_scenario(TASK, {"run.duration": number})
+    with pytest.raises(ArgumentError, match=r"^seed="):
+        ppafo.load_study("torque-task-uncertainty", seed=number)
+
+
+@pytest.mark.parametrize("table", [DataFrame({"supply.pressure=60 psi_g": [1]}), Series({"a": "run.duration=1 s"})])
+def test_a_table_is_no_list_of_overrides(table: Any) -> None:
+    with pytest.raises(ArgumentError, match=r"^overrides=<"):
+        ppafo.load_scenario(TASK, table)
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        MappingProxyType({"run": MappingProxyType({"duration": "1 s"})}),
+        (text for text in ["run.duration=1 s"]),
+        map(str, ["run.duration=1 s"]),
+        {"run.duration=1 s": None}.keys(),
+        np.array(["run.duration=1 s"]),
+    ],
+)
+def test_a_proxy_and_a_generator_are_overrides_as_a_dictionary_and_a_list_are(overrides: Any) -> None:
+    assert ppafo.load_scenario(TASK, overrides) == ppafo.load_scenario(TASK, ["run.duration=1 s"])
+
+
+def test_a_document_may_hold_proxies_iterators_and_numbers_of_numpy() -> None:
+    plain = document()
+    plain["device"]["overrides"] = ["supply.pressure=60 psi_g"]
+    strange: dict[str, Any] = {
+        name: MappingProxyType(part) if isinstance(part, Mapping) else part for name, part in plain.items()
+    }
+    strange["device"] = MappingProxyType({**plain["device"], "overrides": iter(plain["device"]["overrides"])})
+    strange["schema_version"] = np.int64(1)
+    found = ppafo.scenario_from_dict(MappingProxyType(strange))
+    assert found == ppafo.scenario_from_dict(plain)
+    assert found.origin.content == plain
+
+
+def test_a_document_that_holds_itself_comes_to_an_end() -> None:
+    endless: dict[str, Any] = document()
+    endless["run"] = endless
+    with pytest.raises(ScenarioError, match="deep"):
+        ppafo.scenario_from_dict(endless)
+    assert taken_document({"x": list(itertools.islice(itertools.repeat(1), 2))}) == {"x": [1, 1]}
+
+
+def test_none_is_no_value_of_a_document() -> None:
+    content = document()
+    content["controller"]["proportional_gain"] = None
+    with pytest.raises(ArgumentError, match=r"controller\.proportional_gain = None: is no value; leave out the key"):
+        ppafo.scenario_from_dict(content)
+
+
+@pytest.mark.parametrize("version", [True, np.bool_(True), 2, "1"])
+def test_only_1_is_a_version_of_a_layout(version: Any) -> None:
+    with pytest.raises(ScenarioError, match=r"schema_version = .* is not allowed"):
+        ppafo.scenario_from_dict({**document(), "schema_version": version})
+
+
+@pytest.mark.parametrize("part", [math.nan, 0, "1 s", None, Sensors()])
+@pytest.mark.parametrize(
+    "name", ["run", "device", "motion", "initial", "controller", "reference", "sensors", "origin", "links"]
+)
+def test_a_foreign_part_of_a_scenario_is_refused_by_its_name(name: str, part: Any) -> None:
+    if (name, type(part)) == ("sensors", Sensors):
+        return
+    changed = replace(ppafo.load_scenario(TASK), **{name: part})
+    with pytest.raises(ScenarioError, match=rf"^{TASK}: {name} = .*: must be "):
+        ppafo.simulate(changed)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, 0, -1.0, "1 s", None, True, np.ma.masked, np.timedelta64(3)])
+def test_a_number_of_a_changed_scenario_is_checked_as_one_of_a_file(number: Any) -> None:
+    scenario = ppafo.load_scenario(TASK)
+    with pytest.raises(ScenarioError, match=r"run\.duration = .*: must be more than 0 and at most 1e\+06 s"):
+        ppafo.simulate(replace(scenario, run=replace(scenario.run, duration=number)))
+    walk = ppafo.load_walk("solenoid")
+    with pytest.raises(ScenarioError, match=r"supply\.pressure = .*: must be at least 1000"):
+        ppafo.walk(
+            replace(walk, device=replace(walk.device, supply=replace(walk.device.supply, pressure=number))), minutes=0.1
+        )
+
+
+def test_a_masked_value_of_a_channel_is_none() -> None:
+    assert np.isnan(Channel(MASKED, "rad").values).tolist() == [True, False]
+    with pytest.raises(DataError, match="channel 'angle' is nan at sample 1"):
+        ppafo.Recording("x", np.array([0.0, 1.0]), {"angle": Channel(MASKED, "rad")})
+    for values in (np.array([1, 2], dtype="m8[s]"), np.array([1j, 2.0]), np.array(["1", "2"]), (x for x in [1.0])):
+        with pytest.raises(DataError, match="a channel is a plain list of numbers"):
+            Channel(values, "rad")  # type: ignore[arg-type]
+
+
+def test_an_adiabatic_gas_needs_no_area_of_walls() -> None:
+    content = document()
+    content["gas_model"] = {"kind": "thermal", "heat_transfer_coefficient": "0 W/(m^2 K)"}
+    adiabatic = scenario_from_dict(content)
+    content["gas_model"]["wall_area_per_volume"] = "100 1/m"
+    assert scenario_from_dict(content).gas_model != adiabatic.gas_model
+    content["gas_model"] = {"kind": "thermal", "heat_transfer_coefficient": "5 W/(m^2 K)"}
+    with pytest.raises(ScenarioError, match=r"'gas_model\.wall_area_per_volume' is missing"):
+        scenario_from_dict(content)
+    with pytest.raises(ScenarioError, match=r"its heat transfer varies, and 'gas_model\.wall_area_per_volume' is 0"):
+        run_ensemble(adiabatic, {"gas_model.heat_transfer_coefficient": np.array([0.0, 5.0])}, [])

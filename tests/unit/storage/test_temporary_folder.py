@@ -1,0 +1,63 @@
+"""Temporary folders in which something is built: a full one is one line with a remedy, and nothing stays in it."""
+
+import errno
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from ppafo.errors import DataError
+from ppafo.exports.fmu import platforms
+from ppafo.page import wasm
+from ppafo.processor.catalog import MSP430F2013
+from ppafo.processor.images import processor_simulator
+from ppafo.storage.files import temporary_folder
+from ppafo.study.sent_plugins import SentPlugin, _written
+
+
+def simulated() -> None:
+    """The simulator of a processor with a firmware of one file."""
+    with processor_simulator({"main.c": b"int"}, MSP430F2013):
+        pass
+
+
+BUILDERS: dict[str, Callable[[], object]] = {
+    "unit": lambda: platforms.build("linux64", {"unit.c": b"int"}, "unit.c"),
+    "page": lambda: wasm.build("int"),
+    "firmware": simulated,
+    "plugins": lambda: _written(SentPlugin(None, (("law.py", b"x"),))),  # type: ignore[arg-type]
+    "study": lambda: temporary_folder("ppafo-study", {"a/b": b"x"}),
+}
+
+
+@pytest.mark.parametrize("name", BUILDERS)
+def test_a_full_temporary_folder_is_said_in_one_line_by_all_that_build_in_one(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_path: Path, _content: bytes) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(platforms, "compiler_for", lambda _name: ["cc"])
+    monkeypatch.setattr(wasm, "check_can_build", lambda: None)
+    monkeypatch.setattr("ppafo.processor.images.missing_tools", lambda _target: ())
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(DataError, match=r"^temporary files cannot be written: no space left on device; .*TMPDIR"):
+        BUILDERS[name]()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_temporary_folder_that_is_gone_is_said_in_the_same_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "gone"))
+    with pytest.raises(DataError, match=r"^temporary files cannot be written: no such file or directory; "):
+        temporary_folder("ppafo")
+
+
+def test_files_lie_in_the_folder_by_path_as_long_as_it_is_needed() -> None:
+    with temporary_folder("ppafo", {"sources/unit.c": b"int"}) as folder:
+        assert Path(folder, "sources", "unit.c").read_bytes() == b"int"
+    assert not Path(folder).exists()
