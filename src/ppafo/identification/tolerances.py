@@ -42,6 +42,7 @@ HELD = {
     "friction.static_torque": 0.3,
     "friction.dynamic_torque": 0.5,
     "friction.viscous_damping": 0.3,
+    "effects.stribeck.share": 0.3,
     "foot_plate.inertia": 0.05,
     "foot_plate.gravity_torque": 0.1,
     "valve.discharge_coefficient": 0.1,
