@@ -1,6 +1,7 @@
 """Measures a recording, or the file or the result folder of one: its metrics by name."""
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ppafo.arguments import checked
 from ppafo.metrics import Metric
@@ -9,12 +10,19 @@ from ppafo.signals import Recording
 from ppafo.storage import read_recording
 from ppafo.storage.result_folder import ColumnsLike
 
+if TYPE_CHECKING:
+    from pandas import DataFrame  # type: ignore[import-untyped]
+    from xarray import Dataset
+
 
 @checked()
-def evaluate(recording: Recording | str | Path, *, columns: ColumnsLike | None = None) -> dict[str, Metric]:
+def evaluate(
+    recording: "Recording | DataFrame | Dataset | str | Path", *, columns: ColumnsLike | None = None
+) -> dict[str, Metric]:
     """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
 
-    A file or a result folder stands for its recording; ``columns`` is the column map of a file with other columns.
+    A file, a result folder, a pandas DataFrame or an xarray Dataset stands for its recording; ``columns`` is
+    the column map of a file with other columns.
     DataError for one that cannot be used.
 
     >>> import ppafo

@@ -52,7 +52,7 @@ ALLOWED_IN_PAGES: Mapping[str, tuple[str, str]] = {
 }
 """By page: words that stand there for something else, and for what."""
 
-COMPOSED = ("engine/", "translation/", "gym/kernel.py")
+COMPOSED = ("engine/", "translation/")
 """Strings there are source text, in which a lane is a lane of a processor."""
 SOMETHING_ELSE = ("answers?", "whole numbers?")
 """Words that messages need for something else: an answer of a board, 'must be a whole number'."""

@@ -10,6 +10,7 @@ Steps (``interpreter.py``), recordings, solvers and linear models run their func
 import ast
 import inspect
 import math
+import sys
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
@@ -28,7 +29,7 @@ from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
 
 OWN = "ppafo."
-"""Begin of the names of modules whose functions may call what has something in its place."""
+"""Begin of the names of modules whose functions are called by the names of the modules, too."""
 
 
 class EffectRows(Protocol):
@@ -89,7 +90,8 @@ class PythonFunctions:
 
     def _function(self, function: FunctionType) -> Any:
         """A copy of a function whose names stand for what the program has; the function itself where none differs."""
-        if not function.__module__.startswith(OWN) and not self._goes_on and function not in self._effects:
+        # A valve or law of somebody's own module calls the model too; the standard library does not.
+        if function.__module__.partition(".")[0] in sys.stdlib_module_names:
             return function
         if function not in self._made:
             code = going_on(function) if self._goes_on else function.__code__
@@ -118,8 +120,9 @@ class PythonFunctions:
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         own = [name for name in names if name not in rows]
 
-        def called(*arguments: Any) -> Any:
-            return function(**dict(zip(own, arguments, strict=True)), **{row: self._rows[row] for row in rows})
+        def called(*arguments: Any, **named: Any) -> Any:
+            given = dict(zip(own, arguments, strict=False))
+            return function(**given, **named, **{row: self._rows[row] for row in rows})
 
         return called
 

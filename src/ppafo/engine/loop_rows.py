@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from ppafo.engine.entries import indent, parse_expression
 from ppafo.engine.generator import Composed, StepText
 from ppafo.engine.lane_rows import HANDED, lanes_of
-from ppafo.engine.reduction import HISTORIES, NUMBER, TRACE, Slot, with_arguments
+from ppafo.engine.reduction import HISTORIES, NUMBER, TRACE, Slot, group_of_name, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 
 
@@ -57,8 +57,17 @@ class Question(NamedTuple):
 class Rows(Protocol):
     """Where the numbers of a step are, for the writer of the loop."""
 
+    arrays: frozenset[str]
+    """Names of arrays in which numbers are, beside those of the loop over steps."""
+
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """Lines that call phases, one after the other, for each run."""
+
+    def for_lane(self, call: Call) -> list[str]:
+        """Lines that call a phase for the present run."""
+
+    def with_cells(self, node: ast.expr) -> ast.expr:
+        """An expression with the numbers of the present run in the place of ``lane.GROUP.FIELD``."""
 
     def any_of(self, condition: ast.expr, is_none: bool) -> Question:
         """The question whether a condition on ``lane`` holds in any run, or with ``is_none`` in none."""
@@ -94,6 +103,8 @@ class RowsOfLanes:
         self.kept = [*self.state_at, "remaining", *handed] if step.parts.parts_are_rare else []
         self.count = self.aside + len(self.kept)
 
+        self.arrays: frozenset[str] = frozenset()
+
     def load(self, group: str) -> str:
         """Line that makes the group from its rows."""
         return f"{group} = {row_expression(self.step.rows[group], group, self.cells, self.step.collector.add)}"
@@ -123,9 +134,14 @@ class RowsOfLanes:
                     lines.append(f"{self.cells[path]} = {call.result(group)}{path.removeprefix(group)}")
         return lines + [f"{call.stored(slot, 'lane')} = {call.result(name)}" for name, slot in effects.slots.items()]
 
+    def with_cells(self, node: ast.expr) -> ast.expr:
+        """An expression with the cells of its numbers."""
+        written: ast.expr = _Cells(self.cells).visit(deepcopy(node))
+        return written
+
     def any_of(self, condition: ast.expr, is_none: bool) -> Question:
         """A count of lanes: a sum of whole numbers is taken of several at once, a largest float is not."""
-        text = ast.unparse(_Cells(self.cells).visit(deepcopy(condition)))
+        text = ast.unparse(self.with_cells(condition))
         lines = ["counted = 0", "for lane in range(width):", f"    counted += 1 if {text} else 0"]
         return Question(lines, "counted == 0" if is_none else "counted > 0")
 
@@ -179,12 +195,13 @@ class RowsOfRun:
 
     def __init__(self, step: StepText, outputs: str) -> None:
         self.step, self.outputs = step, outputs
+        self.arrays: frozenset[str] = frozenset()
 
     def over_lanes(self, calls: Sequence[Call]) -> list[str]:
         """The bare calls, whose results get the names of their groups."""
-        return [line for call in calls for line in self.for_run(call)] or ["pass"]
+        return [line for call in calls for line in self.for_lane(call)] or ["pass"]
 
-    def for_run(self, call: Call) -> list[str]:
+    def for_lane(self, call: Call) -> list[str]:
         """Lines for one call: groups that it sets, numbers of histories, and of a trace the row of the sample."""
         effects = call.phase.effects
         if not effects.results:
@@ -197,9 +214,14 @@ class RowsOfRun:
         kept = {name: slot for name, slot in effects.slots.items() if slot.history != TRACE}
         return lines + [f"{call.stored(slot, '0')} = {call.result(name)}" for name, slot in kept.items()]
 
+    def with_cells(self, node: ast.expr) -> ast.expr:
+        """An expression with the names of its groups."""
+        written: ast.expr = _OfRun().visit(deepcopy(node))
+        return written
+
     def any_of(self, condition: ast.expr, is_none: bool) -> Question:
         """The condition of the run itself."""
-        text = ast.unparse(_OfRun().visit(deepcopy(condition)))
+        text = ast.unparse(self.with_cells(condition))
         return Question([], f"not {text}" if is_none else text)
 
     def action(self, method: str, arguments: Sequence[str]) -> list[str]:  # noqa: ARG002 - a protocol
@@ -222,7 +244,12 @@ class _Cells(ast.NodeTransformer):
         self.cells = cells
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        path = ast.unparse(node).removeprefix("lane.")
+        root: ast.expr = node
+        while isinstance(root, ast.Attribute):
+            root = root.value
+        group = group_of_name(root)
+        path = ast.unparse(node).removeprefix(f"{ast.unparse(root)}.")
+        path = f"{group}.{path}" if group else path
         return parse_expression(self.cells[path]) if path in self.cells else node
 
 
@@ -234,6 +261,9 @@ class _OfRun(ast.NodeTransformer):
             return ast.Name(node.attr, ast.Load())
         self.generic_visit(node)
         return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        return ast.Name(group_of_name(node) or node.id, node.ctx)
 
 
 def over_rows(count: int, line: str) -> list[str]:

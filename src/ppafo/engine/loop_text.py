@@ -8,15 +8,16 @@ stand where they act.
 import ast
 from collections.abc import Callable, Mapping, Sequence
 from types import FunctionType
+from typing import Any, get_type_hints
 
-from ppafo.engine.entries import HEADER, indent, parse_expression
+from ppafo.engine.entries import ARRAY_2D, ARRAY_3D, FLOAT, HEADER, INT, entry_text, indent, parse_expression
 from ppafo.engine.generator import StepText
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED, VECTOR
 from ppafo.engine.loop_rows import Call, Rows, RowsOfLanes, RowsOfRun, over_rows
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.reduction import HISTORIES, Reduction, is_known_part
-from ppafo.engine.rows import leaf_paths
+from ppafo.engine.rows import leaf_paths, row_numbers
 from ppafo.engine.source_text import Names, SourceCollector
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
@@ -29,16 +30,18 @@ class LoopText:
     """Writes a function of the loop over steps, with those that it calls in their places.
 
     ``steps`` has the step of each program with the place of its numbers: with two, the loop asks ``NEEDS_PARTS``
-    wherever the second goes on in another way. A method for a statement returns the statements that it becomes;
-    ProgramError where it is none of the loop.
+    wherever the second goes on in another way. ``known`` are arguments of the function whose values are known. A method
+    for a statement returns the statements that it becomes; ProgramError where it is none of the loop.
     """
 
-    def __init__(self, steps: Mapping[Rows, StepText], function: Callable[..., None]) -> None:
+    def __init__(
+        self, steps: Mapping[Rows, StepText], function: Callable[..., None], known: Mapping[str, Any] | None = None
+    ) -> None:
         (self.rows, self.step), *others = steps.items()
         self.steps, self.function = steps, function
         assert isinstance(function, FunctionType), "it is no other callable"
-        self.reduction = Reduction(self.step, function, {})
-        local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record"})
+        self.reduction = Reduction(self.step, function, known or {})
+        local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
         self.composer = self.step.composer(function, Names(local, self.step.kept, {"now": Now}))
         self.other = LoopText(dict(others), function) if others else None
 
@@ -54,7 +57,10 @@ class LoopText:
 
     def expression(self, node: ast.expr) -> ast.expr:
         """An expression of the loop as the module has it: reduced, with arrays in the place of ``lanes``."""
-        reduced = self.reduction.visit(node)
+        return self.composed(self.reduction.visit(node))
+
+    def composed(self, reduced: ast.expr) -> ast.expr:
+        """A reduced expression as the module has it."""
         composed: ast.expr = self.composer.visit(_OfLanes(self.rows).visit(reduced))
         return composed
 
@@ -118,9 +124,40 @@ class LoopText:
         return node.body if test.value else node.orelse
 
     def phases(self, node: ast.For) -> list[ast.stmt]:
-        """A loop over lanes, in which phases are called."""
+        """A loop over lanes, in which phases are called; or with decisions and names of each lane between them."""
+        if not all(isinstance(statement, ast.Expr) for statement in node.body):
+            return [ast.For(node.target, parse_expression("range(width)"), self.of_lane(node.body), [])]
         own = _parsed(self.rows.over_lanes([self.phase(call) for call in node.body]))
         return own if self.other is None else self.either(own, self.other.phases(node))
+
+    def of_lane(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
+        """What is done for one lane before the next one: phases, names, decisions of its numbers, counted loops."""
+        made: list[ast.stmt] = []
+        for node in statements:
+            match node:
+                case ast.Expr(value=ast.Call()):
+                    made += _parsed(self.rows.for_lane(self.phase(node)))
+                case ast.Assign(targets=[ast.Name() as target]):
+                    made.append(ast.Assign([target], self.number_of_lane(node.value)))
+                case ast.For(target=ast.Name()):
+                    made.append(ast.For(node.target, self.expression(node.iter), self.of_lane(node.body), []))
+                case ast.If():
+                    test = self.reduction.asked(node.test)
+                    if isinstance(test, ast.Constant):
+                        made += self.of_lane(node.body if test.value else node.orelse)
+                    else:
+                        body, otherwise = self.of_lane(node.body), self.of_lane(node.orelse)
+                        made.append(ast.If(self.number_of_lane(node.test), body or [ast.Pass()], otherwise))
+                case ast.Continue():
+                    made.append(node)
+                case _:
+                    line = ast.unparse(node).splitlines()[0]
+                    raise self.reduction.refuse(node, f"'{line}' is no statement of a lane in the loop")
+        return made
+
+    def number_of_lane(self, node: ast.expr) -> ast.expr:
+        """An expression of the loop with numbers of the present lane."""
+        return self.composed(self.rows.with_cells(self.reduction.visit(node)))
 
     def phase(self, node: ast.stmt) -> Call:
         """The call of a phase in a loop over lanes."""
@@ -211,6 +248,30 @@ def lane_loop(step: StepText, head: str, name: str, arguments: str, lanes: int =
         *over_rows(states, "states[row, lane] = x[row, lane]"),
     ]
     return "\n".join([head, f"def {name}({arguments}):", *indent(lines)])
+
+
+def lane_entry(
+    step: StepText,
+    function: Callable[..., None],
+    arrays: Mapping[str, Mapping[str, Any]],
+    known: Mapping[str, Any] | None = None,
+) -> str:
+    """An entry that does what a function of the loop says, on arrays in which numbers of lanes stay between calls.
+
+    Its parameters are the ``arrays``, each of the rows of its groups by lanes, the histories of signals, and the
+    function's own numbers but those that are ``known``.
+    """
+    rows = RowsOfLanes(step)
+    # What a step hands on lives no longer than a call.
+    rows.cells = {path: path.replace(".", "_") for path in rows.step_at}
+    for array, groups in arrays.items():
+        rows.cells |= {path: f"{array}[{row}, lane]" for path, row in row_numbers(groups).items()}
+    rows.arrays = frozenset(arrays)
+    hints = get_type_hints(function)
+    numbers = {name: FLOAT if kind is float else INT for name, kind in hints.items() if kind in (float, int)}
+    types = dict.fromkeys(arrays, ARRAY_2D) | {"signal_history": ARRAY_3D} | numbers
+    lines = [f"width = {next(iter(arrays))}.shape[1]", *_unparsed(LoopText({rows: step}, function, known).lines())]
+    return entry_text(function.__name__, types, lines)
 
 
 LOOP_ARRAYS = {"signal_history": 3, "command_history": 2}

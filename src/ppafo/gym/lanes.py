@@ -1,8 +1,8 @@
 """Environments of one program side by side: each a lane, with an episode of its own that began at its own step."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.step.lane import LaneStart
 from ppafo.errors import ScenarioError
-from ppafo.gym.kernel import OWN_PATHS, kernel_source
+from ppafo.gym.kernel import OWN_PATHS, Action, kernel_source
 from ppafo.gym.tasks import Outcome, Task
 from ppafo.model.sensors import Measurement
 
@@ -92,6 +92,14 @@ class Seen:
         )
 
 
+class Block(NamedTuple):
+    """Compiled calls for the environments of a block: commands of the actions, steps, what is observed."""
+
+    command: Callable[..., None]
+    advance: Callable[..., None]
+    judge: Callable[..., None]
+
+
 @final
 class Environments:
     """Some environments of one program side by side, each a lane with an episode of its own."""
@@ -113,26 +121,33 @@ class Environments:
         self._own = np.zeros((blocks, len(OWN_PATHS), width))
         # Where the next actions are written (environments, 1 or 2).
         self.actions = np.zeros((count, task.actions))
-        self._chosen = np.zeros(count)
-        self._observations = np.zeros((count, len(task.observed_paths)))
-        self._outcomes = np.zeros((_OUTCOMES, count))
-        self._signals = np.zeros((blocks * SIGNAL_ROWS, clock.signal_delay + 2, width))
+        self._actions = np.zeros((blocks, len(Action._fields), width))
+        self._chosen = np.zeros((blocks, 1, width))
+        self._observations = np.zeros((blocks, len(task.observed_paths), width))
+        self._outcomes = np.zeros((blocks, _OUTCOMES, width))
+        self._signals = np.zeros((blocks, SIGNAL_ROWS, clock.signal_delay + 2, width))
         self._now = 0
-        self._go_on = with_arrays(
-            load_source(kernel_source(program, task)).go_on,
-            self._states.reshape(-1, width),
-            self._parameters.reshape(-1, width),
-            self._signals,
-            self._commands.reshape(-1, width),
-            np.empty((0, len(state_rows), width)),
-            np.empty((0, 0, width)),
-            self._own.reshape(-1, width),
-            self.actions,
-            np.ascontiguousarray(judging.bounds),
-            self._chosen,
-            self._observations,
-            self._outcomes,
-        )
+        module = load_source(kernel_source(program, task))
+        record, trace = np.empty((0, len(state_rows), width)), np.empty((0, 0, width))
+        self._blocks = [
+            Block(
+                with_arrays(module.command, states, actions, signals),
+                with_arrays(module.advance, states, parameters, signals, commands, record, trace),
+                with_arrays(module.judge, states, parameters, own, chosen, observations, outcomes, signals),
+            )
+            for states, parameters, own, actions, chosen, observations, outcomes, signals, commands in zip(
+                self._states,
+                self._parameters,
+                self._own,
+                self._actions,
+                self._chosen,
+                self._observations,
+                self._outcomes,
+                self._signals,
+                self._commands,
+                strict=True,
+            )
+        ]
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "Environments":
         """Return environments that go on from here by themselves; the compiled program is the same."""
@@ -171,7 +186,7 @@ class Environments:
         # Delayed commands of the episode before must not reach this one.
         self._commands[blocks, :, own] = 0.0
         self._chosen[:] = 0.0
-        self._chosen[places] = 1.0
+        self._chosen[blocks[: places.size], 0, own[: places.size]] = 1.0
         return self._call(0)
 
     def step(self) -> Seen:
@@ -185,19 +200,36 @@ class Environments:
         return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
 
     def _call(self, steps: int) -> Seen:
-        clock = self._clock
+        clock, judging, width = self._clock, self._judging, self._states.shape[2]
         self._now += steps
-        self._go_on(
-            self._judging.error_weight,
-            self._judging.gas_weight,
-            self._now,
-            steps,
-            clock.step_count,
-            clock.steps_per_sample,
-            clock.signal_delay,
-            clock.command_delay,
-        )
-        # Copies, because the kernel writes the same arrays at the next step.
-        rewards, errors, supplied = self._outcomes[:_FIRST_FLAG].copy()
-        failed, through = self._outcomes[_FIRST_FLAG:] != 0.0
-        return Seen(self._observations.astype(np.float32), rewards, errors, supplied, failed, through)
+        # Lanes without an environment take the action of the last one.
+        every = np.minimum(np.arange(self._actions.shape[0] * width), self.count - 1).reshape(-1, width)
+        for number in range(self._actions.shape[1]):
+            self._actions[:, number] = self.actions[every, min(number, self.actions.shape[1] - 1)]
+        late = clock.signal_delay, clock.command_delay
+        for block in self._blocks:
+            # A call with 0 steps senses and observes alone: this is how episodes begin.
+            if steps > 0:
+                block.command()
+                block.advance(self._now - steps, steps, -1, clock.steps_per_sample, 1.0, -1, 0, 0, *late)
+            block.judge(
+                judging.error_weight,
+                judging.gas_weight,
+                self._now,
+                clock.step_count,
+                clock.steps_per_sample,
+                clock.signal_delay,
+            )
+        lowest, highest = judging.bounds
+        shown = self._by_environment(self._observations)
+        # The lowest value for nan: a converter shows nothing else.
+        shown = np.where(shown >= lowest, shown, lowest)
+        shown = np.where(shown <= highest, shown, highest)
+        outcomes = self._by_environment(self._outcomes).T
+        rewards, errors, supplied = outcomes[:_FIRST_FLAG]
+        failed, through = outcomes[_FIRST_FLAG:] != 0.0
+        return Seen(shown.astype(np.float32), rewards, errors, supplied, failed, through)
+
+    def _by_environment(self, blocks: Floats) -> Floats:
+        """Return copies of numbers (blocks, numbers, lanes) as (environments, numbers)."""
+        return blocks.transpose(0, 2, 1).reshape(-1, blocks.shape[1])[: self.count].copy()

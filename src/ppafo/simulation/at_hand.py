@@ -78,4 +78,8 @@ def dataset(self: Recorded, units: Mapping[str, str] | None = None) -> "xarray.D
 
 def dataframe(self: Recorded, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
     """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
-    return dataset(self, units).to_dataframe()
+    table = dataset(self, units)
+    frame = table.to_dataframe()
+    # pandas keeps no attributes of columns.
+    frame.attrs = {**table.attrs, "units": {str(name): table[name].attrs["units"] for name in table.data_vars}}
+    return frame

@@ -32,6 +32,7 @@ _OTHERS = (
 )
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
+_ONLY_SIMULATED = "supplied_mass"
 _OWN_COLUMNS = (
     "; other columns are read through a column map: validate --columns FILE.toml:NAME, or columns = 'NAME' in a "
     "problem file of identify"
@@ -62,6 +63,8 @@ def parse_header(cells: list[str]) -> list[Column]:
     if not cells:
         raise DataError("the header must come first, line 1 is empty")
     columns = []
+    if is_of_frame(cells):
+        cells = [f"{name} [{CHANNELS[name].unit if name in CHANNELS else TIME_UNIT}]" for name in map(str.strip, cells)]
     for cell in cells:
         match = _HEADER.fullmatch(cell)
         if match is None:
@@ -85,6 +88,15 @@ def parse_header(cells: list[str]) -> list[Column]:
     if twice is not None:
         raise DataError(f"there are two columns '{twice}'")
     return columns
+
+
+def is_of_frame(cells: Sequence[str]) -> bool:
+    """Whether a header is that of a result's ``to_dataframe().to_csv()``: channels of a simulation, bare and in SI.
+
+    Bare names alone do not say so: a logger may call a column in degrees ``angle``.
+    """
+    names = {cell.strip() for cell in cells}
+    return _ONLY_SIMULATED in names and names <= {TIME, *CHANNELS}
 
 
 def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
@@ -189,10 +201,15 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         header = _whole_cells(next(rows, []), mark)
         if not header and not any(lines[first:]):
             raise DataError("has no header")
-        columns = parse_header(header)
+        # A first column without a name is the row number that pandas writes.
+        is_counted = bool(header) and not header[0].strip()
+        columns = parse_header(header[is_counted:])
         values = _table(header, rows if mark == "," else _with_points(rows), first)
         if not len(values):
             raise DataError("has a header but no samples")
+        if is_counted and not np.array_equal(values[:, 0], np.arange(len(values))):
+            raise DataError("the first column has no name, and does not count the rows from 0; name it, or remove it")
+        values = values[:, is_counted:]
         series = []
         for index, column in enumerate(columns):
             with refused_as(DataError, f"column '{column.name} [{column.unit}]'", UnitError):
@@ -203,7 +220,8 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
             column.name: Channel(one, column.si_unit, column.between)
             for column, one in zip(columns[1:], series[1:], strict=True)
         }
-        return Recording(label or one_line(Path(path).stem), series[0], named, kind_of_comments(lines[:first]))
+        kind = "simulated" if is_of_frame(header) else kind_of_comments(lines[:first])
+        return Recording(label or one_line(Path(path).stem), series[0], named, kind)
     except csv.Error as error:
         raise DataError(f"{path}: is not a CSV file: {error}") from error
     except DataError as error:

@@ -26,6 +26,7 @@ from ppafo.storage.column_map import (
 from ppafo.storage.comma_separated import Column, check_clock, in_si
 from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes
+from ppafo.storage.frames import remedy_for
 from ppafo.storage.mapped_text import read_mapped_text
 from ppafo.storage.matlab import MATLAB_SUFFIX, MatlabFile, read_matlab
 
@@ -170,6 +171,8 @@ def read_foreign(
     # Both name the file themselves where it cannot be read.
     content = read_matlab(path) if suffix == MATLAB_SUFFIX else read_bytes(path)
     with refused_as(DataError, path, DataError):
+        if remedy_for(path):
+            raise DataError(f"is no table of text{remedy_for(path)}")
         if suffix == ".nc":
             raise DataError("is a NetCDF file, which names its own channels and units: read it without a column map")
         with in_map(map_name):

@@ -25,6 +25,9 @@ from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_by
 from ppafo.storage.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
+    from pandas import DataFrame  # type: ignore[import-untyped]
+    from xarray import Dataset
+
     from ppafo.storage.column_map import ColumnMap
 
 _MAXIMUM_BYTES_WRITTEN = 16_000_000
@@ -289,11 +292,15 @@ WALK_RECORDING = "recording.nc"
 
 @checked("path", "atmosphere")
 def read_recording(
-    path: str | Path, *, atmosphere: Pressure = STANDARD_ATMOSPHERE, columns: ColumnsLike | None = None
+    path: "str | Path | DataFrame | Dataset",
+    *,
+    atmosphere: Pressure = STANDARD_ATMOSPHERE,
+    columns: ColumnsLike | None = None,
 ) -> Recording:
-    """Return the recording in a ``.nc`` file or a table of text such as ``.csv``, or in a result folder, of a walk too.
+    """Return the recording in a ``.nc`` or ``.parquet`` file, a table of text such as ``.csv``, or a result folder.
 
-    Gauge pressure in a table counts from ``atmosphere`` [Pa absolute]. ``columns`` is a column map, or the name of one,
+    A pandas DataFrame or an xarray Dataset is taken as well: columns ``name [unit]``, or units in its ``attrs``. Gauge
+    pressure in a table counts from ``atmosphere`` [Pa absolute]. ``columns`` is a column map, or the name of one,
     ``logger.toml:bench``, for a table with other columns, signs or separators and for a ``.mat`` file. DataError for a
     file that is not usable.
 
@@ -302,6 +309,10 @@ def read_recording(
     >>> ppafo.read_recording(folder).names[:3]
     ('angle', 'angular_velocity', 'pressure_1')
     """
+    if not isinstance(path, str | Path):
+        from ppafo.storage.frames import recording_of_frame  # a run reads no tables of others
+
+        return recording_of_frame(path, atmosphere=atmosphere)
     file = Path(path)
     if columns is not None:
         from ppafo.storage.column_map import column_map_of
@@ -311,12 +322,19 @@ def read_recording(
         return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
     if file.is_dir() and (file / RUN_FILE).exists():
         return read_result(file).recording
-    if file.is_dir():
-        if not (file / WALK_RECORDING).is_file():
-            raise DataError(
-                f"{file}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})"
-            )
-        file /= WALK_RECORDING
+    return _read_file(_recording_of_walk(file) if file.is_dir() else file, atmosphere)
+
+
+def _recording_of_walk(folder: Path) -> Path:
+    """Return the recording in the folder of a walk; DataError where there is none."""
+    file = folder / WALK_RECORDING
+    if not file.is_file():
+        raise DataError(f"{folder}: contains no result of a walk or a simulation (no {WALK_RECORDING}, no {RUN_FILE})")
+    return file
+
+
+def _read_file(file: Path, atmosphere: float) -> Recording:
+    """Return the recording in a file whose columns have the names of channels, by its suffix."""
     if file.suffix == ".nc":
         from ppafo.storage.netcdf_reading import read_netcdf
         from ppafo.storage.trial_reading import check_can_be_read
@@ -326,16 +344,23 @@ def read_recording(
         return read_netcdf(file)
     if file.suffix.lower() in TEXT_SUFFIXES:
         return _read_text(file, atmosphere)
+    if file.suffix.lower() == ".parquet":
+        from ppafo.storage.frames import read_parquet
+
+        return read_parquet(file, atmosphere)
     if file.suffix.lower() == ".mat":
         raise DataError(
-            f"{path}: is a .mat file, whose variables have no units: name them in a column map, "
+            f"{file}: is a .mat file, whose variables have no units: name them in a column map, "
             "--columns FILE.toml:NAME"
         )
     if not file.exists():
-        raise DataError(f"{path}: no such file or folder")
+        raise DataError(f"{file}: no such file or folder")
+    from ppafo.storage.frames import remedy_for
+
+    other = "; a table of text of another suffix is read through a column map, --columns FILE.toml:NAME"
     raise DataError(
-        f"{path}: is neither a .nc nor a {', '.join(TEXT_SUFFIXES)} file nor a result folder; a table of another "
-        "suffix is read through a column map, --columns FILE.toml:NAME"
+        f"{file}: is no .nc, .parquet or {', '.join(TEXT_SUFFIXES)} file and no result folder"
+        f"{remedy_for(file) or other}"
     )
 
 

@@ -3,6 +3,7 @@
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -47,6 +48,10 @@ _MAXIMUM_RANGES = 20.0
 _MINIMUM_CHANGE = 0.01
 """Part of a full range [-] by which some channel has to change."""
 
+if TYPE_CHECKING:
+    from pandas import DataFrame  # type: ignore[import-untyped]
+    from xarray import Dataset
+
 
 @dataclass(frozen=True, slots=True)
 class Measured:
@@ -63,12 +68,17 @@ class Measured:
 
 
 def read_measured(
-    source: Recording | str | Path, device: Device, columns: ColumnMap | None = None, map_name: str = ""
+    source: "Recording | DataFrame | Dataset | str | Path",
+    device: Device,
+    columns: ColumnMap | None = None,
+    map_name: str = "",
 ) -> Measured:
     """Return a recording, or the one of a file or result folder; DataError where it cannot be compared with a model.
 
     A file with columns of its own is read through a column map, which messages call ``map_name``.
     """
+    if not isinstance(source, Recording | str | Path):
+        source = read_recording(source, atmosphere=device.supply.atmospheric_pressure)
     if isinstance(source, Recording):
         values = [source.time, *(source[name] for name in sorted(source.names))]
         return check_recording(

@@ -134,13 +134,43 @@ def test_the_example_prints_the_torque_task_with_the_bits_of_python(tmp_path: Pa
 
 def test_a_valve_that_gets_its_command_late_prints_the_bits_of_python(tmp_path: Path) -> None:
     scenario = load_scenario("torque-task-slow-valve", ["run.duration=0.5 s"])
-    name = written(tmp_path, "torque-task-slow-valve", "run.duration=0.5 s")
-    # A history that is never written leaves a function without a caller.
-    subprocess.run(["make", "-s", "-C", str(tmp_path), "CFLAGS=-std=c99 -O1 -Wall -Werror", name], check=True)
-    done = subprocess.run([tmp_path / name], capture_output=True, text=True, check=True)
+    written(tmp_path, "torque-task-slow-valve", "run.duration=0.5 s")
+    # A history that is never written leaves a function without a caller: an error under the library's own flags.
+    done = subprocess.run(["make", "-s", "-C", str(tmp_path), "check"], capture_output=True, text=True, check=True)
+    assert done.stderr == "equal to Python: 501 samples to the bit, 15 metrics\n"
     result = simulate(scenario)
     assert result.metrics["gas_supplied"].value > 1e-5
     assert done.stdout.splitlines() == printed(result, scenario_library(scenario).program.outputs)
+
+
+def test_make_check_says_which_number_is_not_that_of_python(tmp_path: Path) -> None:
+    name = written(tmp_path, "step-response", "run.duration=0.05 s")
+    table, head = tmp_path / "expected.csv", ["make", "-s", "-C", str(tmp_path), "CFLAGS=-std=c99 -O0"]
+    subprocess.run([*head, f"{name}_check"], check=True)
+    text = table.read_text(encoding="utf-8")
+    row = text.splitlines()[20].split(",")
+    place = text.splitlines()[0].split(",").index("pressure_1")
+    other = repr(float(np.nextafter(float(row[place]), 9e9)))
+    cases = {
+        f"at {float(row[0]):.9g} s pressure_1 is": text.replace(row[place], other),
+        "metric gas_vented is": re.sub(r"(?<=# gas_vented = ).*", "1.0", text),
+        "the run ended before 9 s": text.replace("# gas_supplied", f"9,{','.join(row[1:])}\n# gas_supplied", 1),
+        "no table of Python's numbers": text.replace("angle", "angel", 1),
+    }
+    for said, changed in cases.items():
+        assert changed != text
+        table.write_text(changed, encoding="utf-8")
+        done = subprocess.run([tmp_path / f"{name}_check", table], capture_output=True, text=True, check=False)
+        assert done.returncode > 0
+        assert said in done.stderr
+
+
+@pytest.mark.parametrize("interface", [c_library, plant_library])
+def test_the_comparison_with_python_is_clean_c_and_cpp(interface: Any, tmp_path: Path) -> None:
+    for file, content in interface(load_scenario("torque-task-slow-valve", ["run.duration=0.2 s"])).items():
+        (tmp_path / file).write_bytes(content)
+    for line in (["gcc", "-std=c99", *WARNINGS, "-Wshadow"], ["g++", "-x", "c++", "-Wall", "-Wextra", "-Werror"]):
+        subprocess.run([*line, "-fsyntax-only", "check.c"], cwd=tmp_path, check=True)
 
 
 @pytest.mark.parametrize("rate", ["7 Hz", "13 Hz"])

@@ -11,6 +11,9 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Progress, Report, report_nothing
 
 if TYPE_CHECKING:
+    from pandas import DataFrame  # type: ignore[import-untyped]
+    from xarray import Dataset
+
     from ppafo.analyses.validate.result import Validation
     from ppafo.report.finding import Finding
     from ppafo.signals import Recording
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
 SetLike = Annotated[str | Path, Word("PARAMETERS")]
 ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
-Recorded = Annotated["Recording | str | Path", Word("RECORDING")]
+Recorded = Annotated["Recording | DataFrame | Dataset | str | Path", Word("RECORDING")]
 Motion = Annotated[str, Word("free|measured|locked|leg")]
 Initial = Annotated[str, Word("CHANNEL=VALUE")]
 Limits = Annotated[Sequence[str], Word("[CHANNEL=]LIMIT", option="--threshold")]

@@ -27,8 +27,8 @@ def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Ov
     out: the folder to write
 
     >>> print(export_c("step-response", out=Path("library")).text)
-    written: library (CMakeLists.txt, LICENSE, Makefile, README.md, main.c, step_response.c, step_response.h); next:
-    make -C library check
+    written: library (CMakeLists.txt, LICENSE, Makefile, README.md, check.c, main.c, step_response.c, step_response.h,
+    expected.csv); next: make -C library check
     """
     from ppafo.cli.output import export
     from ppafo.exports.c_library import c_library

@@ -6,6 +6,7 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
+from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import (
     RULES_OF_TIMES,
@@ -38,8 +39,13 @@ _FLAWS_OF_WALK = (
 
 
 def c_library(scenario: Scenario) -> dict[str, bytes]:
-    """Files of a library in C by name. ProgramError for what cannot be translated, with file and line."""
-    return library_files(library_of(scenario))
+    """Files of a library in C by name, with a run of Python to compare it with.
+
+    ProgramError for what cannot be translated, with file and line.
+    """
+    library = library_of(scenario)
+    metrics = [kind.name for kind in library.program.metrics]
+    return {**library_files(library), "expected.csv": expected_csv(scenario, library.program.outputs, metrics)}
 
 
 def scenario_library(scenario: Scenario) -> Library:

@@ -63,13 +63,15 @@ OUTPUTS = {
     "gait_fraction": ("-", "gait phase that the controller goes by, in turns"),
 }
 """Unit and meaning of the outputs at each sample."""
+SAME_METRIC = 1.0e-12
+"""Difference of a metric in C from Python's, as a share of it: sums are rounded in another order."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
 _SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
-_FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt"}
+_FILES = {"Makefile": "Makefile", "CMakeLists.txt": "CMakeLists.txt", "check.c": "check.c"}
 """Templates of files that every library has, and what they are called in it."""
 
 
-_OWN_FILES = {"main", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "license"}
+_OWN_FILES = {"main", "expected", "unit", "plugin", "fmi2", "fmi3", "makefile", "readme", "license"}
 _OWN_TARGETS = {"all", "check", "clean", "test"}
 _OF_BOARDS = {"board", "board_simulated", "start_cortex"}
 _OF_CMAKE = {"help", "install", "package", "m"}
@@ -226,6 +228,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
         **_struct_words(library),
         **_check_words(library),
         **_example_words(library),
+        **_comparing_words(library, name),
         "in_parts": in_parts,
         "run": filled(template(_FOLDER, "run.h"), {"name": name}),
         "steps": filled(template(_FOLDER, "steps.c"), steps),
@@ -297,6 +300,18 @@ def _example_words(library: Library) -> dict[str, str]:
             for kind in library.program.metrics
         ),
         "example": f"{pressure.name} = {pressure.value!r};",
+    }
+
+
+def _comparing_words(library: Library, name: str) -> dict[str, str]:
+    """Words of the program that compares the library with Python: channels, metrics, and what a closed loop adds."""
+    return {
+        "channel_names": ", ".join(f'"{channel}"' for channel in ("time", *library.program.outputs)),
+        "metric_names": ", ".join(f'"{kind.name}"' for kind in library.program.metrics) or '""',
+        "allowed": repr(SAME_METRIC),
+        "check_inputs": "",
+        "check_first": f"    status = status == {name.upper()}_GOING_ON ? {name}_step(run) : status;",
+        "check_metrics": filled(template(_FOLDER, "check_metrics.c"), {"name": name, "NAME": name.upper()}),
     }
 
 

@@ -8,12 +8,14 @@ from typing import NamedTuple
 from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
 from ppafo.exports.c_library.files import Library, Setting, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
 from ppafo.parameters.graph import outside
+from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.plan import step_counts
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMotion, ProfileChoice, Scenario, Sensors
@@ -187,7 +189,20 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
 
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Return the files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step."""
-    return library_files(surfaced(plant_of(scenario)).library)
+    library = surfaced(plant_of(scenario)).library
+    return {**library_files(library), "expected.csv": expected_csv(_half_open(scenario), library.program.outputs)}
+
+
+_EXAMPLE = 0.5
+"""Command of the example, which does something."""
+
+
+def _half_open(scenario: Scenario) -> Scenario:
+    """Return the run of the example by Python: the plant for a tenth of a second or longer under a constant command."""
+    plant = _commanded(scenario.motion, scenario)
+    command = replace(plant.controller, settings={"command": _EXAMPLE})
+    duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)
+    return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
 
 def surfaced(alone: PlantAlone) -> PlantAlone:
@@ -195,13 +210,16 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.
-    example = [0.5 if variable.name == "command" else variable.start for variable in alone.inputs]
+    example = [_EXAMPLE if variable.name == "command" else variable.start for variable in alone.inputs]
     comments = [f" * {variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
     entries = [f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs]
     words = {
         "arguments": ", ".join(f"double {name}" for name in names),
         "inputs": ", ".join(names),
         "first_inputs": ", ".join(map(repr, example)),
+        "check_inputs": "".join(f", {value!r}" for value in example),
+        "check_first": "",
+        "check_metrics": "",
         "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone)]),
         "said_inputs": ";\n".join(comments) + ".",
         "listed_inputs": "\n".join(entries),
