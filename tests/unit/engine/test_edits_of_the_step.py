@@ -32,7 +32,7 @@ class Mine(NamedTuple):
 
 def groups(parts: Program) -> Groups:
     """Groups of the gas, with the parameter and one that a phase hands on."""
-    return isothermal.groups(parts) | {"mine": given(Mine), "halved": handed(float)}
+    return {**isothermal.groups(parts), "mine": given(Mine), "halved": handed(float)}
 
 
 def change(parts: Program, lane: Any, length: float) -> None:
