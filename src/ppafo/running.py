@@ -28,7 +28,7 @@ _STRIDES_TRIED = 8.0
 """Strides of a walk with which a remedy is tried."""
 
 
-@checked()
+@checked
 def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> Result:
     """Run one scenario: an object, or the name of a shipped one or a file.
 
@@ -114,7 +114,7 @@ def _trial_run(scenario: Scenario) -> RunSettings:
     return replace(run, duration=round(duration / run.output_interval) * run.output_interval)
 
 
-@checked("scenarios", "threads")
+@checked
 def simulate_many(
     scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
 ) -> list[Result]:

@@ -31,6 +31,11 @@ _OF_LOOP = frozenset(
         angle_loop.GRAVITY,
         angle_loop.INERTIA,
         angle_loop.FRICTION,
+        angle_loop.STATIC_FRICTION,
+        angle_loop.LOAD_TIME,
+        angle_loop.TORQUE_LAG,
+        angle_loop.TOLERANCE,
+        angle_loop.REST_DISTANCE,
     )
 )
 

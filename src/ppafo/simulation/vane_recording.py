@@ -38,7 +38,7 @@ def measured_prescribed(scenario: Scenario, run: Run, times: Floats, rows: Mappi
 
     def external_torque(torque: Floats) -> Floats:
         acceleration = profile_values(path, times)[2]
-        gravity = gravity_torque(rows["state.angle"], plant.gravity_torque)
+        gravity = over_samples(gravity_torque, rows["state.angle"], plant.gravity_torque)
         return np.asarray(net_torques(run, rows, torque - gravity) - plant.inertia * acceleration)
 
     return measured(scenario, run, times, rows, external_torque)

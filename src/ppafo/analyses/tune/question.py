@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TuningLike = Annotated["Problem | str | Path | Mapping[str, Any]", Word("TUNING")]
 
 
-@checked("tuning", "overrides", "seed")
+@checked
 def tune(
     tuning: TuningLike,
     *,
