@@ -37,7 +37,7 @@ test-processors: $(READY)
 	set -e; for kernel in $(PROCESSORS); do OPENBLAS_CORETYPE=$$kernel $(TESTS) -m "not long" $(FITTING); done
 
 # The short tests of what a host program asks for, in one that has set decimals, errors of NumPy, locale and warnings in its own way.
-HOSTED := tests/contract/test_docstring_examples.py tests/acceptance/test_hostile_host.py tests/unit/test_units.py tests/unit/test_results_at_hand.py \
+HOSTED := tests/contract/test_docstring_examples.py tests/unit/test_units.py tests/unit/test_results_at_hand.py \
 	$(addprefix tests/unit/,arguments control documents metrics parameters signals storage)
 test-host: $(READY)
 	$(TESTS) -p tests.hostile_host -m "not long" $(HOSTED)

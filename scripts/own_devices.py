@@ -1,6 +1,10 @@
 """Draws devices that are not the paper's and walks them with every torque law: what gains that follow the device cost.
 
     python scripts/own_devices.py --seed 1 --devices 12
+    python scripts/own_devices.py --seed 1 --joints 20
+
+With ``--joints`` it runs joints of a bench in place of walks, and counts what the verdict on tracking says of them
+(``drawn_joints.py``).
 
 Each law walks with the gains that it has where nobody gives any, and with these times 1/8 to 4. Tuned are, of
 these, the least gas among loops that do not oscillate and whose error is within a quarter of the least one, and that
@@ -22,6 +26,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
+from scripts.drawn_joints import count_joints, table_text
 
 LAWS = (
     "event_on_off_dead_zone",
@@ -129,7 +134,14 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--devices", type=int, default=12)
     parser.add_argument("--seconds", type=float, default=10.0, help="length of each walk [s]")
+    parser.add_argument(
+        "--joints", type=int, default=0, help="joints of a bench in place of walks: are verdicts right?"
+    )
     given = parser.parse_args(words)
+    if given.joints:
+        counts = count_joints(given.seed, given.joints)
+        print(table_text(counts))
+        return 1 if any(row["good said"] or row["fails silent"] for row in counts.values()) else 0
     draw = random.Random(given.seed)
     devices = [draw_device(draw) for _ in range(given.devices)]
     for number, device in enumerate(devices, start=1):

@@ -164,7 +164,7 @@ ARGUMENTS: Mapping[str, str] = {
         "baseline? draws check"
     ),
     "compare_walks": "scenario minutes? progress",
-    "design": ("problem:object? seed? threads? mass? stature? torque? pressure? minutes? toes? catalogue? progress?"),
+    "design": ("problem:object? threads? mass? stature? torque? pressure? minutes? toes? catalogue? progress?"),
     "endurance_of_walk": "result bottle?",
     "estimate": (
         "overrides seed? threads? progress? confidence maximum_failed study metric statistic width? also "
@@ -175,7 +175,7 @@ ARGUMENTS: Mapping[str, str] = {
     "identify": "problem progress",
     "linearise": "scenario at overrides",
     "load_catalogue": "catalogue",
-    "load_design": "problem seed?",
+    "load_design": "problem",
     "load_device": "parameter_set overrides valve?",
     "load_gait": "gait",
     "load_parameter_set": "parameter_set:name",

@@ -159,17 +159,6 @@ _HOMES = {
 _HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for name in names))
 __all__ = list(_HOME_OF)
 
-_RENAMED = {
-    "monte_carlo": "estimate",
-    "run_design": "design",
-    "run_sizing": "design",
-    "run_study": "sweep",
-    "size": "design",
-    "load_sizing": "load_design",
-    "endurance": "bottle",
-}
-"""Names of earlier versions and what they are called now."""
-
 
 def _compiler_of_c(name: str) -> Compiler:
     """Return a compiler of C, which knows the translation above the engine."""
@@ -184,8 +173,6 @@ offer({name: partial(_compiler_of_c, name) for name in ("gcc", "clang", "zig")})
 
 def __getattr__(name: str) -> Any:
     """Load a public name from its module the first time it is used."""
-    if name in _RENAMED:
-        raise AttributeError(f"ppafo.{name} is now called ppafo.{_RENAMED[name]}")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'ppafo' has no attribute '{name}'")
     home = _HOME_OF[name]

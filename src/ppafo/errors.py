@@ -111,14 +111,6 @@ def said_missing(names: Sequence[str]) -> str:
     return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
 
 
-RENAMED_KEYS: Mapping[str, str] = {
-    "course": "task_sequence",
-    "quantum": "resolution",
-    "volume_per_angle": "displacement_per_radian",
-}
-"""Keys of files of earlier versions and what they are called now."""
-
-
 _OF_DATA_SHEETS: Mapping[str, str] = {
     "cv": "3.87 L/(s bar) for each Cv [US gal/min, psi]",
     "kv": "4.48 L/(s bar) for each Kv [m^3/h, bar]",
@@ -132,17 +124,11 @@ _SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coeffi
 def nearest_name(name: str, allowed: Iterable[str]) -> str:
     """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
 
-    A name of an earlier version is answered with what it is called now. One that is far from all in letters may be
+    One that is far from all in letters may be
     short for one: its first word, or another.
     """
     word, known = str(name), list(allowed)
     before, dot, last = word.rpartition(".")
-    if last in RENAMED_KEYS:
-        renamed = f"{before}{dot}{RENAMED_KEYS[last]}"
-        # Commands have a hyphen where files have an underscore.
-        for now in (renamed, renamed.replace("_", "-")):
-            if now in known:
-                return f", which is now called '{now}'"
     sheet = _OF_DATA_SHEETS.get(_SPELT_OTHERWISE.get(last.lower(), last.lower()))
     if sheet is not None and any(name.rpartition(".")[2] == _C for name in known):
         return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"

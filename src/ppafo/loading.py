@@ -24,11 +24,6 @@ from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
 
-_OF_A_VANE = ("motion", "initial", "reference")
-"""Sections of which the file of a vane has one; a walk has none of them unless its motion says that it is a walk."""
-_OF_A_LEG = ("wearer", "timing", "faults", "bottle", "gait", "task_sequence")
-"""Sections that only the file of a walk has."""
-
 
 def list_all_scenarios() -> tuple[str, ...]:
     """Return the names of the scenarios that come with the package: vanes alone first, then walks."""
@@ -37,7 +32,7 @@ def list_all_scenarios() -> tuple[str, ...]:
     return *of_vanes.list_scenarios(), *list_walks()
 
 
-@checked("scenario", "overrides", "parameter_set", name_or_path="scenario")
+@checked
 def load_scenario(
     scenario: str | Path,
     overrides: Overrides = (),
@@ -81,7 +76,7 @@ def load_scenario(
     return of_vanes.scenario_of(request, _layout(document))
 
 
-@checked()
+@checked
 def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Scenario:
     """Return a scenario, walks among them, from nested dictionaries that are laid out as a scenario file is.
 
@@ -103,11 +98,8 @@ def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *,
 
 
 def _layout(document: Mapping[str, Any]) -> of_vanes.Layout:
-    """Return how a document is laid out: as its motion says, or without one, as in older files, as its sections do."""
-    is_older_walk = not any(section in document for section in _OF_A_VANE) and (
-        any(section in document for section in _OF_A_LEG) or {"device", "controller"} <= document.keys()
-    )
-    if not is_walk(kind_at(document, "motion")) and not is_older_walk:
+    """Return how a document is laid out: as its motion says."""
+    if not is_walk(kind_at(document, "motion")):
         return of_vanes.VANE
     from ppafo.walking.loading import WALKING
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 
-@checked()
+@checked
 def evaluate(
     recording: "Recording | DataFrame | Dataset | str | Path", *, columns: ColumnsLike | None = None
 ) -> dict[str, Metric]:

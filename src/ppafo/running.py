@@ -1,23 +1,34 @@
 """Runs scenarios by name, by file or as they are, a vane alone or a leg that walks."""
 
+import contextlib
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ppafo.arguments import Overrides, Threads, checked
-from ppafo.loading import scenario_or_load
+from ppafo.errors import PpafoError
+from ppafo.loading import reloaded, scenario_or_load
 from ppafo.model.columns import first
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation import simulate as of_loaded
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.scenario import RunSettings, Scenario
 from ppafo.simulation.simulate import Result
 
 if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
+    from ppafo.simulation.tracking import Tracking
+    from ppafo.simulation.tracking.remedies import Remedy
+
+MOST_TRIED = 12
+"""Remedies of a run that does not follow that are tried side by side."""
+_STRIDES_TRIED = 8.0
+"""Strides of a walk with which a remedy is tried."""
 
 
-@checked()
+@checked
 def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> Result:
     """Run one scenario: an object, or the name of a shipped one or a file.
 
@@ -56,7 +67,54 @@ def most_reversals(scenario: Scenario) -> float:
     return rules.most_reversals(scenario, law, first(scenario.run.duration), scenario.motion.stride_time)
 
 
-@checked("scenarios", "threads")
+def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
+    """Return a verdict with the first of its remedies that lets the run follow, from runs with each, side by side.
+
+    They are given as the overrides that the verdict prints; a walk is tried on its first strides. Where none lets it
+    follow, it is the one that leaves the least error, if that is less than half.
+    """
+    if verdict is None or verdict.accepted or not verdict.remedies:
+        return verdict
+    from ppafo.simulation.tracking.remedies import change_text
+
+    # What was changed in Python would be lost with overrides.
+    is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
+    candidates: list[tuple[Remedy, Scenario]] = []
+    for remedy in verdict.remedies[:MOST_TRIED]:
+        with contextlib.suppress(PpafoError):
+            again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
+            candidates.append((remedy, replace(again, run=_trial_run(scenario))))
+    try:
+        results = of_loaded.simulate_many([candidate for _, candidate in candidates])
+    except PpafoError:
+        return verdict
+    best: tuple[Remedy, float] | None = None
+    for (remedy, _), result in zip(candidates, results, strict=True):
+        left = result.tracking
+        if not result.status.is_completed:
+            continue
+        if left is None:
+            return replace(verdict, tried=f"with {remedy.text} it does, as a further run shows")
+        if left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
+            best = (remedy, left.error)
+    if best is not None:
+        error = change_text(verdict.controlled, best[1])
+        return replace(verdict, tried=f"with {best[0].text} an RMS error of {error} is left, as a further run shows")
+    names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
+    advice = f"{verdict.advice}; " if verdict.advice else ""
+    return replace(verdict, tried=f"{advice}other {names} alone did not mend it")
+
+
+def _trial_run(scenario: Scenario) -> RunSettings:
+    """Return the times with which a remedy is tried: those of a task, some strides of a walk."""
+    run, duration = scenario.run, _STRIDES_TRIED * scenario.motion.stride_time
+    if scenario.follows_reference or not 0.0 < duration < run.duration:
+        return run
+    # A whole number of output intervals, as the walk itself has.
+    return replace(run, duration=round(duration / run.output_interval) * run.output_interval)
+
+
+@checked
 def simulate_many(
     scenarios: Sequence[Scenario | str | Path], *, threads: Threads | None = None, plugins: Plugins = ()
 ) -> list[Result]:

@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
 import sys
@@ -29,5 +31,6 @@ def printed(host: str) -> str:
     return subprocess.run(words, check=True, stdout=subprocess.PIPE, text=True, env=surroundings).stdout
 
 
+@pytest.mark.long
 def test_a_program_prints_the_same_in_a_hostile_host() -> None:
     assert printed("hostile") == printed("friendly")

@@ -68,18 +68,3 @@ def test_a_mistyped_option_is_one_line_and_exit_code_2(capsys: pytest.CaptureFix
     said = capsys.readouterr().err
     assert "did you mean '--json'" in said
     assert said.count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("word", "place"), [("bench", "python -m benchmarks"), ("coverage", "scripts/interval_coverage.py")]
-)
-@pytest.mark.parametrize("more", [[], ["--help"], ["--draws", "1"]])
-def test_the_package_names_the_new_place_of_a_command_that_it_had(
-    word: str, place: str, more: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert package([word, *more]) == 2
-    captured = capsys.readouterr()
-    assert f"'{word}' is no longer a command of the package" in captured.err
-    assert place in captured.err
-    assert captured.err.count("\n") == 1
-    assert captured.out == ""

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.analyses.design.loading import read_design_file
+from ppafo.analyses.design.loading import load_design
 from ppafo.analyses.endurance.walk_gas import read_walk_gas
 from ppafo.analyses.reproduce.publication import load_publication
 from ppafo.analyses.sweep.answer import load_study_results
@@ -37,7 +37,7 @@ LOADERS: dict[str, Callable[[str], Any]] = {
     "study": load_study,
     "tuning": load_tuning,
     "parts": load_catalogue,
-    "design": read_design_file,
+    "design": load_design,
     "walk": load_walk,
     "task-sequence": load_task_sequence,
     "identification": load_problem,

@@ -28,7 +28,7 @@ FOLDERS: dict[str, list[str]] = {
     "gait": ["show", "falisse2019-subject1"],
     "gait import": ["import", "walk.mot", "--body-mass", "62 kg"],
     "bottle": ["--gas-per-stride", "0.3 g"],
-    "design": ["torque-task"],
+    "design": ["push-off"],
     "design of a profile": ["push-off"],
     "sets list": ["list"],
     "sets show": ["show", "ppafo2011"],

@@ -20,7 +20,7 @@ from ppafo.analyses.linearise.solve import EQUILIBRIUM
 from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
 from ppafo.cli.command_line import Command, Group, option_of, parameters_of
-from ppafo.cli.commands import COMMANDS, OTHERS, RENAMED
+from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
 from ppafo.exports.hil.wire import DEFAULT_BAUD, RATE
 from ppafo.validation.agreement import DEFAULT_LIMIT
@@ -101,31 +101,6 @@ def test_the_function_of_a_command_is_the_verb_of_python_with_its_errors_documen
     verb = VERBS[name].function()
     assert getattr(ppafo, name) is verb
     assert "Error" in (verb.__doc__ or "")
-
-
-@pytest.mark.parametrize("old", RENAMED)
-def test_an_old_command_answers_with_the_new_line(old: str, capsys: pytest.CaptureFixture[str]) -> None:
-    words = [word.lower() for word in old.split()]
-    assert main(words) == 2
-    said = capsys.readouterr().err
-    assert f"is now 'ppafo {RENAMED[old]}'" in said
-    assert said.count("\n") == 1
-    now = RENAMED[old].partition(" --")[0].split()
-    assert " ".join(now) in VERBS or now == ["new", "example"]
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("montecarlo study.toml --metric gas", "sweep --statistic mean study.toml --metric gas"),
-        ("montecarlo s --metric gas --statistic mean", "sweep s --metric gas --statistic mean"),
-        ("chip torque-task-solenoid", "export firmware --try torque-task-solenoid"),
-        ("rig record leak-rate --seed 2", "rig simulate leak-rate --seed 2"),
-    ],
-)
-def test_an_old_line_answers_with_the_whole_new_one(old: str, new: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(old.split()) == 2
-    assert capsys.readouterr().err.endswith(f": ppafo {new}\n")
 
 
 def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.CaptureFixture[str]) -> None:

@@ -34,14 +34,13 @@ def test_the_table_has_every_public_function_and_each_of_its_arguments() -> None
     [
         (
             lambda: ppafo.sweep("s", ["valve.area=3 mm^2"]),
-            "sweep() takes one argument by position: write sweep('s', out=",
+            "sweep() takes one argument by position: write sweep('s', overrides=['valve.area=3 mm^2'])",
         ),
         (lambda: ppafo.walk("solenoid", 5), "walk() takes one argument by position: write walk('solenoid', minutes=5)"),
         (
-            lambda: ppafo.load_device("ppafo2011", "proportional"),
-            "write load_device('ppafo2011', valve='proportional')",
+            lambda: ppafo.load_device("ppafo2011", {"valve.area": 3.0e-6}),
+            "write load_device('ppafo2011', overrides={'valve.area': 3e-06})",
         ),
-        (lambda: ppafo.load_gait(name_or_path="x"), "load_gait(): name_or_path is now called gait: write gait='x'"),
         (lambda: ppafo.find("s", vary="a", such_that="b", higest=True), "did you mean 'highest'?"),
         (lambda: ppafo.find("s"), "find() needs vary and such_that: "),
         (
@@ -50,7 +49,7 @@ def test_the_table_has_every_public_function_and_each_of_its_arguments() -> None
         ),
     ],
 )
-def test_an_old_or_mistyped_call_is_answered_with_what_to_write(call, said) -> None:  # type: ignore[no-untyped-def]
+def test_a_mistyped_call_is_answered_with_what_to_write(call, said) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(ppafo.ArgumentError) as caught:
         call()
     assert said in str(caught.value)

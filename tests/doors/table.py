@@ -34,8 +34,8 @@ BASES: dict[str, Texts] = {
     WALK_BASE: (),
 }
 """Overrides of each, with which a run of 100 steps moves all that is there."""
-WALKED = 0.65
-"""Seconds of a walk: from heel strike through push-off, with 800 samples of its controller."""
+WALKED = 1.0
+"""Seconds of a walk, the shortest that there is: from heel strike through push-off, with 1000 samples."""
 TWO_STRIDES = 2.3
 """Seconds of a walk whose controller learns from the first stride."""
 
@@ -94,11 +94,11 @@ VANE_FEATURES: dict[str, Feature] = {
     "spool": _feature("valve.spool_frequency=40 Hz", "valve.spool_damping_ratio=0.5", needs="valve"),
     "slew": _feature("valve.slew_limit=30 1/s", needs="valve"),
     "play": _feature("effects.spool_play.width=0.04", needs="valve"),
-    "solenoid": _feature(*_SOLENOID, needs="valve law"),
+    "solenoid": _feature(*_SOLENOID, needs="valve law clock actuator"),
     "opening delays": _feature(
         *_SOLENOID,
         *("valve.opening_delay=3.3 ms", "valve.closing_delay=2 ms", "valve.switching_interval=7 ms"),
-        needs="valve law",
+        needs="valve law clock actuator",
     ),
     "coil heating": _feature(
         *_SOLENOID,
@@ -108,7 +108,7 @@ VANE_FEATURES: dict[str, Feature] = {
             "effects.coil_heating.time_constant=1 s",
         ),
         "effects.coil_heating.pull_in_share=0.5",
-        needs="valve law",
+        needs="valve law clock actuator",
     ),
     "parts of steps": _feature("valve.area=150 mm^2", "run.tolerance=1e-4", needs="area"),
     # Gas.
@@ -165,11 +165,11 @@ VANE_FEATURES: dict[str, Feature] = {
     "resolution": _feature("sensors.angle_resolution=1 deg", "sensors.pressure_resolution=0.5 psi_d"),
     "bandwidth": _feature("sensors.angle_bandwidth=30 Hz", "sensors.pressure_bandwidth=40 Hz"),
     # Clocks.
-    "samples that do not divide the run": _feature("controller.rate=70 Hz", "run.duration=0.05 s"),
-    "samples between steps": _feature("controller.rate=333 Hz"),
+    "samples that do not divide the run": _feature("controller.rate=70 Hz", "run.duration=0.05 s", needs="clock"),
+    "samples between steps": _feature("controller.rate=333 Hz", needs="clock"),
     "records between steps": _feature("run.output_interval=1.5 ms", "run.duration=90 ms"),
     "steps that do not divide the record": _feature("run.step=0.3 ms", "run.duration=60 ms"),
-    "period": _feature("controller.period=3 ms", "run.output_interval=2 ms"),
+    "period": _feature("controller.period=3 ms", "run.output_interval=2 ms", needs="clock"),
     # Laws.
     "constant": _feature("controller.kind=constant", "controller.command=0.7", needs="law"),
     "hysteresis": _feature("controller.kind=hysteresis", "controller.band=0.1 N m", needs="law"),
@@ -230,7 +230,7 @@ WALK_FEATURES: dict[str, Feature] = {
     "recycling": _feature(
         *("device.valve=solenoid_recycling", "controller.kind=event_on_off"),
         *("valve.joining_time=60 ms", "valve.holding_time=40 ms", "valve.opening_delay=3 ms"),
-        needs="valve law",
+        needs="valve law actuator",
     ),
     "thermal gas": _feature(*_THERMAL),
     "supply lines": _feature(*_LINES),
@@ -264,7 +264,7 @@ WALK_FEATURES: dict[str, Feature] = {
     "cylinder": _feature("device.set=cylinder-lever", needs="actuator"),
     "bladder": _feature(f"device.set={BLADDER}", needs="actuator area"),
     "muscle pair": _feature(f"device.set={MUSCLES}", needs="actuator"),
-    "off": _feature("controller.kind=off", needs="law"),
+    "off": _feature("controller.kind=off", needs="law timing"),
     "on_off law": _feature("controller.kind=event_on_off", needs="law"),
     "dead zone": _feature("controller.kind=event_on_off_dead_zone", needs="law"),
     "pid": _feature("controller.kind=event_pid", needs="law"),

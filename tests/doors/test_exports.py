@@ -53,7 +53,8 @@ def printed(folder: Path, files: dict[str, bytes]) -> tuple[dict[str, Floats], d
     """Channels and metrics that the example of a library prints, built with every warning and sanitizer."""
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    sources = [str(folder / name) for name in files if name.endswith(".c")]
+    # The comparison with Python's numbers that comes along is a program of its own.
+    sources = [str(folder / name) for name in files if name.endswith(".c") and name != "check.c"]
     program = folder / "example"
     built = subprocess.run([*BUILT, *sources, "-o", str(program), "-lm"], capture_output=True, text=True, check=False)
     assert (built.returncode, built.stderr) == (0, "")

@@ -15,8 +15,8 @@ pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="no node on
 
 
 def of_modules() -> list[Any]:
-    """Every case; of the short ones those whose program comes with the package: others wait until it is built."""
-    return [parameter(case, suite="" if case.suite != "short" or case.is_shipped else "long") for case in EXPORTED]
+    """Every case; what needs a program that does not come with the package waits for seconds until it is built."""
+    return [parameter(case, suite="" if case.is_shipped else "thorough") for case in EXPORTED]
 
 
 @pytest.mark.parametrize("case", of_modules())

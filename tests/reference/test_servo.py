@@ -5,7 +5,7 @@ Runge-Kutta method of fourth order. Numbers of the device come from the set, gai
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -113,34 +113,87 @@ def rates(servo: Servo, y: np.ndarray, command: float, is_stuck: bool) -> np.nda
     return np.array([y[1], 0.0 if is_stuck else net / servo.inertia, flow_1, flow_2])
 
 
+class Cascade:
+    """The cascade, written again, with what it remembers."""
+
+    def __init__(self, law: Any) -> None:
+        self.law, self.is_begun, self.is_held, self.is_full = law, False, False, False
+        self.rate = self.slope = self.quickening = self.before = self.asked = self.angle = self.place = self.still = 0.0
+        self.load = self.breaking = self.torque = self.lagged = self.jump = 0.0
+
+    def command(self, wanted: float, angle: float, shown: float) -> float:
+        law, dt = self.law, self.law.period
+        asked = self.sense(wanted, angle, shown)
+        error = wanted - angle
+        moves = self.is_begun and 0.02 * self.still < law.rest_distance
+        self.is_held = asked == 0.0 and (
+            (self.is_held and abs(error) < 2.0 * law.tolerance) or (abs(error) < law.tolerance and not moves)
+        )
+        acting = max(-law.error_limit, min(law.error_limit, error))
+        slip = asked + 2.0 * law.angle_stiffness / law.angle_damping * acting
+        friction = 0.7 * law.friction_torque * max(-1.0, min(1.0, slip / 0.05))
+        self.lagged += (self.torque - self.lagged) * dt / (dt + law.torque_lag)
+        if self.is_full or not self.is_begun:
+            self.lagged = shown
+        if not self.is_held:
+            self.learn(friction, error, moves)
+            self.torque = self.load + self.breaking + friction + law.inertia * self.quickening
+            self.torque += law.angle_stiffness * acting + law.angle_damping * (asked - self.rate)
+        self.is_begun = True
+        unlimited: float = law.torque_gain * (self.torque - shown)
+        self.is_full = abs(unlimited) >= 1.0
+        return max(-1.0, min(1.0, unlimited))
+
+    def sense(self, wanted: float, angle: float, shown: float) -> float:
+        """Take a sample, and return the rate of the reference [rad/s]."""
+        law, dt = self.law, self.law.period
+        asked = (wanted - self.before) / dt if self.is_begun else 0.0
+        turned = angle - self.angle if self.is_begun else 0.0
+        self.slope = (turned - dt * self.rate) / (dt + law.rate_filter)
+        self.rate += self.slope
+        # The first rate of the reference has none before it.
+        jump = asked - self.asked if self.jump else 0.0
+        self.quickening += (jump - dt * self.quickening) / (dt + 8.0 * law.rate_filter)
+        if abs(angle - self.place) > law.rest_distance:
+            self.place, self.still = angle, 0.0
+        elif self.is_begun:
+            self.still += dt
+        if not self.is_begun:
+            self.load = self.torque = shown
+        self.before, self.asked, self.angle, self.jump = wanted, asked, angle, float(self.is_begun)
+        return asked
+
+    def learn(self, friction: float, error: float, moves: bool) -> None:
+        law, dt = self.law, self.law.period
+        self.load += (self.lagged - friction - self.breaking - self.load) * dt / law.load_time
+        self.load -= law.inertia * self.slope / law.load_time
+        creep = 0.0
+        if abs(error) > law.tolerance and not moves:
+            speed = min(abs(error) / math.radians(1.0), 10.0)
+            creep = math.copysign(law.static_torque / (5.0 * law.torque_lag) * speed * dt, error)
+        breaks = 0.0 if moves else self.breaking + creep
+        if abs(breaks) <= law.static_torque:
+            self.breaking = breaks
+        elif not self.is_full:
+            self.load += creep
+
+
 def independent(scenario: Scenario, duration: float) -> np.ndarray:
     """Time [s], angle [rad] and pressure in chamber 1 [Pa] of the servo at each sample of its law (3, samples)."""
     servo, law, reference = servo_of(scenario), scenario.controller, scenario.reference
-    late = round(scenario.sensors.delay / law.period)
+    late, cascade = round(scenario.sensors.delay / law.period), Cascade(law)
     volume_1, volume_2, _ = chambers(servo, scenario.motion.angle)
     y = np.array(
         [scenario.motion.angle, 0.0, servo.room * volume_1 / servo.product, servo.room * volume_2 / servo.product]
     )
     seen: list[tuple[float, float]] = []
     rows: list[tuple[float, float, float]] = []
-    rate = quickening = before = asked_before = angle_before = 0.0
     for sample in range(round(duration / law.period)):
         pressure, _, torque = pressures_and_torque(servo, y)
         rows.append((sample * law.period, float(y[0]), pressure))
         seen.append((float(y[0]), torque))
-        angle, shown = seen[max(0, sample - late)]
-        time = sample * law.period
-        wanted = reference.level + reference.amplitude * math.sin(2.0 * math.pi * reference.frequency * time)
-        asked = (wanted - before) / law.period if sample else 0.0
-        turned = angle - angle_before if sample else 0.0
-        rate += (turned - law.period * rate) / (law.period + law.rate_filter)
-        jump = asked - asked_before if sample > 1 else 0.0
-        quickening += (jump - law.period * quickening) / (law.period + 8.0 * law.rate_filter)
-        before, asked_before, angle_before = wanted, asked, angle
-        needed = law.angle_stiffness * max(-law.error_limit, min(law.error_limit, wanted - angle))
-        needed += law.angle_damping * (asked - rate) + law.inertia * quickening
-        needed += law.friction_torque * max(-1.0, min(1.0, asked / 0.05))
-        command = max(-1.0, min(1.0, law.torque_gain * (needed - shown)))
+        turned = math.sin(2.0 * math.pi * reference.frequency * sample * law.period)
+        command = cascade.command(reference.level + reference.amplitude * turned, *seen[max(0, sample - late)])
         for _ in range(round(law.period / STEP)):
             y = stepped(servo, y, command)
     return np.array(rows).T

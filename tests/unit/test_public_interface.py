@@ -41,16 +41,6 @@ def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:
     assert not hasattr(ppafo, "nothing_of_the_kind")
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [("run_sizing", "design"), ("run_design", "design"), ("size", "design"), ("load_sizing", "load_design")],
-)
-def test_a_renamed_name_says_the_new_one(old: str, new: str) -> None:
-    with pytest.raises(AttributeError, match=f"ppafo.{old} is now called ppafo.{new}"):
-        getattr(ppafo, old)
-    assert callable(getattr(ppafo, new))
-
-
 def test_importing_the_package_loads_nothing_heavy() -> None:
     heavy = ("numpy", "pint", "pydantic", "matplotlib", "xarray", "h5netcdf", "scipy", "pandas")
     code = f"import sys, ppafo; print([name for name in {heavy} if name in sys.modules])"

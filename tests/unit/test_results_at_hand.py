@@ -25,12 +25,6 @@ TASK = "torque-task-proportional"
 STUDY = "torque-task-uncertainty"
 
 
-def _sized() -> Any:
-    problem = ppafo.load_design("torque-task")
-    search = problem.search.model_copy(update={"screening": 64, "population": 16, "generations": 1})
-    return ppafo.design(replace(problem, search=search))
-
-
 def _identified(folder: Path) -> Any:
     new("example", "measured-cylinder", out=folder / "cylinder")
     return ppafo.identify(folder / "cylinder" / "cylinder.toml")
@@ -51,11 +45,11 @@ MADE: dict[str, Callable[[], Any]] = {
     "endurance_of_walk": lambda: ppafo.endurance_of_walk(ppafo.walk("solenoid", minutes=0.1)),
     "evaluate": lambda: ppafo.evaluate(ppafo.simulate(TASK).recording),
     "audit": lambda: ppafo.audit("ppafo2011"),
-    "design": _sized,
+    "design": lambda: ppafo.design("push-off"),
     "tune": _tuned,
     "apply_overrides": lambda: ppafo.apply_overrides(ppafo.load_parameter_set("ppafo2011"), {"valve.area": 3.0e-6}),
     "load_catalogue": ppafo.load_catalogue,
-    "load_design": lambda: ppafo.load_design("torque-task"),
+    "load_design": lambda: ppafo.load_design("push-off"),
     "load_device": lambda: ppafo.load_device("ppafo2011"),
     "load_gait": lambda: ppafo.load_gait(ppafo.list_gaits()[0]),
     "load_parameter_set": lambda: ppafo.load_parameter_set("cylinder-lever"),

@@ -1,6 +1,6 @@
 """The door of every public function: what a call gives is checked by the signature that makes the command line too.
 
-``@checked()`` reads the annotations at the first call. A value that does not fit is an ArgumentError that names the
+``@checked`` reads the annotations at the first call. A value that does not fit is an ArgumentError that names the
 argument, says what it takes and quotes the value; so are words that Python itself would answer with a TypeError.
 """
 
@@ -89,66 +89,44 @@ def _texts(value: Any) -> Iterator[str]:
         yield from (str(each) for each in value if isinstance(each, str | Path))
 
 
-def checked(*formerly: str, **renamed: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return what puts the door before a function.
+def checked(function: Callable[P, R]) -> Callable[P, R]:
+    """Return a function with the door before it."""
 
-    ``formerly`` are the arguments that calls gave by position in an earlier version, in that order, and ``renamed`` the
-    new names of arguments by their old ones: a call of that form is answered with how it is written now.
-    """
+    @functools.cache
+    def signature() -> _Signature:
+        parameters = annotated_parameters(function)
+        return _Signature(
+            {name: _Parameter(each.default, taken(each.annotation)) for name, each in parameters.items()},
+            tuple(name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
+        )
 
-    def decorate(function: Callable[P, R]) -> Callable[P, R]:
-        @functools.cache
-        def signature() -> _Signature:
-            parameters = annotated_parameters(function)
-            return _Signature(
-                {name: _Parameter(each.default, taken(each.annotation)) for name, each in parameters.items()},
-                tuple(name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
-            )
+    @functools.wraps(function)
+    def call(*args: P.args, **kwargs: P.kwargs) -> R:
+        values = _values(function.__name__, signature(), args, kwargs)
+        with _usual_numpy():
+            if _says_arguments.get():
+                # Only the function that was called says which argument: those that it calls have others.
+                with without_names():
+                    return _named(function, values)
+            return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
 
-        @functools.wraps(function)
-        def call(*args: P.args, **kwargs: P.kwargs) -> R:
-            values = _values(function.__name__, signature(), args, kwargs, formerly, renamed)
-            with _usual_numpy():
-                if _says_arguments.get():
-                    # Only the function that was called says which argument: those that it calls have others.
-                    with without_names():
-                        return _named(function, values)
-                return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
-
-        return call
-
-    return decorate
+    return call
 
 
 def _values(
-    function: str,
-    signature: _Signature,
-    positional: tuple[Any, ...],
-    by_name: Mapping[str, Any],
-    formerly: tuple[str, ...],
-    renamed: Mapping[str, str],
+    function: str, signature: _Signature, positional: tuple[Any, ...], by_name: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return the arguments of a call by name, each as the function takes it."""
     parameters, places = signature
     if len(positional) > len(places):
-        order = [*places, *formerly[len(places) :], *(name for name in parameters if name not in formerly)]
-        # A dictionary is overrides wherever it stands.
-        pairs = [
-            (
-                "overrides" if isinstance(value, Mapping) and "overrides" in parameters else renamed.get(name, name),
-                value,
-            )
-            for name, value in zip(order, positional, strict=False)
-        ]
-        now = ", ".join([*map(shown, positional[:1]), *(f"{name}={shown(value)}" for name, value in pairs[1:])])
+        left = [name for name in parameters if name not in places]
+        named = [(_taking(parameters, left, value), value) for value in positional[len(places) :]]
+        known = map(shown, positional[: len(places)])
+        now = ", ".join([*known, *(f"{name}={shown(value)}" for name, value in named)])
         count = {1: "one argument"}.get(len(places), f"{len(places)} arguments")
         raise ArgumentError(f"{function}() takes {count} by position: write {function}({now})")
     given = dict(zip(places, positional, strict=False))
     for name, value in by_name.items():
-        if name in renamed:
-            raise ArgumentError(
-                f"{function}(): {name} is now called {renamed[name]}: write {renamed[name]}={shown(value)}"
-            )
         if name not in parameters:
             hint = nearest_name(name, parameters)
             raise ArgumentError(f"{function}() has no argument '{name}'{hint}; it has {', '.join(parameters)}")
@@ -160,6 +138,16 @@ def _values(
         takes = "; ".join(f"{name} is {parameters[name].taken.what}" for name in missing)
         raise ArgumentError(f"{function}() needs {' and '.join(missing)}: {takes}")
     return {name: _value(name, parameters[name], value) for name, value in given.items()}
+
+
+def _taking(parameters: Mapping[str, _Parameter], left: list[str], value: Any) -> str:
+    """Take from the names that are left the first whose parameter takes a value."""
+    for name in left:
+        with contextlib.suppress(ArgumentError):
+            parameters[name].taken.take(name, value)
+            left.remove(name)
+            return name
+    return left.pop(0) if left else "..."
 
 
 def _value(name: str, parameter: _Parameter, value: Any) -> Any:

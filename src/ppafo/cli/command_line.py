@@ -359,27 +359,11 @@ class CommandParser(argparse.ArgumentParser):
         return found
 
 
-RENAMED = {
-    "--course": "--task-sequence",
-    "--first": "--first-draws",
-    "--gas-per-step": "--gas-per-stride",
-    "--least-strides": "--minimum-strides",
-    "--maximum": "--draws",
-    "--most": "--draws",
-    "--most-failed": "--maximum-failed",
-    "--runs": "--draws",
-    "--step-time": "--stride-time",
-}
-"""Options of earlier versions and what they are called now."""
-
-
 def check_options(words: Sequence[str], parser: CommandParser) -> None:
     """Refuse an option that no part of the parser has, before argparse complains of what it finds missing besides."""
     known = sorted(parser.options())
     for word in takewhile(lambda word: word != "--", words):
         name = word.partition("=")[0]
-        if name in RENAMED and name not in known and RENAMED[name] in known:
-            raise UsageError(f"{name} is now called {RENAMED[name]}")
         # As argparse has it: a dash alone, numbers and words with a space are values.
         is_value = not word.startswith("-") or len(word) == 1 or " " in word or _NEGATIVE_NUMBER.fullmatch(word)
         if not is_value and not any(_stands_for(name, option) for option in known):

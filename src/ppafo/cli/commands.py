@@ -3,7 +3,6 @@
 Commands of other packages are plain functions, found by entry points of the group ``ppafo.commands``.
 """
 
-import shlex
 from types import FunctionType
 
 from ppafo.cli.command_line import Command, Group, UsageError
@@ -91,7 +90,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         ),
         "design": Command(
             f"{_ANALYSES}.design.question:design",
-            first_line="Find a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass.",
+            first_line="Find a device: for a wearer or for a torque profile.",
             library="ppafo.analyses.design.loading:FILE",
         ),
         "bottle": Command(
@@ -160,34 +159,9 @@ OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {
 OF_OTHERS = "of other packages"
 """The heading of the help for them."""
 
-RENAMED: dict[str, str] = {
-    "audit": "sets audit",
-    "cache": "doctor",
-    "chip": "export firmware --try",
-    "endurance": "bottle",
-    "examples": "new example",
-    "firmware": "export firmware",
-    "gait export": "export opensim",
-    "montecarlo": "sweep --statistic mean",
-    "parts": "sets parts",
-    "plot": "export figure",
-    "record": "rig record",
-    "rig list": "rig simulate --list",
-    "rig record EXPERIMENT": "rig simulate",
-    "schema": "doctor --schema",
-    "size": "design",
-}
-"""Commands of the version before and what is written instead; a word in capitals stands for any that is no option."""
-
-MOVED: dict[str, str] = {
-    "bench": "'python -m benchmarks' or 'make bench'",
-    "coverage": "'python scripts/interval_coverage.py'",
-}
-"""Commands that the package had once, and what does the same in a checkout of the repository."""
-
 
 def check_words(words: list[str]) -> None:
-    """Refuse words that begin as no command does: with the new line of an old one, else with the nearest name.
+    """Refuse words that begin as no command does, with the nearest name.
 
     KindError for a command of another package that is there and cannot be used.
     """
@@ -195,25 +169,9 @@ def check_words(words: list[str]) -> None:
     # Options alone, such as --version, are for the parser.
     if not given:
         return
-    # A line of the version before gets its new form, not a guess at what may have been misspelled.
-    for old, now in RENAMED.items():
-        parts = old.split()
-        pairs = zip(parts, words, strict=False)
-        if len(words) >= len(parts) and all(
-            part == word or (part.isupper() and not word.startswith("-")) for part, word in pairs
-        ):
-            shown = [part for part in parts if not part.isupper()]
-            rest = words[len(shown) :]
-            head, dashes, option = now.partition(" --")
-            # An option of the new line that was given before stays as it was.
-            line = head if dashes and f"--{option.split()[0]}" in rest else now
-            full = " ".join(["ppafo", line, *map(shlex.quote, rest)])
-            raise UsageError(f"'ppafo {' '.join(shown)}' is now 'ppafo {now}': {full}")
     _check_installed(given)
     word = given[0]
     name_modules_in(word)
-    if word in MOVED:
-        raise UsageError(f"'{word}' is no longer a command of the package: run {MOVED[word]} in a checkout of ppafo")
     if word not in COMMANDS and word not in OTHERS:
         known = tuple(dict.fromkeys((*COMMANDS, *OTHERS)))
         raise UsageError(f"there is no command '{word}'{nearest_name(word, known)}; available: {', '.join(known)}")

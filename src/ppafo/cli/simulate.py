@@ -46,12 +46,10 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
 @in_units(lambda scenario, *_: scenario.device.shown)
 def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
-    from ppafo.running import gains
+    from ppafo.running import gains, tried
     from ppafo.simulation.simulate import simulate
 
     result = simulate(chosen)
-    from ppafo.simulation.tracking import tried
-
     in_force, verdict = gains(chosen), tried(chosen, result.tracking)
     # A run that diverged has no result to repeat; its exit code says so already.
     checked = result.check() if check and result.status.is_completed else None

@@ -10,6 +10,7 @@ asks for
 For 1/s^2 with a delay of D, and a time constant of D, the rules of S. Skogestad, Journal of Process Control 13 (2003)
 291, give w = 1/(4 D), so w = 1/(8 theta). A joint with much inertia is slower than that: full opening changes the
 torque by R [N m/s] only, so that a way of ``travel`` takes (I travel / R)^(1/3) [s], and w is at most its inverse.
+A joint whose static friction holds more than k_a ``travel`` has a stiffness for that, up to w = 1.7/(8 theta).
 
 A law that opens the valve by the error of the angle alone sees one integrator, at R/S for full opening, behind a mass
 on a gas spring S: beyond its frequency and damping nothing settles, whatever the gains. ``slow_loop`` is that loop.
@@ -27,11 +28,26 @@ RATE_FILTER = "rate filter of the angle loop"
 INNER_GAIN = "inner gain of the angle loop"
 GRAVITY = "gravity torque of the joint"
 FRICTION = "friction of the joint in motion"
+STATIC_FRICTION = "static friction of the joint"
 INERTIA = "inertia of the joint"
+LOAD_TIME = "time constant of the observed load"
+TORQUE_LAG = "time constant of the torque loop"
+TOLERANCE = "tolerance of the angle"
+REST_DISTANCE = "turn of a joint that shows motion"
 """What a default may follow: the numbers that the functions below give."""
 
 OUTER_TIMES_INNER = 8.0
 """1/(w theta): four times the delay of the inner loop, which is two dead times."""
+
+STIFFENED = 1.7
+"""Largest w over 1/(8 theta) where static friction asks for a stiffness."""
+LOAD_PERIODS = 4.0
+"""Time constant of the observed load over 1/w: a quicker observer makes the loop swing."""
+LEAST_TOLERANCE = math.radians(0.5)
+STEPS_OF_TOLERANCE = 2.0
+"""Resolutions of the angle sensor that a tolerance is at least; and as many standard deviations of its noise, twice."""
+REST_RATE = 0.02
+"""Rate [rad/s] below which a joint counts as resting."""
 
 USUAL_SWING = 0.05
 """rad: the swing at which dry friction counts as a damping."""
@@ -42,16 +58,20 @@ THIRD = 1.0 / 3.0
 class Joint(NamedTuple):
     """What turns, with the gas behind it.
 
-    Inertia [kg m^2], gas spring [N m/rad], viscous damping [N m s/rad], friction in motion [N m], the way [rad] that
-    it is to go at a time, largest torque of gravity [N m].
+    Inertia [kg m^2], gas spring [N m/rad], viscous damping [N m s/rad], friction in motion and static friction [N m],
+    the way [rad] that it is to go at a time, largest torque of gravity [N m], and resolution and noise of the angle
+    sensor [rad].
     """
 
     inertia: float
     stiffness: float
     damping: float
     friction: float
+    static_friction: float
     travel: float
     gravity: float
+    resolution: float
+    noise: float
 
 
 def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
@@ -61,19 +81,54 @@ def bandwidth(loop: TorqueLoop, joint: Joint) -> float:
 
 
 def angle_stiffness(loop: TorqueLoop, joint: Joint) -> float:
-    """Gain k_a = I w^2 [N m/rad]: torque requested per error of the angle."""
+    """Gain k_a = I w^2 [N m/rad], or what breaks static friction within the way: torque requested per angle error."""
     frequency = bandwidth(loop, joint)
-    return joint.inertia * frequency * frequency
+    stiffest = max(frequency, STIFFENED / (OUTER_TIMES_INNER * loop.dead_time))
+    breaking = joint.static_friction / max(joint.travel, LEAST_TOLERANCE)
+    return min(max(joint.inertia * frequency * frequency, breaking), joint.inertia * stiffest * stiffest)
+
+
+def stiffened(loop: TorqueLoop, joint: Joint) -> float:
+    """Bandwidth w = sqrt(k_a / I) [rad/s] with the stiffness that the joint has."""
+    return math.sqrt(angle_stiffness(loop, joint) / joint.inertia)
 
 
 def angle_damping(loop: TorqueLoop, joint: Joint) -> float:
     """Gain d_a = 2 I w [N m s/rad]: torque requested per rate of that error, for two equal roots."""
-    return 2.0 * joint.inertia * bandwidth(loop, joint)
+    return 2.0 * joint.inertia * stiffened(loop, joint)
+
+
+def load_time(loop: TorqueLoop, joint: Joint) -> float:
+    """Time constant [s] of the observed load, 4/w."""
+    return LOAD_PERIODS / stiffened(loop, joint)
+
+
+def torque_lag(loop: TorqueLoop, _joint: Joint) -> float:
+    """Time constant [s] of the torque loop with the gain 1/(2 R theta): 2 theta."""
+    return 2.0 * loop.dead_time
+
+
+def tolerance(_loop: TorqueLoop, joint: Joint) -> float:
+    """Angle error [rad] within which nothing is learnt: 0.5 deg, or what the sensor cannot tell."""
+    unseen = STEPS_OF_TOLERANCE * max(joint.resolution, 2.0 * joint.noise)
+    return max(LEAST_TOLERANCE, unseen)
+
+
+def rest_distance(loop: TorqueLoop, joint: Joint) -> float:
+    """Turn [rad] that shows motion: more than a step of the sensor or its noise, and than ``REST_RATE`` in 2 theta."""
+    unseen = 1.5 * joint.resolution + 4.0 * joint.noise
+    return max(REST_RATE * torque_lag(loop, joint), unseen)
 
 
 def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
-    """Time constant [s] of the filter on the rate of the error: as late as the torque loop, at most 0.1/w."""
-    return min(loop.dead_time, 0.1 / bandwidth(loop, joint))
+    """Time constant [s] of the filter on the measured rate: as late as the torque loop, at most 0.1/w.
+
+    A step of a coarse sensor may open the valve by half: for that the filter is slower, up to 0.3/w.
+    """
+    step = max(joint.resolution, 2.0 * joint.noise)
+    smoothing = 2.0 * inner_gain(loop, joint) * angle_damping(loop, joint) * step
+    frequency = stiffened(loop, joint)
+    return max(min(loop.dead_time, 0.1 / frequency), min(smoothing, 0.3 / frequency))
 
 
 def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:
@@ -89,6 +144,11 @@ def gravity(_loop: TorqueLoop, joint: Joint) -> float:
 def friction(_loop: TorqueLoop, joint: Joint) -> float:
     """Torque of the joint's friction in motion [N m], which a default may follow."""
     return joint.friction
+
+
+def static_friction(_loop: TorqueLoop, joint: Joint) -> float:
+    """Torque of the joint's static friction [N m], which a default may follow."""
+    return joint.static_friction
 
 
 def inertia(_loop: TorqueLoop, joint: Joint) -> float:

@@ -46,6 +46,14 @@ USUAL_LEAD = 0.0185
 SAMPLES_LATE = 1.5
 """Sample periods by which a sampled command is late: one to compute it, half of one for which it is held."""
 
+SHARPNESS = 0.01
+"""Command [-] within which a dead band is passed through: a jump at 0 would let the valve chatter."""
+
+
+def beyond_dead_band(command: float, dead_band: float) -> float:
+    """Command [-] whose opening is a command from -1 to 1, of a valve that opens beyond a dead band [-]."""
+    return (1.0 - dead_band) * command + dead_band * max(-1.0, min(1.0, command / SHARPNESS))
+
 
 def torque_in_dead_time(loop: TorqueLoop) -> float:
     """R theta [N m]: what full opening adds before a law sees anything of it."""

@@ -8,16 +8,18 @@ Steps (``interpreter.py``), recordings, solvers and linear models run their func
 """
 
 import ast
+import contextlib
 import inspect
 import math
+import operator
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import repeat
 from types import CodeType, FunctionType, ModuleType, SimpleNamespace
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,6 +27,8 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaves, rebuilt
+from ppafo.engine.source_text import COMPILED_BUILTINS
+from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
 
@@ -42,13 +46,17 @@ class EffectRows(Protocol):
 class PythonFunctions:
     """Functions in which some names stand for what a program has in their place; the functions themselves without any.
 
-    With ``goes_on``, a division by zero and the root of a negative number give what compiled code gets.
+    ``operations`` are other ones than Python's: those that go on, or those of columns.
     """
 
     def __init__(
-        self, links: Mapping[Any, Any], effects: Mapping[Any, tuple[str, ...]], rows: EffectRows, goes_on: bool = False
+        self,
+        links: Mapping[Any, Any],
+        effects: Mapping[Any, tuple[str, ...]],
+        rows: EffectRows,
+        operations: "Operations | None" = None,
     ) -> None:
-        self._links, self._effects, self._rows, self._goes_on = links, effects, rows, goes_on
+        self._links, self._effects, self._rows, self._operations = links, effects, rows, operations
         self._made: dict[Any, Any] = {}
 
     def parts(self, program: Program) -> Any:
@@ -70,16 +78,14 @@ class PythonFunctions:
 
     def of(self, value: Any, inside: Any = None) -> Any:
         """What stands for a value inside a function."""
-        if not self._links and not self._goes_on:
+        if not self._links and self._operations is None:
             return value
         value = getattr(value, "__wrapped__", value)
         if isinstance(value, FunctionType):
             return self._function(self._links.get((inside, value), self._links.get(value, value)))
         if isinstance(value, ModuleType) and value.__name__.startswith(OWN):
             return self._module(value)
-        if value is math and self._goes_on:
-            return MATH
-        return value
+        return MATH if value is math and self._operations is GOING_ON else value
 
     def _module(self, module: ModuleType) -> Any:
         if module not in self._made:
@@ -94,17 +100,18 @@ class PythonFunctions:
         if function.__module__.partition(".")[0] in sys.stdlib_module_names:
             return function
         if function not in self._made:
-            code = going_on(function) if self._goes_on else function.__code__
+            code = function.__code__ if self._operations is None else rewritten(function, self._operations.writer)
             scope = dict(function.__globals__)
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
             rows = self._effects.get(function, ())
             self._made[function] = self._law(copied, rows) if rows else copied
-            for name in _names_of(function.__code__):
-                if name in scope:
-                    scope[name] = self.of(scope[name], function)
+            read = {name: scope[name] for name in _names_of(function.__code__) if name in scope}
+            scope |= {name: self.of(value, function) for name, value in read.items()}
             copied.__kwdefaults__ = self._named_defaults(function)
-            if self._goes_on:
-                scope |= {"_quotient": quotient, "int": whole_part}
+            if self._operations is not None:
+                scope |= self._operations.names
+            elif not rows and not copied.__kwdefaults__ and all(scope[name] is read[name] for name in read):
+                self._made[function] = function
         return self._made[function]
 
     def _named_defaults(self, function: FunctionType) -> dict[str, Any]:
@@ -120,8 +127,9 @@ class PythonFunctions:
         names = function.__code__.co_varnames[: function.__code__.co_argcount]
         own = [name for name in names if name not in rows]
 
-        def called(*arguments: Any) -> Any:
-            return function(**dict(zip(own, arguments, strict=True)), **{row: self._rows[row] for row in rows})
+        def called(*arguments: Any, **named: Any) -> Any:
+            given = dict(zip(own, arguments, strict=False))
+            return function(**given, **named, **{row: self._rows[row] for row in rows})
 
         return called
 
@@ -132,42 +140,29 @@ def _names_of(code: CodeType) -> set[str]:
     return names.union(*(_names_of(constant) for constant in code.co_consts if isinstance(constant, CodeType)))
 
 
-class _GoingOn(ast.NodeTransformer):
-    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
-        self.generic_visit(node)
-        if not isinstance(node.op, ast.Div):
-            return node
-        return ast.copy_location(ast.Call(ast.Name("_quotient", ast.Load()), [node.left, node.right], []), node)
-
-
-@lru_cache(maxsize=1024)
-def going_on(function: FunctionType) -> CodeType:
-    """The code of a function with quotients that go on, on the lines of its file."""
-    code = function.__code__
-    text = textwrap.dedent(inspect.getsource(function))
-    tree = _GoingOn().visit(parse_module("\n" * (code.co_firstlineno - 1) + text))
-    whole = compile(ast.fix_missing_locations(tree), code.co_filename, "exec", dont_inherit=True)
-    return next(
-        constant for constant in whole.co_consts if isinstance(constant, CodeType) and constant.co_name == code.co_name
-    )
-
-
-def functions_of(program: Program, rows: EffectRows, goes_on: bool = False) -> PythonFunctions:
+def functions_of(program: Program, rows: EffectRows, operations: "Operations | None" = None) -> PythonFunctions:
     """Return the functions of the model as a program has them, with rows of its effects; ProgramError as linking."""
+    links, effects = _links_of(program)
+    return PythonFunctions(links, effects, rows, operations)
+
+
+@lru_cache(maxsize=64)
+def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ...]]]:
+    """What stands for functions of the model in a program, and the rows that laws of its effects take."""
     collector = SimpleNamespace(links={}, effects={})
     link_program(program, collector)
-    return PythonFunctions(collector.links, collector.effects, rows, goes_on)
+    return collector.links, collector.effects
 
 
 def in_program(
-    function: PlainFunction, program: Program, effects: Sequence[Any], goes_on: bool = False
+    function: PlainFunction, program: Program, effects: Sequence[Any], operations: "Operations | None" = None
 ) -> PlainFunction:
     """Return a function of the model as a program has it, with parameters of its effects.
 
     Before its own arguments it takes the states of effects by name, an empty mapping where there are none.
     """
     rows = {effect.name: row for effect, row in zip(program.effects, effects, strict=True)}
-    own = functions_of(program, rows, goes_on).of(function)
+    own = functions_of(program, rows, operations).of(function)
 
     def called(states: Mapping[str, Any], *arguments: Any) -> Any:
         rows.update(states)
@@ -176,23 +171,59 @@ def in_program(
     return called
 
 
-def over_samples(function: PlainFunction, *arguments: Any, goes_on: Callable[[], PlainFunction] | None = None) -> Any:
-    """Value of a function of the model at every sample, numbers as columns (samples,).
+class Operations(NamedTuple):
+    """Operations in the place of Python's: what writes a function for them, and their names."""
 
-    Arguments are numbers, rows, and mappings of rows; what is a column in them has one number for each sample. Without
-    any column it is one value. Where Python raises, the function is called with operations that go on; ``goes_on``
-    makes that of a function that is not the model's own.
+    writer: Callable[[FunctionType], ast.NodeTransformer]
+    names: Mapping[str, Any]
+
+
+@lru_cache(maxsize=1024)
+def rewritten(function: FunctionType, writer: Callable[[FunctionType], ast.NodeTransformer]) -> CodeType:
+    """The code of a function with other operations, on the lines of its file; ProgramError where it has none."""
+    code = function.__code__
+    text = textwrap.dedent(inspect.getsource(function))
+    tree = writer(function).visit(parse_module("\n" * (code.co_firstlineno - 1) + text))
+    whole = compile(ast.fix_missing_locations(tree), code.co_filename, "exec", dont_inherit=True)
+    return next(
+        constant for constant in whole.co_consts if isinstance(constant, CodeType) and constant.co_name == code.co_name
+    )
+
+
+# Functions over samples: with operations of whole columns, each in the same order, so that every number has the bits
+# that the function itself gives; a choice works out both of its values. What has no such form, a branch, a loop whose
+# end depends on a number or a power, is called sample by sample.
+
+
+def over_samples(function: PlainFunction, *arguments: Any) -> Any:
+    """Value of a function of the model, in its own units, of rows and numbers any of which may be columns (samples,).
+
+    What is the same for all samples may stay one number.
     """
+    return _over_samples(lambda operations: PythonFunctions({}, {}, {}, operations).of(function), arguments)
+
+
+def over_samples_in(
+    program: Program, effects: Sequence[Any], function: PlainFunction, states: Mapping[str, Any], *arguments: Any
+) -> Any:
+    """Value of a function of the model as a program has it, with parameters and states of effects, over samples."""
+    return _over_samples(partial(in_program, function, program, effects), (states, *arguments))
+
+
+def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
+    """Value of a function that is made for operations."""
     sizes = {column.size for argument in arguments for column in _columns_of(argument)}
     if not sizes:
-        return function(*arguments)
+        return make(None)(*arguments)
     (size,) = sizes
+    with contextlib.suppress(ProgramError), np.errstate(all="ignore"):
+        # A choice works out what no sample takes, too.
+        return make(COLUMNS)(*arguments)
     try:
-        return _gathered(list(map(function, *(_samples_of(argument, size) for argument in arguments))))
+        return _gathered(list(map(make(None), *(_samples_of(argument, size) for argument in arguments))))
     except (ArithmeticError, ValueError):
         # A run that diverged has numbers of which Python would make none.
-        without_errors = PythonFunctions({}, {}, {}, goes_on=True).of(function) if goes_on is None else goes_on()
-        return _gathered(list(map(without_errors, *(_samples_of(argument, size) for argument in arguments))))
+        return _gathered(list(map(make(GOING_ON), *(_samples_of(argument, size) for argument in arguments))))
 
 
 def _columns_of(argument: Any) -> list[Any]:
@@ -224,6 +255,125 @@ def _gathered(results: list[Any]) -> Any:
         return np.array(results, dtype=np.float64)
     parts = [_gathered(list(part)) for part in zip(*results, strict=True)]
     return type(first)(*parts) if hasattr(first, "_fields") else tuple(parts)
+
+
+def _chosen(test: Any, yes: Callable[[], Any], no: Callable[[], Any]) -> Any:
+    if isinstance(test, np.ndarray):
+        return _where(test, yes(), no())
+    return yes() if test else no()
+
+
+def _where(test: Any, yes: Any, no: Any) -> Any:
+    if not isinstance(test, np.ndarray):
+        return yes if test else no
+    if isinstance(yes, tuple):
+        parts = [_where(test, one, other) for one, other in zip(yes, no, strict=True)]
+        return type(yes)(*parts) if hasattr(yes, "_fields") else tuple(parts)
+    return np.where(test, yes, no)
+
+
+def _extreme(is_beyond: Callable[[Any, Any], Any], first: Any, *others: Any) -> Any:
+    """The largest or smallest as Python has it: of equal numbers the first, also of 0 and -0."""
+    for other in others:
+        # A strict comparison, as Python's max has it; np.maximum would take 0.0 over -0.0, and spread NaN.
+        first = _where(is_beyond(other, first), other, first)
+    return first
+
+
+def _without_fraction(number: Any) -> Any:
+    # Python has no whole number -0.
+    return np.trunc(number) + 0.0 if isinstance(number, np.ndarray) else int(number)
+
+
+def _as_float(number: Any) -> Any:
+    return number.astype(np.float64) if isinstance(number, np.ndarray) else float(number)
+
+
+_OF_COLUMNS: dict[str, Callable[..., Any]] = {  # of one number, of two, or of any
+    "_chosen": _chosen,
+    "_all": np.logical_and,
+    "_any": np.logical_or,
+    "_not": np.logical_not,
+    "_quotient": np.divide,
+    "_root": np.sqrt,
+    "max": partial(_extreme, operator.gt),
+    "min": partial(_extreme, operator.lt),
+    "int": _without_fraction,
+    "float": _as_float,
+}
+_SAME_IN_COLUMNS = frozenset({"abs", "range", *_OF_COLUMNS})
+
+
+def _call(name: str, *arguments: ast.expr) -> ast.expr:
+    return ast.Call(ast.Name(name, ast.Load()), list(arguments), [])
+
+
+def _later(value: ast.expr) -> ast.Lambda:
+    return ast.Lambda(ast.arguments([], [], None, [], [], None, []), value)
+
+
+class _ForColumns(ast.NodeTransformer):
+    """Writes the operations of a function for columns. ProgramError for what has no such form."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self.known = function.__globals__.keys() - set(function.__code__.co_varnames)
+
+    def visit(self, node: ast.AST) -> Any:
+        """Write a node."""
+        if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not self.is_elementwise(node):
+            raise ProgramError(f"'{ast.unparse(node)}' has no form for columns")
+        return super().visit(node)
+
+    def is_elementwise(self, node: ast.AST) -> bool:
+        """True where columns can stand for numbers."""
+        if isinstance(node, ast.BinOp):
+            return isinstance(node.op, ast.Add | ast.Sub | ast.Mult | ast.Div)
+        if isinstance(node, ast.Compare):
+            return len(node.ops) == 1
+        if isinstance(node, ast.For) and isinstance(node.iter, ast.Call):
+            # The ends of a counted loop are constants of the module or of the text.
+            names = {name.id for name in ast.walk(node.iter) if isinstance(name, ast.Name)} - {"range"}
+            return names <= self.known
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            return node.func.id not in COMPILED_BUILTINS - _SAME_IN_COLUMNS
+        # NumPy's other functions differ from ``math`` in the last bits.
+        called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
+        return called == "math.sqrt" or not called.startswith("math.")
+
+    def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
+        node.body = [self.visit(line) for line in node.body if not isinstance(line, ast.Assert)]
+        return node
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        test, yes, no = (self.visit(part) for part in (node.test, node.body, node.orelse))
+        return _call("_chosen", test, _later(yes), _later(no))
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        # Both sides are computed: columns have no short circuit.
+        name = "_all" if isinstance(node.op, ast.And) else "_any"
+        joined: ast.expr
+        joined, *others = (self.visit(part) for part in node.values)
+        for other in others:
+            joined = _call(name, joined, other)
+        return joined
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
+        inner = self.visit(node.operand)
+        return _call("_not", inner) if isinstance(node.op, ast.Not) else ast.UnaryOp(node.op, inner)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
+        left, right = self.visit(node.left), self.visit(node.right)
+        # np.divide gives inf over 0 where Python's quotient raises, as compiled code does.
+        return _call("_quotient", left, right) if isinstance(node.op, ast.Div) else ast.BinOp(left, node.op, right)
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        if ast.unparse(node.func) == "math.sqrt":
+            return _call("_root", *map(self.visit, node.args))
+        return self.generic_visit(node)
+
+
+COLUMNS = Operations(_ForColumns, _OF_COLUMNS)
+"""Operations of whole columns."""
 
 
 # Operations that go on where Python would raise, with what compiled code gives there: a run that diverges divides by
@@ -285,3 +435,18 @@ def _math() -> SimpleNamespace:
 
 MATH = _math()
 """The module ``math``: infinite where a function overflows, NaN where it has no value."""
+
+
+class _GoingOn(ast.NodeTransformer):
+    def __init__(self, _function: FunctionType) -> None:
+        """Any function can go on."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.Div):
+            return node
+        return ast.copy_location(_call("_quotient", node.left, node.right), node)
+
+
+GOING_ON = Operations(_GoingOn, {"_quotient": quotient, "int": whole_part})
+"""Operations that go on where Python would raise."""

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.in_python import functions_of
+from ppafo.engine.in_python import GOING_ON, Operations, functions_of
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.step import loop
@@ -36,11 +36,11 @@ class PythonProgram:
         # What was written before Python raised is as it was: the steps are done again from where they began.
         before = [array.copy() for array in arrays[:2]]
         try:
-            self._advanced(states, parameters, arrays, clock, goes_on=False)
+            self._advanced(states, parameters, arrays, clock, None)
         except (ArithmeticError, ValueError):
             for array, kept in zip(arrays, before, strict=False):
                 array[:] = kept
-            self._advanced(states, parameters, arrays, clock, goes_on=True)
+            self._advanced(states, parameters, arrays, clock, GOING_ON)
 
     def _advanced(
         self,
@@ -48,15 +48,15 @@ class PythonProgram:
         parameters: Floats,
         arrays: tuple[Floats, ...],
         clock: tuple[Any, ...],
-        goes_on: bool,
+        operations: Operations | None,
     ) -> None:
         """Run the loop over steps on lanes made of the rows, and write their states back.
 
-        With ``goes_on``, operations that Python refuses give what compiled code gets.
+        With ``GOING_ON``, operations that Python refuses give what compiled code gets.
         """
         program = self._program
         lanes = PythonLanes(program, states, parameters, *arrays)
-        linked = functions_of(program, lanes, goes_on)
+        linked = functions_of(program, lanes, operations)
         parts: Any = linked.parts(program)
         linked.of(loop.advance)(parts, lanes, *clock)
         for number, lane in enumerate(lanes.lanes):

@@ -218,9 +218,7 @@ class Reduction:
         read = self.definition.read_in(node)
         if read & self.running or not read & self.known.keys():
             return _UNKNOWN
-        for name in read - self.known.keys():
-            if name in self.scope:
-                self.collector.note_read(self.scope, name)
+        self.note_reads(node)
         try:
             return self.definition.value(node, self.scope, self.known)
         except (NameError, AttributeError, TypeError) as error:
@@ -231,12 +229,23 @@ class Reduction:
         value = self.value_of(node)
         if value is not _UNKNOWN:
             return value
+        self.note_reads(node)
         if isinstance(node, ast.Name) and node.id not in self.running:
             return self.scope.get(node.id, getattr(builtins, node.id, _UNKNOWN))
         if isinstance(node, ast.Attribute):
             owner = self.outside(node.value)
             return getattr(owner, node.attr, _UNKNOWN) if isinstance(owner, types.ModuleType) else _UNKNOWN
         return _UNKNOWN
+
+    def note_reads(self, node: ast.expr) -> None:
+        """Keep which names from outside an expression asks, those of modules too: with another value, all is other."""
+        for inner in ast.walk(node):
+            if isinstance(inner, ast.Name) and inner.id in self.scope and inner.id not in self.known:
+                self.collector.note_read(self.scope, inner.id)
+            if isinstance(inner, ast.Attribute) and isinstance(inner.value, ast.Name):
+                owner = self.scope.get(inner.value.id)
+                if isinstance(owner, types.ModuleType) and hasattr(owner, inner.attr):
+                    self.collector.note_read(vars(owner), inner.attr)
 
     def written(self, value: Any) -> ast.expr:
         """An expression for a value that is known."""

@@ -36,6 +36,8 @@ COMPILED_BUILTINS = frozenset(
 Row = TypeVar("Row", bound=tuple[Any, ...])
 _INSIDE = object()
 """Stands for a value that is known only while the function runs."""
+_INSTEAD = {"print": "; take it out: under PPAFO_BACKEND=python a debugger stops in the function"}
+"""Remedies for functions of Python."""
 
 
 def each(convert: Callable[[float], float], row: Row) -> Row:
@@ -118,6 +120,15 @@ class Composer(ast.NodeTransformer):
         if isinstance(node.value, ast.Constant):
             return ast.copy_location(ast.Pass(), node)
         return ast.copy_location(ast.Expr(self.visit(node.value)), node)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        """Refuse a power with a number that is written out: compilers and Python differ in its last bits."""
+        left, right = self.visit(node.left), self.visit(node.right)
+        if isinstance(node.op, ast.Pow) and any(map(_is_written_out, (left, right))):
+            times = {"2": 2, "2.0": 2, "3": 3, "3.0": 3}.get(ast.unparse(right), 0)
+            product = f"write '{' * '.join([ast.unparse(node.left)] * times)}'" if times else "make both parameters"
+            raise self.refuse(node, f"'{ast.unparse(node)}' cannot be compiled; {product}")
+        return ast.copy_location(ast.BinOp(left, node.op, right), node)
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace a name from outside."""
@@ -282,7 +293,7 @@ class Composer(ast.NodeTransformer):
             if node.id in COMPILED_BUILTINS:
                 return getattr(builtins, node.id)
             if hasattr(builtins, node.id):
-                raise self.refuse(node, f"'{node.id}' cannot be compiled")
+                raise self.refuse(node, f"'{node.id}' cannot be compiled{_INSTEAD.get(node.id, '')}")
             hint = nearest_name(node.id, [*self.local, *scope, *COMPILED_BUILTINS])
             remedy = "; import math" if node.id == "math" else ""
             raise self.refuse(node, f"there is no '{node.id}'{hint}{remedy}")
@@ -353,6 +364,11 @@ class Composer(ast.NodeTransformer):
             f"cannot compile {self.function.__qualname__}: {name} is not a number, a tuple of numbers, a plain "
             f"function, a NamedTuple or the module math",
         )
+
+
+def _is_written_out(node: ast.expr) -> bool:
+    """True for a number in a text, with a sign or without."""
+    return isinstance(node.operand if isinstance(node, ast.UnaryOp) else node, ast.Constant)
 
 
 def _parameters(code: types.CodeType) -> tuple[str, ...]:

@@ -195,7 +195,7 @@ def list_gaits() -> tuple[str, ...]:
     return _FILE.names()
 
 
-@checked(name_or_path="gait")
+@checked
 def load_gait(gait: str | Path = NORMATIVE) -> Gait:
     """Return a gait by its name in the package or by the path of a gait file (TOML), in SI units.
 

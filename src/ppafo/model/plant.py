@@ -15,9 +15,12 @@ atmosphere and for a relieving supply, 0 for a supply with a check valve.
 from typing import NamedTuple
 
 from ppafo.model.columns import Numeric
-from ppafo.model.elementary import QUARTER_TURN
+from ppafo.model.elementary import QUARTER_TURN, TURN
 from ppafo.model.orifice import FlowCurve, check_valve_flow, check_valve_flow_slopes, orifice_flow, orifice_flow_slopes
 from ppafo.model.ports import exhaust_path, load_torque, supply_path
+
+HALF_TURN = 0.5 * TURN
+"""rad."""
 
 
 class PlantParameters(NamedTuple):
@@ -120,15 +123,20 @@ def joint_torque(plant: PlantParameters, _angle: float, pressure_1: float, press
     return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
 
 
-def gravity_torque(angle: Numeric, largest_torque: float) -> Numeric:
+def gravity_torque(angle: float, largest_torque: float) -> float:
     """Torque [N m] that gravity takes from the vane (it is subtracted in equation (1)), for an upright shank.
 
     The foot plate is level at 90 deg, where gravity pulls the toes down with ``largest_torque`` = m g l, that is in
-    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 within 0 to
-    180 deg, because a call of a library cosine would keep the loop over runs from vector code.
+    plantarflexion, so the value is negative. The cosine of the slope is a power series, good to 1e-8 at every angle
+    that a set may state, because a call of a library cosine would keep the loop over runs from vector code.
     """
+    slope = abs(angle - QUARTER_TURN)
+    # The cosine is even and periodic: a slope of up to 5 half turns comes within one half turn of level.
+    slope = abs(slope - TURN) if slope > HALF_TURN else slope
+    slope = abs(slope - TURN) if slope > HALF_TURN else slope
+    is_upside_down = slope > QUARTER_TURN
+    slope = HALF_TURN - slope if is_upside_down else slope
     # Terms up to x^12 of the cosine, by Horner's rule from the last one.
-    slope = angle - QUARTER_TURN
     square = slope * slope
     cosine = 1.0 / 479001600.0 * square - 1.0 / 3628800.0
     cosine = cosine * square + 1.0 / 40320.0
@@ -136,7 +144,7 @@ def gravity_torque(angle: Numeric, largest_torque: float) -> Numeric:
     cosine = cosine * square + 1.0 / 24.0
     cosine = cosine * square - 0.5
     cosine = cosine * square + 1.0
-    return -largest_torque * cosine
+    return (largest_torque if is_upside_down else -largest_torque) * cosine
 
 
 def net_driving_torque(actuator: float, gravity: float, external: float) -> float:

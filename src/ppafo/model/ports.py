@@ -55,7 +55,7 @@ def friction_in_motion(torque: float, angular_velocity: float, pressure_1: float
     return torque
 
 
-def load_torque(torque: float, angle: float, angular_velocity: float) -> float:
+def load_torque(torque: float, angle: float, rate: float) -> float:
     """Torque [N m] that a load takes from the joint at an angle [rad] and a rate [rad/s]; it is subtracted.
 
     Given what other loads take, 0 without any. Equation (1). What it takes at a rate of 0 friction may hold, as it does

@@ -40,7 +40,7 @@ _LABELS = {
 }
 
 
-@checked("scenarios", "overrides")
+@checked
 def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
     """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
 

@@ -194,7 +194,7 @@ def list_sets() -> tuple[str, ...]:
     return _FILE.names()
 
 
-@checked("parameter_set", "valve", "overrides", name_or_path="parameter_set")
+@checked
 def load_device(
     parameter_set: ParameterSet | str | Path,
     *,
@@ -221,7 +221,7 @@ def load_device(
     return build_device(with_overrides(loaded, given, valve), valve)
 
 
-@checked(name_or_path="parameter_set")
+@checked
 def load_parameter_set(parameter_set: str | Path, *, plugins: Plugins = ()) -> ParameterSet:
     """Return a parameter set by its name in the package or by the path of a TOML file.
 

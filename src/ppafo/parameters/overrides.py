@@ -162,7 +162,7 @@ def either(path: str, forms: Forms = FORMS) -> str:
     return f"give either {' or '.join(' and '.join(f'{section}.{name}' for name in way) for way in ways)}, not both"
 
 
-@checked("parameter_set", "overrides", "valve")
+@checked
 def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
     """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
 

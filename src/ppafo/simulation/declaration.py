@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.catalog import CONTROLLERS, FIXED_POINT, PROFILES
+from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.models import quote
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
@@ -71,8 +71,6 @@ WALL_AREA = "gas_model.wall_area_per_volume"
 RATE = Quantity("rate", "Hz", "samples per second; or give the period", None, 1.0e-6, 1.0e8)
 PERIOD = Quantity("period", "s", "time between two samples; or give the rate", None, 1.0e-8, 1.0e6)
 SAMPLING = (RATE, PERIOD)
-ARITHMETIC = "controller.arithmetic"
-"""What integer controllers were once chosen by."""
 
 REFERENCE_OF = "reference.of"
 PURPOSE = "reference.beyond_reach"
@@ -94,9 +92,6 @@ SUPPLY_LINES = tuple(line.name for line in fields(SupplyLine))
 
 _REGULATED = quantities_of(RegulatedLine)
 
-RENAMED_MOTIONS = {"led": "prescribed", "held": "locked"}
-RENAMED_CONTROLLERS = {f"{name}_on_chip": f"{name}{FIXED_POINT}" for name in ("pid", "on_off", "on_off_dead_zone")}
-"""Kinds of motion and controllers by their names in an earlier version."""
 SECTIONS = (
     "device",
     "run",
@@ -256,16 +251,9 @@ def texts(document: Mapping[str, Any]) -> tuple[str, ...]:
 def find_kinds(document: Mapping[str, Any], file: str) -> None:
     """Load the kinds that a document names, where other packages have them; ``file`` is for the message.
 
-    ScenarioError where one cannot be loaded or has an old name.
+    ScenarioError where one cannot be loaded.
     """
     check_motion_kind(kind_at(document, "motion"), f"{file}: motion.kind")
-    law = kind_at(document, "controller")
-    if law in RENAMED_CONTROLLERS:
-        raise ScenarioError(f"{file}: the controller '{law}' is now called '{RENAMED_CONTROLLERS[law]}'")
-    old = value_at(document, ARITHMETIC)
-    if old is not None:
-        said = no_arithmetic(law, old)
-        raise ScenarioError(f"{file}: {ARITHMETIC} = {quote(old)}: {said}")
     kind = kind_at(document, "motion")
     # A kind that is missing is refused by the layout, which says what it may be.
     with refused_as(ScenarioError, f"{file}: motion.kind", KindError):
@@ -285,21 +273,8 @@ def find_kinds(document: Mapping[str, Any], file: str) -> None:
             kinds.get(kind_at(document, section))
 
 
-def no_arithmetic(kind: str, text: object) -> str:
-    """Return what to write in the place of ``controller.arithmetic``, which ``text`` was once given for."""
-    if text == "float":
-        return "is no setting any more; leave it out: every controller but the fixed-point ones computes with floats"
-    integer = kind if kind.endswith(FIXED_POINT) else f"{kind}{FIXED_POINT}"
-    if integer in CONTROLLERS:
-        return f'is no setting any more; leave it out and write controller.kind = "{integer}"'
-    known = ", ".join(name for name in CONTROLLERS if name.endswith(FIXED_POINT))
-    return f"is no setting any more, and '{kind}' has no fixed-point form; controllers that have one: {known}"
-
-
 def check_motion_kind(kind: object, place: str) -> None:
-    """Raise ScenarioError for an old name, or for the motion of a leg that walks; ``place`` begins the message."""
-    if isinstance(kind, str) and kind in RENAMED_MOTIONS:
-        raise ScenarioError(f"{place}: the kind of motion '{kind}' is now called '{RENAMED_MOTIONS[kind]}'")
+    """Raise ScenarioError for the motion of a leg that walks; ``place`` begins the message."""
     with refused_as(ScenarioError, place, KindError):
         walks = isinstance(kind, str) and is_walk(kind)
     if walks:

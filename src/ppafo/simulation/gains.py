@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
-from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
+from ppafo.model.ports import load_torque
 from ppafo.parameters.graph import Term
+from ppafo.parameters.plant import effects_of
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
@@ -29,6 +31,11 @@ _OF_LOOP = frozenset(
         angle_loop.GRAVITY,
         angle_loop.INERTIA,
         angle_loop.FRICTION,
+        angle_loop.STATIC_FRICTION,
+        angle_loop.LOAD_TIME,
+        angle_loop.TORQUE_LAG,
+        angle_loop.TOLERANCE,
+        angle_loop.REST_DISTANCE,
     )
 )
 
@@ -56,6 +63,8 @@ class Gains:
     torque_rate: float
     dead_time: float
     unit: str = "N m"
+    unknown_loads: tuple[str, ...] = ()
+    """Effects that load the joint, where a gain is computed from the joint: none of them is in it."""
 
     @property
     def sentence(self) -> str:
@@ -66,7 +75,8 @@ class Gains:
             for computed, origin in ((False, "(given)"), (True, f"(computed from the device: {loop})"))
             if any(gain.computed == computed for gain in self.gains)
         ]
-        return f"gains: {'; '.join(parts)}"
+        without = f"; without the load of {', '.join(self.unknown_loads)}" if self.unknown_loads else ""
+        return f"gains: {'; '.join(parts)}{without}"
 
 
 def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]:
@@ -98,4 +108,10 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     )
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit)
+    of_joint = any(gain.computed for gain in gains) and scenario.controlled == ANGLE
+    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, _loads_of(scenario) if of_joint else ())
+
+
+def _loads_of(scenario: Scenario) -> tuple[str, ...]:
+    """Return the sections of the effects that load the joint of a scenario."""
+    return tuple(effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws)

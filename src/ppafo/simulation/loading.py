@@ -138,7 +138,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     lines = read_supply_line(reading, device)
     controlled = _controlled(reading)
     reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
-    control, of_control = _control(reading, device, clock.period, sensors, lines, motion)
+    control, of_control = _control(reading, device, clock.period, sensors, lines, motion, reference)
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -262,6 +262,7 @@ def _control(
     sensors: Sensors,
     lines: SupplyLine | None,
     motion: Motion,
+    reference: ProfileChoice,
 ) -> tuple[Control, Graph]:
     """Return the controller with its sample period [s], and which of its settings [SI] follow other numbers."""
     kind = kind_at(reading.document, "controller")
@@ -271,12 +272,13 @@ def _control(
         return Control(kind, reading.section("controller", items), period), {}
     rows = None if lines is None else lines.row(device.supply)
     is_locked = getattr(motion, "locked_angle", None) is not None and motion.motion_kind.name == "locked"
-    seen = seen_in_scenario(controlled, leg is not None, is_locked)
+    seen = seen_in_scenario(controlled, leg is not None, is_locked, reference.kind)
     terms = nominal_terms(device, rows) | loop_terms(device, CONTROLLERS[kind], seen, controlled)
     of_sensors = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
     present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
     if is_locked:
         present |= {LOCKED_ANGLE: motion.locked_angle}
+    present |= {f"reference.{name}": number for name, number in reference.settings.items()}
     if leg is not None:
         present |= {path: getattr(leg, path.removeprefix("motion.")) for path in LEG_PATHS}
     followed, links = read_followers(reading, {"controller": items}, terms, device, present)

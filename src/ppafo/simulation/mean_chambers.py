@@ -1,6 +1,6 @@
-"""What an actuator of any kind is like in the middle of its range: torque per pressure and volume of each chamber.
+"""Chambers of an actuator of any kind at an angle: torque per pressure and volume of each.
 
-A vane is taken with the foot at a right angle, or 0.2 rad inside a stop where that comes first.
+Where nobody knows where the joint is, they are taken at a right angle, or in the middle of a range without one.
 """
 
 from collections.abc import Callable
@@ -70,10 +70,9 @@ class ShapedParts(NamedTuple):
 
 
 class UsualParts(NamedTuple):
-    """Chambers of an actuator at an angle [rad], and the angle where nobody knows where the joint is [rad]."""
+    """Chambers of an actuator at an angle [rad]."""
 
     at: Callable[[Any, Range, Surroundings, float], MeanChambers]
-    place: Callable[[Range], float]
 
 
 def measured_shape_of(settings: Any, stops: Range, *, parts: MeasuredParts) -> Any:
@@ -81,11 +80,10 @@ def measured_shape_of(settings: Any, stops: Range, *, parts: MeasuredParts) -> A
     return parts.prepare(settings, stops, parts.table)
 
 
-def inside_stops(lowest: float, highest: float) -> float:
-    """A right angle [rad], or 0.2 rad inside the stop before it; the middle of a range of less than 0.4 rad."""
-    middle = 0.5 * (lowest + highest)
-    inside: float = min(max(RIGHT_ANGLE, lowest + INSIDE), highest - INSIDE)
-    return inside if highest - lowest > 2.0 * INSIDE else middle
+def usual_place(lowest: float, highest: float) -> float:
+    """Angle [rad] for the gains of a joint that may be anywhere: a right angle, or the middle of a range without it."""
+    has_right_angle = lowest + INSIDE <= RIGHT_ANGLE <= highest - INSIDE
+    return RIGHT_ANGLE if has_right_angle else 0.5 * (lowest + highest)
 
 
 def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: float) -> MeanChambers:
@@ -131,19 +129,9 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
     )
 
 
-def middle_of(stops: Range) -> float:
-    """Middle of the range [rad]."""
-    return 0.5 * (stops.angle_min + stops.angle_max)
-
-
-def right_angle_in(stops: Range) -> float:
-    """A right angle [rad], or 0.2 rad inside a stop."""
-    return inside_stops(stops.angle_min, stops.angle_max)
-
-
 def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: UsualParts) -> MeanChambers:
     """Both chambers where nobody knows where the joint is."""
-    return parts.at(settings, stops, around, parts.place(stops))
+    return parts.at(settings, stops, around, usual_place(stops.angle_min, stops.angle_max))
 
 
 def vane_growth(settings: VaneSettings, _stops: Range, _around: Surroundings) -> float:
@@ -183,13 +171,13 @@ def chambers_of(device: Device) -> ChambersOf:
         for quantity in quantities_of(row)
     )
     if actuator.kind == VANE:
-        usual = made_of(usual_chambers, "usual_chambers_of_vane", UsualParts(vane_at, right_angle_in))
+        usual = made_of(usual_chambers, "usual_chambers_of_vane", UsualParts(vane_at))
         return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
     name, model, shape = actuator.kind, kind.model, kind.model.prepare
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", MeasuredParts(model.prepare, actuator.table))
     shaped = ShapedParts(shape, model.chambers, model.torque)
     at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
-    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", UsualParts(at, middle_of))
+    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", UsualParts(at))
     growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
     return ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)

@@ -108,9 +108,8 @@ class VaneKind:
         from ppafo.simulation.torque_loop import seen_in_scenario
 
         motion = vane_motion(scenario)
-        return seen_in_scenario(
-            scenario.controlled, motion.leg is not None, scenario.motion.motion_kind.name == "locked"
-        )
+        is_locked = scenario.motion.motion_kind.name == "locked"
+        return seen_in_scenario(scenario.controlled, motion.leg is not None, is_locked, scenario.reference.kind)
 
     def follows_reference(self, scenario: Scenario) -> bool:
         """Tell whether there is a law that follows the reference, and not a constant command."""

@@ -37,12 +37,14 @@ class Clock:
 class Seen(NamedTuple):
     """How a law sees what it controls: the row of its signals, how late they are, and the paths that fill the row.
 
-    ``turning`` makes inertia and gravity torque of the row for a law of an angle; None for any other.
+    ``places`` makes the two angles [rad] between which the joint is of the stops and the row. ``turning`` makes inertia
+    and gravity torque of the row for a law of an angle; None for any other.
     """
 
     signals: type
     late: PlainFunction
     paths: tuple[str, ...]
+    places: PlainFunction
     turning: PlainFunction | None = None
 
 

@@ -16,7 +16,7 @@ from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
-from ppafo.simulation.declaration import ARITHMETIC, OF_A_VANE, Declared, kind_at, no_arithmetic, value_at
+from ppafo.simulation.declaration import OF_A_VANE, Declared, value_at
 from ppafo.units import SI, number_text
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -62,9 +62,6 @@ def apply_overrides(
         if path not in known:
             # Where a kind is unknown too, that is the mistake.
             declared.find_kinds(changed, file)
-            if path == ARITHMETIC:
-                instead = no_arithmetic(kind_at(changed, "controller"), own[path].text)
-                raise ScenarioError(f"override '{own[path]}': {instead}")
             raise _unused(path, own, (*known, *declared.same), file)
     for path in waiting:
         if path in declared.appended:

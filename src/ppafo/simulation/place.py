@@ -5,13 +5,12 @@ from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.parameters.device import Actuator, Device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque
-from ppafo.simulation.mean_chambers import LEAST_GAUGE, inside_stops
+from ppafo.simulation.mean_chambers import LEAST_GAUGE, usual_place
 
 
 def place_of_gains(actuator: Actuator) -> float:
     """Angle [rad] at which the gains of a law take the chambers of an actuator that moves."""
-    ends = float(actuator.angle_min), float(actuator.angle_max)
-    return inside_stops(*ends) if ACTUATORS[actuator.kind].model.shape is None else 0.5 * (ends[0] + ends[1])
+    return usual_place(float(actuator.angle_min), float(actuator.angle_max))
 
 
 def quicker_at(device: Device, angle: float, controlled: str) -> float:

@@ -14,6 +14,7 @@ from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
+from ppafo.units.shown import in_units
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
@@ -126,6 +127,7 @@ def range_text(stops: tuple[float, float]) -> str:
     return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"
 
 
+@in_units(lambda scenario: scenario.device.shown)
 def reference_problem(scenario: Scenario) -> str:
     """Return why no controller could follow the reference of a scenario of a vane; an empty text where one might."""
     if scenario.controlled == TORQUE:

@@ -22,7 +22,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Term
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import LOCKED_ANGLE
-from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
+from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of, usual_place
 from ppafo.simulation.motion_kind import Seen
 from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
@@ -34,7 +34,9 @@ _OF_DEVICE = (
     "foot_plate.gravity_torque",
     "friction.viscous_damping",
     "friction.dynamic_torque",
+    "friction.static_torque",
 )
+_OF_ANGLE = ("sensors.angle_bandwidth", "sensors.angle_resolution", "sensors.angle_noise")
 LEG_PATHS = ("motion.foot_mass", "motion.foot_mass_centre", "motion.foot_inertia")
 """What the foot of a leg adds."""
 
@@ -54,6 +56,7 @@ _Hertz = Annotated[float, Number("Hz", "")]
 _Inertia = Annotated[float, Number("kg m^2", "")]
 _Torque = Annotated[float, Number("N m", "")]
 _Damping = Annotated[float, Number("N m s/rad", "")]
+_Angle = Annotated[float, Number("rad", "")]
 _Mass = Annotated[float, Number("kg", "")]
 _Length = Annotated[float, Number("m", "")]
 
@@ -73,13 +76,30 @@ class Signals(NamedTuple):
     delay: _Seconds
 
 
-_Joint = {"inertia": _Inertia, "gravity_torque": _Torque, "viscous_damping": _Damping, "dynamic_torque": _Torque}
-Locked: Any = row_with("Locked", Signals, locked_angle=Annotated[float, Number("rad", "")])
+_Joint = {
+    "angle_resolution": _Angle,
+    "angle_noise": _Angle,
+    "inertia": _Inertia,
+    "gravity_torque": _Torque,
+    "viscous_damping": _Damping,
+    "dynamic_torque": _Torque,
+    "static_torque": _Torque,
+}
+Locked: Any = row_with("Locked", Signals, locked_angle=_Angle)
 """Signals of a joint that is locked, with its angle [rad]."""
 OfJoint: Any = row_with("OfJoint", Signals, angle_bandwidth=_Hertz, **_Joint)
-"""Signals of a scenario with bandwidth of the angle sensor [Hz]; what turns, and its friction."""
+"""Signals of a scenario, bandwidth [Hz], resolution and noise [rad] of its angle sensor; what turns, its friction."""
 OfLeg: Any = row_with("OfLeg", OfJoint, foot_mass=_Mass, foot_mass_centre=_Length, foot_inertia=_Inertia)
 """Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
+_Ramp = {"start_level": _Angle, "level": _Angle}
+_Sine = {"level": _Angle, "amplitude": _Angle}
+JointAtLevel: Any = row_with("JointAtLevel", OfJoint, level=_Angle)
+LegAtLevel: Any = row_with("LegAtLevel", OfLeg, level=_Angle)
+JointOnRamp: Any = row_with("JointOnRamp", OfJoint, **_Ramp)
+LegOnRamp: Any = row_with("LegOnRamp", OfLeg, **_Ramp)
+JointOnSine: Any = row_with("JointOnSine", OfJoint, **_Sine)
+LegOnSine: Any = row_with("LegOnSine", OfLeg, **_Sine)
+"""Signals with the settings of a reference of the angle [rad]."""
 
 
 class SpoolParts(NamedTuple):
@@ -88,36 +108,47 @@ class SpoolParts(NamedTuple):
     follow_time: Callable[[Any], float]
 
 
-class ChamberParts(NamedTuple):
-    """Chambers of an actuator: where the joint is anywhere between its stops, and at an angle [rad]."""
-
-    usual: Callable[[Any, Range, Surroundings], MeanChambers]
-    at: Callable[[Any, Range, Surroundings, float], MeanChambers]
-
-
-def chambers_of_moving_joint(
-    settings: Any, stops: Range, around: Surroundings, _signals: Any, *, parts: ChamberParts
-) -> MeanChambers:
-    """Chambers for the gains of a joint that moves."""
-    return parts.usual(settings, stops, around)
+def anywhere(stops: Range, _signals: Any) -> tuple[float, float]:
+    """Place [rad], twice, of a joint that may be anywhere."""
+    place = usual_place(stops.angle_min, stops.angle_max)
+    return place, place
 
 
-def chambers_of_locked_joint(
-    settings: Any, stops: Range, around: Surroundings, signals: Any, *, parts: ChamberParts
-) -> MeanChambers:
-    """Chambers for the gains of a joint that is locked: those at its angle."""
-    return parts.at(settings, stops, around, signals.locked_angle)
+def where_locked(_stops: Range, signals: Any) -> tuple[float, float]:
+    """Place [rad], twice, of a joint that is locked."""
+    return signals.locked_angle, signals.locked_angle
+
+
+def at_level(stops: Range, signals: Any) -> tuple[float, float]:
+    """Place [rad], twice, of a joint whose angle is to be constant."""
+    return between(stops, signals.level), between(stops, signals.level)
+
+
+def at_both_levels(stops: Range, signals: Any) -> tuple[float, float]:
+    """Places [rad] of a joint whose angle is to go from one level to another."""
+    return between(stops, signals.start_level), between(stops, signals.level)
+
+
+def at_both_crests(stops: Range, signals: Any) -> tuple[float, float]:
+    """Places [rad] of a joint whose angle is to be a sine."""
+    return between(stops, signals.level - signals.amplitude), between(stops, signals.level + signals.amplitude)
+
+
+def between(stops: Range, angle: float) -> float:
+    """The angle between the stops that is nearest to an angle [rad]."""
+    return float(min(max(angle, stops.angle_min), stops.angle_max))
 
 
 class LoopParts(NamedTuple):
     """What a loop is made of, each by the rows that it takes.
 
-    The chambers of the actuator, R T times the conductance of the valve [m^3/s], how late the valve follows a command
-    [s] once it is sampled every period [s], how late the measurements are [s], and how what is controlled goes with the
-    pressure in each chamber.
+    The chambers of the actuator at an angle [rad], the two angles [rad] between which the joint is, R T times the
+    conductance of the valve [m^3/s], how late the valve follows a command [s] once it is sampled every period [s], how
+    late the measurements are [s], and how what is controlled goes with the pressure in each chamber.
     """
 
-    mean_chambers: Callable[[Any, Range, Surroundings, Any], MeanChambers]
+    chambers_at: Callable[[Any, Range, Surroundings, float], MeanChambers]
+    places: Callable[[Range, Any], tuple[float, float]]
     valve_flow: Callable[[FlowNumbers], float]
     time_of_valve: Callable[[Any, float], float]
     time_of_signals: Callable[[Any], float]
@@ -223,11 +254,18 @@ def loop_of(
     *,
     parts: LoopParts,
 ) -> TorqueLoop:
-    """The loop of a device at a constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure."""
-    mean = parts.mean_chambers(settings, stops, around, signals)
+    """The loop of a device at a constant volume: R = K q max(P_1 / V_1, P_2 / V_2), theta; K 1 or 0 for a pressure.
+
+    R is the larger one of the two places between which the joint is: there the loop is quickest.
+    """
+    first, last = parts.places(stops, signals)
+    here = parts.chambers_at(settings, stops, around, first)
+    there = parts.chambers_at(settings, stops, around, last)
     per_flow = max(
-        parts.per_pressure_1(mean) * around.supply_pressure / mean.volume_1,
-        parts.per_pressure_2(mean) * around.dorsiflexion_pressure / mean.volume_2,
+        parts.per_pressure_1(here) * around.supply_pressure / here.volume_1,
+        parts.per_pressure_2(here) * around.dorsiflexion_pressure / here.volume_2,
+        parts.per_pressure_1(there) * around.supply_pressure / there.volume_1,
+        parts.per_pressure_2(there) * around.dorsiflexion_pressure / there.volume_2,
     )
     return TorqueLoop(
         rate=parts.valve_flow(numbers) * per_flow,
@@ -267,8 +305,11 @@ def joint_of(
         stiffness=spring_1 + spring_2,
         damping=signals.viscous_damping,
         friction=signals.dynamic_torque,
+        static_friction=signals.static_torque,
         travel=travel,
         gravity=weight,
+        resolution=signals.angle_resolution,
+        noise=signals.angle_noise,
     )
 
 
@@ -368,6 +409,11 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.GRAVITY: angle_loop.gravity,
     angle_loop.INERTIA: angle_loop.inertia,
     angle_loop.FRICTION: angle_loop.friction,
+    angle_loop.STATIC_FRICTION: angle_loop.static_friction,
+    angle_loop.LOAD_TIME: angle_loop.load_time,
+    angle_loop.TORQUE_LAG: angle_loop.torque_lag,
+    angle_loop.TOLERANCE: angle_loop.tolerance,
+    angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
 """What follows the torque loop and the joint, and by which rule."""
 
@@ -393,23 +439,43 @@ class LoopFrames(NamedTuple):
 
 
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
-_ANGLE = (*_PRESSURES, "sensors.delay", "sensors.angle_bandwidth", *_OF_DEVICE)
-IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES)
+_ANGLE = (*_PRESSURES, "sensors.delay", *_OF_ANGLE, *_OF_DEVICE)
+IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
 """The torque in a walk."""
-IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"))
+IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"), places=anywhere)
 """A torque or a pressure of a vane alone."""
-LOCKED = Seen(signals=Locked, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay", LOCKED_ANGLE))
+LOCKED = Seen(
+    signals=Locked, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay", LOCKED_ANGLE), places=where_locked
+)
 """The same of a joint that is locked at an angle."""
+_PLACES: dict[str, tuple[tuple[type, type], tuple[str, ...], Callable[[Range, Any], tuple[float, float]]]] = {
+    "": ((OfJoint, OfLeg), (), anywhere),
+    "constant": ((JointAtLevel, LegAtLevel), ("level",), at_level),
+    "ramp_hold": ((JointOnRamp, LegOnRamp), ("start_level", "level"), at_both_levels),
+    "sine": ((JointOnSine, LegOnSine), ("level", "amplitude"), at_both_crests),
+}
+"""Rows of a joint and of a leg, and settings of a reference that say between which angles the joint is to be."""
 
 
-def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False) -> Seen:
-    """Return how the law of a vane alone sees what is controlled, on a joint with a leg's foot or without."""
-    if controlled != ANGLE:
-        return LOCKED if is_locked else IN_SCENARIO
-    if has_leg:
-        paths = (*_ANGLE, *LEG_PATHS)
-        return Seen(signals=OfLeg, late=time_with_angle, paths=paths, turning=turning_with_foot)
-    return Seen(signals=OfJoint, late=time_with_angle, paths=_ANGLE, turning=turning_alone)
+def _of_angle(reference: str, has_leg: bool) -> Seen:
+    rows, names, places = _PLACES.get(reference, _PLACES[""])
+    return Seen(
+        signals=rows[has_leg],
+        late=time_with_angle,
+        paths=(*_ANGLE, *(LEG_PATHS if has_leg else ()), *(f"reference.{name}" for name in names)),
+        places=places,
+        turning=turning_with_foot if has_leg else turning_alone,
+    )
+
+
+def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False, reference: str = "") -> Seen:
+    """Return how the law of a vane alone sees what is controlled, by its kind of reference.
+
+    The joint may have a leg's foot, or be locked.
+    """
+    if controlled == ANGLE:
+        return _of_angle(reference, has_leg)
+    return LOCKED if is_locked else IN_SCENARIO
 
 
 def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFrames:
@@ -424,11 +490,8 @@ def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFra
     is_pair = {"opening_delay", "closing_delay", "switching_interval"} <= names
     per_pressure_1, per_pressure_2 = _PER_PRESSURE.get(controlled, (torque_by_pressure_1, torque_by_pressure_2))
     parts = LoopParts(
-        mean_chambers=made_of(
-            chambers_of_locked_joint if seen is LOCKED else chambers_of_moving_joint,
-            "chambers_of_loop",
-            ChamberParts(chambers.function, chambers.at),
-        ),
+        chambers_at=chambers.at,
+        places=seen.places,
         valve_flow=sonic_flow if sonic else area_flow,
         time_of_valve=time_of_pair if is_pair else made_of(time_of_spool, "time_of_spool_valve", timed),
         time_of_signals=seen.late,

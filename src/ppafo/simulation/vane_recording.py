@@ -1,12 +1,11 @@
 """Recording and metrics of a run of a vane alone, from its rows: most runs of many are never looked at."""
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ppafo.engine.in_python import in_program, over_samples
+from ppafo.engine.in_python import over_samples, over_samples_in
 from ppafo.engine.lanes import Floats
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import Run
@@ -39,7 +38,7 @@ def measured_prescribed(scenario: Scenario, run: Run, times: Floats, rows: Mappi
 
     def external_torque(torque: Floats) -> Floats:
         acceleration = profile_values(path, times)[2]
-        gravity = gravity_torque(rows["state.angle"], plant.gravity_torque)
+        gravity = over_samples(gravity_torque, rows["state.angle"], plant.gravity_torque)
         return np.asarray(net_torques(run, rows, torque - gravity) - plant.inertia * acceleration)
 
     return measured(scenario, run, times, rows, external_torque)
@@ -141,9 +140,8 @@ def _friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Any:
 
 def _with_effects(run: Run, rows: Mapping[str, Floats], function: PlainFunction, *given: Any) -> Any:
     """Value of a function of the model at each sample, with the effects of a run in it."""
-    in_run = partial(in_program, function, run.program, run.effects)
     states = {
         name: rebuilt(row, [rows[path] for path in leaf_paths(row, name)])
         for name, row in run.program.effect_states.items()
     }
-    return over_samples(in_run(), states, *given, goes_on=partial(in_run, goes_on=True))
+    return over_samples_in(run.program, run.effects, function, states, *given)

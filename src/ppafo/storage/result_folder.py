@@ -53,8 +53,6 @@ MARK = "ppafo.json"
 
 _FORMAT = "ppafo files"
 _HASHES = "sha256"
-_RENAMED = {"endurance": "bottle"}
-"""Commands under their earlier names, whose folders belong to the new ones."""
 NOTHING_KEPT: Mapping[str, bytes] = MappingProxyType({})
 
 
@@ -73,8 +71,7 @@ def marking_command(folder: Path) -> str:
     """Return the command that ``MARK`` in a folder names, empty where it is not one of ours."""
     document = read_json(folder / MARK)
     is_own = isinstance(document, dict) and document.get("format") == _FORMAT
-    command = str(document.get("command", "")) if is_own else ""
-    return _RENAMED.get(command, command)
+    return str(document.get("command", "")) if is_own else ""
 
 
 def add_to_folder(folder: Path, contents: Mapping[str, bytes]) -> None:
@@ -240,7 +237,7 @@ def check_result_folder(folder: str | Path) -> None:
     check_owned_folder(Path(folder), _RESULT)
 
 
-@checked()
+@checked
 def read_result(folder: str | Path) -> StoredResult:
     """Return what a result folder holds. DataError for a folder that holds none.
 
@@ -290,7 +287,7 @@ WALK_RECORDING = "recording.nc"
 """What the folder of a walk has in place of a result."""
 
 
-@checked("path", "atmosphere")
+@checked
 def read_recording(
     path: "str | Path | DataFrame | Dataset",
     *,

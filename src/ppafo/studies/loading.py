@@ -47,7 +47,7 @@ def list_studies() -> tuple[str, ...]:
     return STUDY_FILES.names()
 
 
-@checked("study", "overrides", "draws", "seed")
+@checked
 def load_study(
     study: str | Path | Mapping[str, Any],
     overrides: Overrides = (),

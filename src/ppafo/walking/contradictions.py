@@ -3,6 +3,7 @@
 Any number may be an array (runs,), one for each run of an ensemble.
 """
 
+import math
 import operator
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -60,6 +61,13 @@ PAIRS = (
 _IS_BAD = {"below": operator.ge, "above": operator.le, "at most": operator.gt, "at least": operator.lt}
 
 
+_OF_DEVICE = ("actuator.angle_max", "actuator.angle_min")
+"""Stops of the device, which no key of a walk file gives."""
+_PHASES = np.linspace(0.0, 1.0, 200, endpoint=False)
+_BEYOND_STOP = math.radians(5.0)
+"""Angle by which a gait may go beyond a stop [rad]: no better is the zero of most recordings known."""
+
+
 class Contradiction(NamedTuple):
     """A path, whether its number contradicts another one, in all runs or in each (runs,), and why in one of them."""
 
@@ -76,6 +84,8 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
     """Raise ScenarioError with the first contradiction; ``reading`` says how a value was given."""
     for path, is_bad, reason in _contradictions(scenario):
         if is_bad:
+            if path in _OF_DEVICE:
+                raise ScenarioError(f"{reading.file}: {path}: {reason(0)}")
             quantity = OF_A_WALK.quantities(reading.document).get(path)
             if quantity is None or value_at(reading.document, path) is not None:
                 raise reading.refusal(path, reason(0))
@@ -108,6 +118,7 @@ def check_no_bottle(scenario: Scenario) -> None:
 
 def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     """Yield every pair of numbers that could contradict each other, with whether they do."""
+    yield from _of_stops(scenario)
     yield from _of_pairs(scenario)
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
@@ -134,6 +145,25 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
             peak + fall > 1.0,
             lambda run: f"with controller.fall_time {at(fall, run):g} the torque would end after the stride",
         )
+
+
+def _of_stops(scenario: Scenario) -> Iterator[Contradiction]:
+    """Yield the ankle angles of the gait against the stops of the device."""
+    gait, actuator = walk_of(scenario).gait, scenario.device.actuator
+    angles = gait.ankle_angle.values_at(_PHASES)
+    low, high = float(np.min(angles)), float(np.max(angles))
+    needed = f"the gait needs {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
+    highest, lowest = _OF_DEVICE
+    yield Contradiction(
+        highest,
+        actuator.angle_max < high - _BEYOND_STOP,
+        lambda run: f"{needed}, this joint ends at {_text(actuator.angle_max, run, 'rad')}",
+    )
+    yield Contradiction(
+        lowest,
+        actuator.angle_min > low + _BEYOND_STOP,
+        lambda run: f"{needed}, this joint begins at {_text(actuator.angle_min, run, 'rad')}",
+    )
 
 
 def _of_pairs(scenario: Scenario) -> Iterator[Contradiction]:

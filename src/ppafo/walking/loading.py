@@ -106,7 +106,7 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
         raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
 
 
-@checked("scenario", "overrides", "gait", "task_sequence", "bottle", "parameter_set", name_or_path="scenario")
+@checked
 def load_walk(
     scenario: str | Path,
     overrides: Overrides = (),

@@ -1,5 +1,6 @@
 """From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -9,20 +10,23 @@ from ppafo.control.controllers import switching
 from ppafo.control.kind import ControllerKind
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
+from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch
 from ppafo.engine.rows import leaf_paths, leaves, of_each, rebuilt
-from ppafo.engine.run import Run, Walk, batches_of
+from ppafo.engine.run import Run, Walk, batches_of, states_at_start
 from ppafo.engine.scheme.actuators import filled_chambers
 from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.actuators.kind import Chambers
 from ppafo.model.catalog import ACTUATORS
-from ppafo.model.columns import Problem, first, over_runs, smaller, truncated, whole
+from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, truncated, whole
+from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.gait import GaitNow, gait_at
 from ppafo.model.orifice import area_conductance
 from ppafo.model.plant import PlantParameters, PlantState
 from ppafo.model.plant_faults import SOUND, PlantFaults
+from ppafo.model.ports import load_torque
 from ppafo.model.sensors import GaitSensors
 from ppafo.model.shut_off import NOT_FITTED, ShutOff
 from ppafo.parameters.device import Device
@@ -53,6 +57,11 @@ from ppafo.walking.wearer import Build, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """A controller of walking makes its own."""
+FASTEST_FOOT = 5.0
+"""Angular velocity of the ankle [rad/s] up to which loads of a walk are followed; it comes to that in push-off."""
+SMALL_TURN = 0.01
+"""rad, over which the stiffness of a load is seen."""
+TINY = 1.0e-30
 
 
 def plan_walk(scenario: Scenario) -> Run:
@@ -104,7 +113,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         lambda plant: start_vented(device, plant, walk.initial.now),
         walk,
     )
-    return run, (too_many_steps(scenario, run.step, run.step_count),)
+    return run, (too_many_steps(scenario, run.step, run.step_count), *stiff_loads(run))
 
 
 def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
@@ -153,6 +162,39 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         record_every=whole(counts.record_every),
         needs_parts=False,
     )
+
+
+def stiff_loads(run: Run) -> tuple[Problem, ...]:
+    """Loads at the joint that change too much in a step of a walk, whose steps have one length.
+
+    A step predicts what a load takes at its end: that converges where the drag would slow the foot by less than twice
+    its speed, and a spring turn it by less than a radian of its swing.
+    """
+    program, inertia = run.program, run.plant.inertia
+    if all(load_torque not in effect.laws for effect in program.effects):
+        return ()
+
+    def growths(*rows: Any) -> tuple[float, float]:
+        count = len(program.effects)
+        taken = in_program(load_torque, program, rows[:count])
+        states = dict(zip(program.effect_states, rows[count:], strict=True))
+        at_rates = [taken(states, 0.0, QUARTER_TURN, share * FASTEST_FOOT) for share in (-1.0, -0.99, 0.99, 1.0)]
+        at_angles = [taken(states, 0.0, QUARTER_TURN + turned, 0.0) for turned in (-SMALL_TURN, SMALL_TURN)]
+        damping = max(at_rates[1] - at_rates[0], at_rates[3] - at_rates[2]) / (0.01 * FASTEST_FOOT)
+        return damping, (at_angles[1] - at_angles[0]) / (2.0 * SMALL_TURN)
+
+    damping, stiffness = of_each(growths, *run.effects, *states_at_start(run))
+    longest = smaller(2.0 * inertia / larger(damping, TINY), over_runs(math.sqrt, inertia / larger(stiffness, TINY)))
+    names = ", ".join(f"effects.{effect.name}" for effect in program.effects if load_torque in effect.laws)
+
+    def line(number: int) -> str:
+        step, most = at(run.step, number), at(longest, number)
+        return (
+            f"{names}: the load changes too much in a step of {step:.3g} s, of which a walk has equal ones: give "
+            f"run.step = {0.5e3 * most:.2g} ms or less, or a smaller load"
+        )
+
+    return ((run.step > longest, line),)
 
 
 def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chambers:

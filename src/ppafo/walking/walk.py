@@ -52,7 +52,7 @@ def silent(done: float, total: float) -> None:  # both are there for those who l
     """Ignore how far a walk is, where nobody wants to see it."""
 
 
-@checked("scenario", "minutes", "overrides", "gait", "progress", "task_sequence", "bottle")
+@checked
 def walk(
     scenario: Scenario | str | Path,
     *,
@@ -160,7 +160,7 @@ class Comparison:
         return self.with_device.status.is_completed and self.without_device.status.is_completed
 
 
-@checked("scenario", "minutes", "progress", configuration="scenario")
+@checked
 def compare_walks(
     scenario: Scenario | str | Path, *, minutes: Minutes | None = None, progress: Progress = silent
 ) -> Comparison:
@@ -324,7 +324,7 @@ class Population:
         return f"Population of {self.count} wearers, {self.scenario.name}, {self.minutes:g} min: {self.message}"
 
 
-@checked("scenario", "minutes", "wearers", "seed", "progress", configuration="scenario")
+@checked
 def walk_population(
     scenario: Scenario | str | Path,
     *,

@@ -14,7 +14,7 @@ from ppafo.errors import ArgumentError, StudyError
 TASK = "torque-task-proportional"
 
 
-@checked("mass", "overrides")
+@checked
 def walked(
     mass: Mass,
     *,
@@ -132,13 +132,3 @@ def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it() -> None:
     )
     with pytest.raises(ArgumentError, match=r"; its '\.recording' is one$"):
         ppafo.evaluate(run)  # type: ignore[arg-type]
-
-
-def test_a_table_of_pandas_is_no_list_of_the_names_of_its_columns() -> None:
-    with pytest.raises(ArgumentError, match=r"^recordings=<DataFrame>: must be a Recording"):
-        ppafo.validate("ppafo2011", ppafo.simulate("step-response").to_dataframe())
-
-
-def test_a_number_apart_from_its_unit_is_answered_with_both_in_one_text() -> None:
-    with pytest.raises(ArgumentError, match=r"reference\.level = \(3, 'N m'\): .* such as '3 N m'$"):
-        ppafo.simulate(TASK, {"reference.level": (3, "N m")})

@@ -38,7 +38,7 @@ def test_every_command_that_begins_with_a_shipped_name_has_list() -> None:
         ("simulate", ("step-response", "torque-task-solenoid")),
         ("bottle", tuple(list_bottles())),
         ("tune", ("pid-gains",)),
-        ("design", ("push-off", "torque-task")),
+        ("design", ("push-off",)),
         ("rig simulate", ("step-response", "vane-leak")),
         ("sweep", ("pressure-and-area",)),
         ("sets", ("ppafo2011", "ppafo2011-printed")),

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.cli.command_line import RENAMED
 from ppafo.cli.main import main
 from ppafo.signals import Channel, Recording
 from ppafo.storage.comma_separated import read_csv, write_csv
@@ -108,9 +107,3 @@ def test_the_folder_has_all_files_and_is_made_again(tmp_path: Path, capsys: pyte
     report = (out / "report.html").read_text(encoding="utf-8").replace("\N{NO-BREAK SPACE}", " ")
     assert "<td><code>bottle.room_heat_transfer</code></td><td>0.5 W/K</td><td>assumed</td>" in report
     assert (out / "endurance.png").stat().st_size > 10_000
-
-
-@pytest.mark.parametrize("old", ["--gas-per-step", "--step-time"])
-def test_an_old_option_answers_with_its_new_name(old: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bottle", f"{old}=1"]) == 2
-    assert f"{old} is now called {RENAMED[old]}" in capsys.readouterr().err

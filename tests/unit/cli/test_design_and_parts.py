@@ -8,29 +8,6 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.parameters.parts import load_catalogue
 
-DESIGN = """
-schema_version = 1
-name = "tiny"
-
-[[task]]
-name = "ramp"
-scenarios = { proportional = "torque-task-proportional" }
-overrides = ["run.duration=0.3 s", "reference.ramp_time=0.2 s", "reference.level=4 N m"]
-
-[parts]
-valves = ["enfield-ls-v05s"]
-actuators = ["smc-crb2bw40-90d"]
-regulators = ["festo-lrma-qs-4"]
-
-[variables."supply.pressure"]
-lowest = "30 psi_g"
-highest = "90 psi_g"
-
-[search]
-screening = 32
-population = 16
-generations = 1
-"""
 SIZING = """
 schema_version = 1
 name = "tiny"
@@ -56,32 +33,8 @@ bottles = ["pipeline-jacpac-9oz"]
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    (tmp_path / "design.toml").write_text(DESIGN)
     (tmp_path / "sizing.toml").write_text(SIZING)
     return tmp_path
-
-
-def test_a_design_is_printed_and_written_with_its_doubts(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    out = folder / "out"
-    assert main(["design", str(folder / "design.toml"), "--out", str(out)]) == 0
-    printed = capsys.readouterr().out
-    assert "suggested: it has the smallest sum of error, gas and mass" in printed
-    assert "join(" not in printed
-    assert printed.count("\n*  enfield-ls-v05s ") == 1
-    assert "enfield-ls-v05s  mass (assumed)" in printed
-    names = ["design.json", "design.txt", "front.csv", "front.png", "front.svg", "ppafo.json", "report.html"]
-    names += ["suggested.png", "suggested.svg"]
-    assert sorted(path.name for path in out.iterdir()) == names
-    document = json.loads((out / "design.json").read_text())
-    assert 0 <= document["suggested"] < len(document["front"])
-    assert {item["part"] for item in document["doubtful"]} == {"enfield-ls-v05s", "festo-lrma-qs-4"}
-    lines = (out / "front.csv").read_text().splitlines()
-    assert lines[0] == "valve,actuator,error [N m],gas [kg],mass [kg],supply.pressure [Pa_a]"
-    assert len(lines) == 1 + len(document["front"])
-    report = (out / "report.html").read_text()
-    assert "Check before buying" in report
-    assert "mass 300\N{NO-BREAK SPACE}g is assumed" in report
-    assert "<script" not in report
 
 
 def test_a_sizing_is_printed_and_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,13 +5,23 @@ from collections.abc import Callable
 
 import pytest
 
-from ppafo.control.angle_loop import Joint, angle_damping, angle_stiffness, bandwidth, slow_loop
+from ppafo.control.angle_loop import (
+    Joint,
+    angle_damping,
+    angle_stiffness,
+    bandwidth,
+    rate_filter,
+    rest_distance,
+    slow_loop,
+    tolerance,
+)
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.control.controllers.cascade import CASCADE
-from ppafo.control.torque_loop import TorqueLoop, proportional_gain
+from ppafo.control.controllers.cascade import CASCADE, CascadeParameters
+from ppafo.control.torque_loop import TorqueLoop, beyond_dead_band, proportional_gain
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.sensors import Measurement
+from ppafo.model.valves.proportional import opening_of_command
 from ppafo.signals.recording import CHANNELS
 
 SEEN = Measurement(angle=1.4, pressure_1=3.0e5, pressure_2=1.2e5, torque=2.6)
@@ -56,7 +66,17 @@ def test_a_walk_is_offered_laws_of_a_torque_alone() -> None:
 
 
 LOOP = TorqueLoop(rate=80.0, dead_time=2.0e-3)
-JOINT = Joint(inertia=8.4e-3, stiffness=2.0, damping=4.0e-3, friction=0.02, travel=0.1, gravity=0.3)
+JOINT = Joint(
+    inertia=8.4e-3,
+    stiffness=2.0,
+    damping=4.0e-3,
+    friction=0.02,
+    static_friction=0.0,
+    travel=0.1,
+    gravity=0.3,
+    resolution=0.0,
+    noise=0.0,
+)
 
 
 def test_two_equal_roots_as_quick_as_dead_time_or_torque_rate_allow() -> None:
@@ -69,6 +89,22 @@ def test_two_equal_roots_as_quick_as_dead_time_or_torque_rate_allow() -> None:
     assert bandwidth(slow_valve, JOINT) == pytest.approx(1.0 / 0.4)
 
 
+def test_static_friction_raises_the_stiffness_up_to_a_cap() -> None:
+    plain = angle_stiffness(LOOP, JOINT)
+    breaking = angle_stiffness(LOOP, JOINT._replace(static_friction=1.5 * plain * JOINT.travel))
+    stuck = angle_stiffness(LOOP, JOINT._replace(static_friction=100.0 * plain * JOINT.travel))
+    assert breaking == pytest.approx(1.5 * plain)
+    assert stuck == pytest.approx(JOINT.inertia * (1.7 / (8.0 * LOOP.dead_time)) ** 2)
+
+
+def test_a_coarse_sensor_widens_what_counts_as_there_and_as_motion() -> None:
+    coarse = JOINT._replace(resolution=math.radians(0.5))
+    assert tolerance(LOOP, JOINT) == pytest.approx(math.radians(0.5))
+    assert tolerance(LOOP, coarse) == pytest.approx(math.radians(1.0))
+    assert rest_distance(LOOP, coarse) > coarse.resolution > rest_distance(LOOP, JOINT)
+    assert rate_filter(LOOP, coarse) > rate_filter(LOOP, JOINT)
+
+
 def test_a_law_on_the_angle_alone_keeps_half_the_gain_at_which_the_mass_swings_on_its_gas() -> None:
     smooth = JOINT._replace(friction=0.0)
     loop = slow_loop(LOOP, smooth)
@@ -79,10 +115,46 @@ def test_a_law_on_the_angle_alone_keeps_half_the_gain_at_which_the_mass_swings_o
     assert slow_loop(LOOP, JOINT).dead_time < loop.dead_time, "dry friction damps"
 
 
+def cascade(**given: float) -> CascadeParameters:
+    """A cascade with these settings and 0 for all others, and a torque loop with a lag of 10 ms."""
+    settings = dict.fromkeys((item.name for item in CASCADE.quantities), 0.0) | {"torque_lag": 0.01} | given
+    return CascadeParameters(**settings)
+
+
+def last_command(row: CascadeParameters, angle: float, samples: int) -> float:
+    """Command after some samples of 1 ms of a joint that rests at an angle [rad] with a torque of 2 N m, 1.5 wanted."""
+    state, command = CASCADE.initial, 0.0
+    for _ in range(samples):
+        command, state = CASCADE.update(row, state, 1.5, Measurement(angle, 1.0e5, 1.0e5, 2.0), 1.0e-3)
+    return float(command)
+
+
+def test_a_cascade_begins_with_the_torque_that_the_joint_has() -> None:
+    assert last_command(cascade(torque_gain=0.1, tolerance=0.01, load_time=0.2), 1.5, 1) == 0.0
+
+
+def test_the_torque_that_breaks_friction_grows_while_the_joint_rests_away_from_its_reference() -> None:
+    stuck = cascade(torque_gain=0.1, tolerance=0.01, rest_distance=1.0e-4, static_torque=0.5, load_time=0.2)
+    assert last_command(stuck, 1.505, 200) == 0.0, "nothing is learnt within the tolerance"
+    early, later = (last_command(stuck, 1.48, samples) for samples in (20, 40))
+    assert 0.0 < early < later <= 1.0
+
+
+def test_a_load_observer_can_be_left_out() -> None:
+    without = cascade(torque_gain=0.1, error_limit=0.1, angle_stiffness=5.0, rest_distance=1.0e-4)
+    assert last_command(without, 1.45, 400) == pytest.approx(0.1 * (5.0 * 0.05 - 2.0))
+
+
+@pytest.mark.parametrize("command", [-1.0, -0.3, -0.02, 0.02, 0.6, 1.0])
+def test_a_valve_opens_as_far_as_a_law_asks_beyond_its_dead_band(command: float) -> None:
+    for band in (0.0, 0.15):
+        assert opening_of_command(beyond_dead_band(command, band), band) == pytest.approx(command)
+    assert abs(beyond_dead_band(1.0e-4, 0.15)) < 0.15, "no jump at 0, where the valve would chatter"
+
+
 def asked_torque(angle: float, reference: float) -> float:
     """The command of a cascade whose inner gain is 1, where nothing moves and the actuator has no torque."""
-    given = dict.fromkeys((item.name for item in CASCADE.quantities), 0.0)
-    row = CASCADE.parameters(**given | {"error_limit": 0.1, "angle_stiffness": 5.0, "torque_gain": 1.0})
+    row = cascade(error_limit=0.1, angle_stiffness=5.0, torque_gain=1.0)
     seen = Measurement(angle=angle, pressure_1=1.0e5, pressure_2=1.0e5, torque=0.0)
     command, _ = CASCADE.update(row, CASCADE.initial, reference, seen, 1.0e-3)
     return float(command)

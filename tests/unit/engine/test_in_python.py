@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ppafo.engine.in_python import in_program, over_samples
+from ppafo.engine.in_python import in_program, over_samples, over_samples_in
 from ppafo.engine.row_functions import row_functions
 from ppafo.model.plant import Openings, PlantParameters, blended_ports
 from ppafo.model.ports import load_torque
@@ -35,7 +35,7 @@ def test_an_effect_acts_in_a_function_of_another_module() -> None:
 def test_a_function_over_samples_has_the_effects_and_their_numbers() -> None:
     run = plan_run(load_scenario("step-response", ["effects.joint_load.drag=0.05 N m s^2/rad^2"]))
     rates = np.array([-2.0, 0.0, 3.0])
-    taken = over_samples(in_program(load_torque, run.program, run.effects), {}, 0.0, 1.0, rates)
+    taken = over_samples_in(run.program, run.effects, load_torque, {}, 0.0, 1.0, rates)
     assert taken == pytest.approx(0.05 * rates * np.abs(rates), rel=1e-15)
 
 

@@ -4,12 +4,15 @@ from typing import Any
 
 import pytest
 
+from ppafo.engine.lanes import write_source
 from ppafo.engine.program import Program
+from ppafo.engine.run import batch_of
 from ppafo.engine.step import phases
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.errors import ProgramError
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
 
 begun, opened = phases.begin_step, phases.open_valve
 
@@ -32,6 +35,12 @@ def makes_a_list(parts: Program, lane: Lane) -> None:
     lane.before = sum([lane.before, 0.0])
 
 
+def squares(parts: Program, lane: Lane) -> None:
+    """Take a power by a number that is written out."""
+    begun(parts, lane)
+    lane.before = lane.before**2
+
+
 def prints(parts: Program, lane: Lane) -> None:
     """Call what gives nothing."""
     begun(parts, lane)
@@ -51,10 +60,11 @@ def counts_on(parts: Program, lane: Lane) -> None:
     ("changed", "message"),
     [
         ({"begin_step": makes_a_list}, r"test_one_dialect\.py:\d+: a list cannot be compiled"),
+        ({"begin_step": squares}, r"test_one_dialect\.py:\d+: 'before \*\* 2' cannot .*; write 'before \* before'"),
         ({"begin_step": prints}, r"test_one_dialect\.py:\d+: 'print\(lane.before\)' throws away"),
         (
             {"begin_step": keeps_unkept, "open_valve": asks_unkept},
-            r"test_one_dialect\.py:26: 'lane.extra', which \S+test_one_dialect\.py:20 sets, .*'extra': handed",
+            r"test_one_dialect\.py:\d+: 'lane.extra', which \S+test_one_dialect\.py:\d+ sets, .*'extra': handed",
         ),
     ],
 )
@@ -75,3 +85,14 @@ def test_a_name_may_be_changed_by_an_amount_and_an_argument_given_by_name(
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     monkeypatch.setattr(phases, "begin_step", counts_on)
     assert simulate(load_scenario("step-response", ("run.duration=2 ms",))).status.kind == "completed"
+
+
+def test_a_program_that_was_written_is_out_of_date_once_one_of_its_phases_is_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    program = batch_of(plan_run(load_scenario("step-response", ("run.duration=2 ms",)))).program
+    write_source.cache_clear()
+    made_from, _ = write_source(program)
+    assert made_from.is_current()
+    monkeypatch.setattr(phases, "begin_step", counts_on)
+    assert not made_from.is_current()

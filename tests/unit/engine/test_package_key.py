@@ -25,7 +25,8 @@ def test_the_key_of_a_law_tells_what_its_parts_are() -> None:
     frame = assistance.timed_phase
     follows: Any = (feedback.pid_update, feedback.sliding_update)
     laws = [made_of(frame, "timed", TimingParts(part, threshold_time)) for part in follows]
-    other = made_of(frame, "timed", TimingParts(threshold_time, follows[0]))
+    first: Any = threshold_time
+    other = made_of(frame, "timed", TimingParts(first, follows[0]))
     keys = [package_key(law, FOLDERS) for law in (*laws, other)]
     assert None not in keys
     assert len({key.words for key in keys if key is not None}) == 3

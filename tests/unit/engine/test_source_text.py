@@ -162,9 +162,27 @@ def test_what_is_no_number_stays_none(write: Write) -> None:
     assert math.isnan(generated(module.law)(1.0))
 
 
-def test_a_power_of_a_negative_constant_is_the_power_of_all_of_it(write: Write) -> None:
-    module = write("BASE = -1.5\n\n\ndef law(x):\n    return BASE**2 + BASE**x\n")
-    assert generated(module.law)(4) == module.law(4) == 2.25 + 5.0625
+def test_a_power_of_a_negative_number_is_the_power_of_all_of_it(write: Write) -> None:
+    module = write("BASE = -1.5\n\n\ndef law(x, exponent):\n    return x**exponent + -BASE * x\n")
+    assert generated(module.law)(-1.5, 2) == module.law(-1.5, 2) == 2.25 - 2.25
+
+
+@pytest.mark.parametrize(
+    ("power", "remedy"),
+    [
+        ("x**2", "write 'x * x'"),
+        ("x**3.0", "write 'x * x * x'"),
+        ("x**SQUARE", "write 'x * x'"),
+        ("x**0.5", "make both parameters"),
+        ("2.0**x", "make both parameters"),
+    ],
+)
+def test_a_power_with_a_number_that_is_written_out_is_refused_with_what_to_write(
+    power: str, remedy: str, write: Write
+) -> None:
+    module = write(f"SQUARE = 2\n\n\ndef law(x):\n    return {power}\n")
+    written = power.replace("**", " ** ")
+    assert refused(module.law) == f"my_law.py:5: '{written}' cannot be compiled; {remedy}"
 
 
 def test_a_number_of_numpy_is_its_number_and_other_kinds_of_numbers_are_refused(write: Write) -> None:

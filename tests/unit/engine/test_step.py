@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.engine.compilers import FLAGS
+from ppafo.engine.compilers import FLAGS, Effort
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.engine.run import batch_of
@@ -141,6 +141,15 @@ VECTORISED = re.compile(r"^program\.c:(\d+):\d+: optimized: loop vectorized", re
 def test_loops_over_lanes_are_vectorised(name: str, overrides: tuple[str, ...], least: int, tmp_path: Path) -> None:
     text = program_source(batch_of(plan_run(load_scenario(name, list(overrides)))).program)
     (tmp_path / "program.c").write_text(text, encoding="utf-8")
-    command = ["gcc", *FLAGS, "-march=x86-64-v3", "-fopenmp-simd", "-fopt-info-vec-optimized", "-c", "program.c"]
+    command = [
+        "gcc",
+        Effort.FULL,
+        *FLAGS,
+        "-march=x86-64-v3",
+        "-fopenmp-simd",
+        "-fopt-info-vec-optimized",
+        "-c",
+        "program.c",
+    ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert len(set(VECTORISED.findall(done.stderr))) >= least

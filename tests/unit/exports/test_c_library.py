@@ -170,7 +170,8 @@ def test_the_comparison_with_python_is_clean_c_and_cpp(interface: Any, tmp_path:
     for file, content in interface(load_scenario("torque-task-slow-valve", ["run.duration=0.2 s"])).items():
         (tmp_path / file).write_bytes(content)
     for line in (["gcc", "-std=c99", *WARNINGS, "-Wshadow"], ["g++", "-x", "c++", "-Wall", "-Wextra", "-Werror"]):
-        subprocess.run([*line, "-fsyntax-only", "check.c"], cwd=tmp_path, check=True)
+        done = subprocess.run([*line, "-fsyntax-only", "check.c"], cwd=tmp_path, capture_output=True, check=False)
+        assert (done.returncode, done.stderr) == (0, b"")
 
 
 @pytest.mark.parametrize("rate", ["7 Hz", "13 Hz"])
@@ -182,34 +183,6 @@ def test_gas_in_c_is_counted_to_the_last_sample_where_the_steps_go_on_after_it(r
     result = simulate("step-response", overrides)
     for metric in ("gas_supplied", "gas_vented", "gas_leaked"):
         assert f"# {metric} = {result.metrics[metric].value:.17g} kg" in done.stdout
-
-
-WARM = (
-    *("gas_model.kind=thermal", "gas_model.heat_transfer_coefficient=50 W/(m^2 K)"),
-    "gas_model.wall_area_per_volume=100 1/m",
-)
-
-
-@pytest.mark.parametrize(
-    ("example", "overrides"),
-    [
-        ("torque-task-measured-bladder", ()),
-        ("torque-task-measured-bladder", (*WARM, "supply_line.plantarflexion.droop=3e6 Pa s/kg")),
-        ("step-response-cylinder", WARM),
-        ("torque-task-cylinder", ()),
-    ],
-    ids=["bladder", "bladder-warm-behind-lines", "cylinder-warm", "cylinder-locked"],
-)
-def test_another_actuator_prints_the_bits_of_python(example: str, overrides: tuple[str, ...], tmp_path: Path) -> None:
-    file = Path(__file__).parents[2] / "actuators" / f"{example}.toml"
-    scenario = load_scenario(str(file), ("run.duration=0.3 s", *overrides))
-    for name, content in c_library(scenario).items():
-        (tmp_path / name).write_bytes(content)
-    lines = printed_samples(simulate(scenario), scenario_library(scenario).program.outputs)
-    assert len(lines) > 300
-    done = subprocess.run(["make", "-s", "-C", str(tmp_path), "check"], capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert [line for line in done.stdout.splitlines() if not line.startswith("#")] == lines
 
 
 def output_of(folder: Path, name: str, *command: str) -> str:
@@ -348,14 +321,6 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
     assert (run.size, run.status) == (0, OTHER_PROGRAM)
     assert step.call("bad_setting", run.settings, returns=ctypes.c_char_p) == setting.encode()
     assert Run(step, valve_dead_band=0.1).status == GOING_ON
-
-
-def test_the_reference_has_its_bits_at_samples_between_the_steps(tmp_path: Path) -> None:
-    overrides = ("run.duration=0.1 s", "controller.rate=333 Hz", "run.output_interval=1 ms")
-    library = Loaded("torque-task-proportional", tmp_path, overrides)
-    at = 1 + library.exported.program.outputs.index("reference")
-    found = [float(np.frombuffer(sample)[at]) for sample in Run(library).course()]
-    assert found == simulate("torque-task-proportional", overrides).recording["reference"].tolist()
 
 
 @pytest.mark.parametrize(

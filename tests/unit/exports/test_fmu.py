@@ -114,19 +114,6 @@ def test_gains_that_nobody_gives_follow_the_parameters_of_a_unit(tmp_path: Path)
     assert {item: float(np.abs(found[item] - recording[item]).max()) for item in names} == dict.fromkeys(names, 0.0)
 
 
-def test_a_free_vane_with_an_open_loop_has_the_bits_of_the_lanes_too(tmp_path: Path) -> None:
-    unit = written(tmp_path, "step-response", ())
-    assert set(largest_difference(unit, "step-response", ()).values()) == {0.0}
-
-
-def test_a_position_servo_has_the_bits_of_the_lanes_too(tmp_path: Path) -> None:
-    quick = ("run.duration=0.3 s", "reference.frequency=3 Hz", "reference.amplitude=15 deg")
-    unit = written(tmp_path, "cylinder-servo", quick)
-    found = largest_difference(unit, "cylinder-servo", quick)
-    assert "reference_angle" in found
-    assert set(found.values()) == {0.0}
-
-
 def test_the_toolbox_for_units_finds_nothing(unit: str) -> None:
     if importlib.util.find_spec("fmu_manipulation_toolbox") is None:
         pytest.skip("fmu-manipulation-toolbox is not installed (pip install -e .[dev])")

@@ -81,23 +81,6 @@ def test_tools_may_show_units_of_the_bench_and_know_the_limits_of_the_inputs(
     assert found == {name: pytest.approx(limits, rel=1e-9) for name, limits in ranges.items()}
 
 
-def test_under_the_commands_of_a_closed_loop_a_free_vane_moves_with_its_bits(free: str) -> None:
-    recording = simulate(*FREE).recording
-    assert np.ptp(recording["angle"]) > 0.5
-    instance = Instance(free)
-    seen = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "supplied_mass", "leaked_mass", "mass_1")
-    assert driven(instance, recording, ("command",), seen) == [0.0] * len(seen)
-    instance.close()
-
-
-def test_a_foot_on_a_shank_that_moves_has_its_bits_under_the_commands_of_a_closed_loop(tmp_path: Path) -> None:
-    recording = simulate("swing-foot").recording
-    instance = Instance(written(tmp_path, "swing-foot", (), fmi=2))
-    seen = ("angle", "angular_velocity", "pressure_1", "pressure_2", "torque", "supplied_mass")
-    assert driven(instance, recording, ("command",), seen) == [0.0] * len(seen)
-    instance.close()
-
-
 def test_an_ankle_that_is_led_point_by_point_follows_the_path_between_them(moved: str) -> None:
     recording = simulate(*MOVED).recording
     assert np.ptp(recording["angle"]) > 0.1

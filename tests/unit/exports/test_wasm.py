@@ -1,7 +1,6 @@
 """A WebAssembly module under node gives what Python gives: every sample of every channel to the last bit."""
 
 import json
-import math
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -19,7 +18,7 @@ from ppafo.simulation.loading import list_scenarios
 from ppafo.simulation.numbers import with_numbers
 from ppafo.walking import list_walks, load_walk
 from scripts.wasm_programs import FOLDER, shipped_programs
-from tests.modules_under_node import DIVERGED, REFUSED, assert_alike, assert_same, compared, drawn, drawn_walks, driven
+from tests.modules_under_node import DIVERGED, assert_alike, assert_same, compared, drawn, drawn_walks, driven
 
 DRAWS, WALKS = 20, 10
 MOVED = (
@@ -60,27 +59,6 @@ def test_a_run_that_diverges_is_kept_up_to_there() -> None:
     assert not result.status.is_completed
     assert given.runs[0].status == DIVERGED
     assert_same(module, given.runs[0], result)
-
-
-@needs_node
-def test_a_bad_setting_is_named_by_its_place() -> None:
-    module = module_of(load_scenario("torque-task-solenoid"))
-    keys = [item["key"] for item in module.description["settings"]]
-    good = drawn(module, 1)[0]
-    bad = {
-        "valve.area": -1.0,
-        "actuator.angle_min": 3.0,
-        "run.step": 0.2,
-        "run.output_interval": 0.7,
-        "run.duration": math.nan,
-        "motion.angle": 0.1,
-    }
-    settings = np.tile(good, (len(bad), 1))
-    for row, (key, value) in zip(settings, bad.items(), strict=True):
-        row[keys.index(key)] = value
-    given = driven(module, settings)
-    assert [keys[ran.checked] for ran in given.runs] == list(bad)
-    assert {ran.status for ran in given.runs} == {REFUSED}
 
 
 @needs_node

@@ -4,7 +4,7 @@ import itertools
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ppafo.model.plant import (
@@ -43,8 +43,11 @@ def test_torque_is_positive_in_plantarflexion() -> None:
     assert actuator_torque(2e5, 1e5, 1.451e-5) == pytest.approx(1.451)
 
 
-@given(st.floats(0.0, math.pi))
-def test_gravity_pulls_the_toes_down_most_where_the_foot_plate_is_level(angle: float) -> None:
+@given(st.floats(-10.0, 10.0))
+@example(10.0)
+@example(math.radians(330.0))
+@example(-10.0)
+def test_gravity_is_a_cosine_at_every_angle_that_a_set_may_state(angle: float) -> None:
     assert gravity_torque(angle, 0.6) == pytest.approx(-0.6 * math.cos(angle - math.pi / 2), abs=1e-7)
 
 

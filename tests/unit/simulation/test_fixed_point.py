@@ -79,25 +79,6 @@ def test_a_converter_without_whole_numbers_is_refused() -> None:
         scenario_from_dict(content)
 
 
-@pytest.mark.parametrize(
-    ("name", "given", "said"),
-    [
-        ("torque-task-proportional", "fixed", r'write controller.kind = "pid_fixed_point"'),
-        ("torque-task-solenoid", "fixed", r'write controller.kind = "on_off_fixed_point"'),
-        ("torque-task-proportional", "float", "leave it out: every controller but the fixed-point ones"),
-        ("step-response", "fixed", "'constant' has no fixed-point form; controllers that have one: pid_fixed_point"),
-    ],
-)
-def test_a_file_with_the_old_arithmetic_is_told_the_kind_to_write(name: str, given: str, said: str) -> None:
-    content = dict(load_scenario(name).origin.content)
-    content["controller"] = {**content["controller"], "arithmetic": given}
-    with pytest.raises(ScenarioError, match=said) as caught:
-        scenario_from_dict(content)
-    assert "\n" not in str(caught.value)
-    with pytest.raises(ScenarioError, match=said):
-        load_scenario(name, (f"controller.arithmetic={given}",))
-
-
 def test_a_processor_takes_the_integer_form_of_a_controller_with_its_gains() -> None:
     scenario = load_scenario("torque-task-proportional", ("controller.proportional_gain=0.1 1/(N m)",))
     named = load_scenario("torque-task-proportional", (FIXED, "controller.proportional_gain=0.1 1/(N m)"))

@@ -144,7 +144,7 @@ def test_a_loop_within_a_cascade_that_is_too_fast_is_the_one_that_is_named() -> 
     given = ["controller.torque_gain=80 1/(N m)"]
     quick = simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), given)).tracking
     assert quick is not None
-    assert quick.sentence.endswith(": for this device `torque_gain = 4.2 1/(N m)`")
+    assert quick.sentence.endswith(": `controller.torque_gain = 4.09 1/(N m)`")
     pressed = [*given, "motion.external_torque=8 N m"]
     on_stop = simulate(scenario_from_dict(document("angle", "95 deg", "cascade", **FREE), pressed)).tracking
     assert on_stop is not None
@@ -244,3 +244,9 @@ def test_what_knows_a_torque_alone_says_so() -> None:
         plant_of(pressure)
     with pytest.raises(ScenarioError, match="a fixed-point controller follows a torque alone"):
         firmware(pressure)
+
+
+def test_a_pressure_beyond_the_supply_is_refused_in_the_unit_of_the_set() -> None:
+    in_bar = document("pressure_1", "6 bar_g", device={"set": "cylinder-lever", "valve": "proportional"})
+    with pytest.raises(ScenarioError, match=r", 0 bar_g to 5 bar_g: it is at 6 bar_g at 0 s$"):
+        scenario_from_dict(in_bar)

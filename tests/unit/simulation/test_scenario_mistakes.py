@@ -86,7 +86,6 @@ def test_a_misspelt_key_is_answered_with_the_nearest(old: str, new: str, key: st
     [
         ('"pid"', '"pdi"', "controller.kind = 'pdi' is not known, did you mean 'pid'?"),
         ('"locked"', '"lokced"', "motion.kind = 'lokced' is not known, did you mean 'locked'?"),
-        ('"locked"', '"held"', "the kind of motion 'held' is now called 'locked'"),
         ('"ramp_hold"', '"ramp"', "reference.kind = 'ramp' is not known"),
     ],
 )
@@ -319,17 +318,6 @@ def test_plain_values_of_a_wrong_type_are_clean_errors(change: dict[Any, Any]) -
         scenario_from_dict({**content, **change})
     assert str(caught.value).startswith("scenario ")
     assert "\n" not in str(caught.value)
-
-
-def test_the_old_name_of_a_prescribed_motion_is_refused_with_the_new_one() -> None:
-    message = problem_after(
-        'kind = "locked"\nangle = "75 deg"', 'kind = "led"\n[motion.profile]\nkind = "constant"\nlevel = "75 deg"'
-    )
-    assert message == "task.toml: motion.kind: the kind of motion 'led' is now called 'prescribed'"
-    with pytest.raises(
-        ScenarioError, match=r"override 'motion\.kind=led': the kind of motion 'led' is now called 'prescribed'"
-    ):
-        load_scenario("step-response", ["motion.kind=led", "motion.profile.kind=sine"])
 
 
 def test_a_parameter_set_that_is_given_as_a_scenario_is_called_what_it_is() -> None:

@@ -8,12 +8,12 @@ import pytest
 
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
-from ppafo.running import simulate
+from ppafo.running import simulate, tried
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking import tried
 
 SERVO = ("cylinder-servo", ("run.duration=1 s",))
 STUCK = ("friction.static_torque=2 N m", "friction.dynamic_torque=1 N m")
+LEARNS_NOTHING = ("controller.static_torque=0 N m", "controller.load_time=0 s", "controller.friction_torque=0 N m")
 
 
 def servo(*overrides: str) -> Scenario:
@@ -21,7 +21,7 @@ def servo(*overrides: str) -> Scenario:
 
 
 def test_a_joint_that_friction_holds_is_named_with_a_stiffness_that_moves_it() -> None:
-    weak = ("controller.angle_stiffness=4 N m/rad", "controller.friction_torque=0 N m")
+    weak = ("controller.angle_stiffness=4 N m/rad", *LEARNS_NOTHING)
     verdict = simulate(servo(*STUCK, *weak)).tracking
     assert verdict is not None
     assert verdict.moved == 0.0
@@ -65,7 +65,9 @@ def test_a_pressure_that_stays_where_it_is_is_named_with_what_keeps_it(overrides
 def test_simulate_says_it_before_the_gains_and_a_check_ends_with_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    given = [word for text in (*STUCK, "controller.angle_stiffness=4 N m/rad") for word in ("--set", text)]
+    given = [
+        word for text in (*STUCK, *LEARNS_NOTHING, "controller.angle_stiffness=4 N m/rad") for word in ("--set", text)
+    ]
     folder = ["--set", "run.duration=0.5 s", "--out", str(tmp_path / "out")]
     assert main(["simulate", "cylinder-servo", *given, *folder, "--json"]) == 0
     said = json.loads(capsys.readouterr().out)["tracking"]["sentence"]

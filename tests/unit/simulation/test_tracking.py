@@ -7,10 +7,9 @@ import pytest
 
 from ppafo.loading import load_scenario
 from ppafo.parameters.reach import supply_for, torque_reach
-from ppafo.running import simulate
+from ppafo.running import simulate, tried
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.tracking import tried
 from ppafo.study.runs import follows, with_companions
 
 TASK = "torque-task-proportional"
@@ -43,7 +42,8 @@ def test_a_torque_beyond_the_reach_is_said_and_a_file_may_say_why_it_asks_for_it
     assert with_numbers(load_scenario(TASK), {"supply.pressure": 3.0e5}).beyond_reach == ""
     scenario = load_scenario(TASK, ["reference.level=9 N m"])
     verdict = tried(scenario, simulate(scenario).tracking)
-    assert verdict is not None and verdict.is_useless
+    assert verdict is not None
+    assert verdict.is_useless
     assert "with `supply.pressure = 94.5 psi_g` it does, as a further run shows" in verdict.sentence
 
 

@@ -180,3 +180,10 @@ def test_a_number_of_wearers_that_cannot_walk_is_refused() -> None:
     for count in (0, -3):
         with pytest.raises(ArgumentError, match=rf"^wearers={count}: must be a whole number, 1 or more"):
             walk_population(load_walk("off"), minutes=0.1, wearers=count)
+
+
+def test_a_joint_whose_stops_the_gait_passes_is_refused_with_both_ranges() -> None:
+    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, this joint ends at 70 deg$"):
+        load_walk("proportional", ["actuator.angle_max=70 deg"])
+    with pytest.raises(ScenarioError, match=r"the gait needs 76 to 109 deg, this joint begins at 85 deg$"):
+        load_walk("proportional", ["actuator.angle_min=85 deg"])

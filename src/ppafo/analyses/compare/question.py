@@ -22,7 +22,7 @@ Configured = Annotated[
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
 
 
-@checked("configurations", "study", "tasks", "overrides")
+@checked
 def compare(
     configurations: Configured | None = None,
     *,

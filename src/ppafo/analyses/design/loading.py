@@ -14,7 +14,7 @@ from ppafo.plugins import Plugins, name_plugins
 FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
 
 
-@checked("problem", name_or_path="problem")
+@checked
 def load_design(problem: str | Path, *, plugins: Plugins = ()) -> SizingProblem:
     """Return the problem of a design file, by its name in the package or by its path; paths in it begin in its folder.
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
 
 
-@checked("problem", "threads")
+@checked
 def design(
     problem: DesignLike | None = None,
     *,

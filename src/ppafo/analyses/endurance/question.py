@@ -22,7 +22,7 @@ GasUses = Annotated[
 BottleLike = Annotated[str | Path, Word("BOTTLE")]
 
 
-@checked("recordings", "gas_per_stride", "stride_time")
+@checked
 def bottle(
     recordings: GasUses = (),
     *,

@@ -26,7 +26,7 @@ LONGEST = 24.0 * 3600.0
 WITHOUT_REST = Schedule(LONGEST, 0.0, LONGEST)
 
 
-@checked("result", "bottle")
+@checked
 def endurance_of_walk(result: WalkResult, *, bottle: str | Path | None = None) -> Endurance | None:
     """Return how long a bottle lasts when the walk continues without rest; None where the walk took no gas.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.analyses.endurance.draw import Draw, draw_of_numbers, largest_flow
-from ppafo.errors import DataError, PpafoError, ScenarioError, nearest_name, refused_as
+from ppafo.errors import DataError, PpafoError, ScenarioError, refused_as
 from ppafo.parameters.overrides import read_overrides
 from ppafo.signals import Recording
 from ppafo.simulation.loading import ScenarioRequest, scenario_of
@@ -120,7 +120,7 @@ class _WalkFile:
 
 
 def _read_walk_file(path: Path) -> _WalkFile:
-    """Return the file of a walk; DataError for one that is none, of a walk that failed, or of an earlier version."""
+    """Return the file of a walk; DataError for one that is none, or of a walk that failed."""
     document = read_json(path)
     if not isinstance(document, dict) or document.get("format") != WALK_FORMAT:
         raise DataError(f"{path}: is not the result of a ppafo walk (its 'format' is not '{WALK_FORMAT}')")
@@ -128,8 +128,6 @@ def _read_walk_file(path: Path) -> _WalkFile:
     status = file.table("status").get("kind", "completed")
     if status != "completed":
         raise DataError(f"{path}: the walk {status}, so it cannot be repeated")
-    if file.table("configuration").get("course") is not None:
-        raise DataError(f"{path}: 'course'{nearest_name('course', ('task_sequence',))}; write the walk again")
     return file
 
 

@@ -21,7 +21,7 @@ Condition = Annotated[str, Word("CONDITION", option="--such-that")]
 Highest = Annotated[bool, Word(off="--lowest", help="find the lowest value (default)")]
 
 
-@checked("scenario", "vary", "such_that", "highest", "grid", "overrides")
+@checked
 def find(
     scenario: ScenarioLike,
     *,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Problem = Annotated[str | Path, Word("PROBLEM", Path)]
 
 
-@checked("problem", "progress")
+@checked
 def identify(
     problem: Problem,
     *,

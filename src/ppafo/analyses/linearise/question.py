@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 ScenarioLike = Annotated["Scenario | str | Path", Word("SCENARIO", help="name of a scenario, or a .toml file")]
 
 
-@checked("scenario", "at", "overrides")
+@checked
 def linearise(
     scenario: ScenarioLike, *, at: words.Point = "equilibrium", overrides: Overrides = (), plugins: Plugins = ()
 ) -> Finding[LinearModel]:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ppafo.report.finding import Finding
 
 
-@checked("part", "catalogue")
+@checked
 def parts(
     part: Annotated[str, Word("PART")] | None = None, *, catalogue: Annotated[str | Path, Word("FILE")] = "parts"
 ) -> Finding[Parts]:

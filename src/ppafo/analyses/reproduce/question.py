@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 PublicationName = Annotated[str | Path, Word("NAME", option="--study")]
 
 
-@checked("study", "overrides", "progress")
+@checked
 def reproduce(
     study: PublicationName = "ppafo-2011",
     *,

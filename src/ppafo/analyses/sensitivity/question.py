@@ -23,7 +23,7 @@ DistributedStudy = Annotated[
 MethodName = Annotated[str, Word("sobol|shapley")]
 
 
-@checked("study", "method", "metrics", "samples")
+@checked
 def sensitivity(
     study: DistributedStudy,
     *,

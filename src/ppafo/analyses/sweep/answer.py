@@ -213,7 +213,7 @@ def write_report(results: StudyResults) -> None:
         results.place.write(name, content)
 
 
-@checked()
+@checked
 def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """Return the finished results of a study in a folder or at an address; DataError where there are none.
 

@@ -23,7 +23,7 @@ MetricName = Annotated[str, Word("NAME", option="--metric")]
 Width = Annotated[str, Word("WIDTH")]
 
 
-@checked()
+@checked
 def sweep_into_folder(
     study: StudyLike,
     *,

@@ -197,7 +197,7 @@ INTERRUPTED = "interrupted; finished chunks are kept, and the same command resum
 INTERRUPTED_AT_ONCE = "interrupted; nothing was kept yet, and the same command begins anew"
 
 
-@checked("study", "out", "overrides", "draws", "seed", "threads", "scheduler", "agreed", "progress")
+@checked
 def sweep(
     study: Study | str | Path | Mapping[str, Any],
     *,

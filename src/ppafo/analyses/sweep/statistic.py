@@ -35,7 +35,7 @@ MOST_DRAWS = 2**20
 """Draws at most."""
 
 
-@checked("study", "metric", "statistic", "width", "configuration", "overrides", "seed", "first_draws", "draws")
+@checked
 def estimate(
     study: Study | str | Path | Mapping[str, Any],
     *,

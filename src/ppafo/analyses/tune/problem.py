@@ -255,7 +255,7 @@ def list_tunings() -> tuple[str, ...]:
     return TUNING.names()
 
 
-@checked()
+@checked
 def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Problem:
     """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
 

@@ -29,7 +29,7 @@ LARGEST_DELAY = 1.0
 """Seconds; a recording that is later than this was not recorded with its command."""
 
 
-@checked("parameter_set", "recordings", "valve", "overrides")
+@checked
 def validate(
     parameter_set: SetLike,
     recordings: Sequence[Recorded],

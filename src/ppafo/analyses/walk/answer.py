@@ -26,9 +26,10 @@ from ppafo.report.display_units import quantity_text
 from ppafo.report.finding import Column, Finding, Part, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
+from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking import Tracking, tried
+from ppafo.simulation.tracking import Tracking
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ppafo.simulation.scenario import Scenario
 
 
-@checked()
+@checked
 def walk_with_and_without(
     scenario: Annotated[Scenario | str | Path, Word("WALK")] = "solenoid",
     *,

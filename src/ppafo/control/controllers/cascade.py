@@ -1,9 +1,30 @@
-"""A law that holds an angle: it asks for the torque that the joint needs, and opens the valve for that torque."""
+"""Law that holds an angle: it asks for the torque that the joint needs, and opens the valve for that torque.
 
+The load on the joint is observed, as the part of the torque that did not accelerate it. Static friction makes an
+observer cycle: the torque that breaks it is therefore a state of its own, which creeps up while the joint rests away
+from its reference and is dropped once it moves. Within a tolerance nothing is learnt.
+"""
+
+import math
 from typing import Annotated, NamedTuple
 
-from ppafo.control.angle_loop import ANGLE_DAMPING, ANGLE_STIFFNESS, FRICTION, GRAVITY, INERTIA, INNER_GAIN, RATE_FILTER
-from ppafo.control.kind import ControllerKind
+from ppafo.control.angle_loop import (
+    ANGLE_DAMPING,
+    ANGLE_STIFFNESS,
+    FRICTION,
+    GRAVITY,
+    INERTIA,
+    INNER_GAIN,
+    LOAD_TIME,
+    RATE_FILTER,
+    REST_DISTANCE,
+    REST_RATE,
+    STATIC_FRICTION,
+    TOLERANCE,
+    TORQUE_LAG,
+)
+from ppafo.control.kind import NOMINAL, ControllerKind
+from ppafo.control.torque_loop import beyond_dead_band
 from ppafo.model.controlled import ANGLE
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.plant import gravity_torque
@@ -11,10 +32,11 @@ from ppafo.model.sensors import Measurement
 
 
 class CascadeParameters(NamedTuple):
-    """Torque per error of the angle [N m/rad], per its rate [N m s/rad] and integral [N m/(rad s)], and the inner gain.
+    """Gains of the angle loop and of the torque loop inside it, and what the law believes of joint and valve.
 
-    ``rate_filter`` [s] smooths the measured rate, ``torque_gain`` [1/(N m)] opens the valve, ``gravity_torque`` and
-    ``friction_torque`` [N m] are the largest gravity torque and the friction in motion that the law makes up for.
+    ``angle_stiffness`` [N m/rad] and ``angle_damping`` [N m s/rad] act on the error and on its rate, ``torque_gain``
+    [1/(N m)] opens the valve. ``rate_filter`` [s] smooths the measured rate, ``load_time`` and ``torque_lag`` [s] are
+    time constants of the observed load and of the torque loop; 0 s of ``load_time`` observes none.
     """
 
     error_limit: Annotated[
@@ -26,17 +48,29 @@ class CascadeParameters(NamedTuple):
     angle_damping: Annotated[
         float, Number("N m s/rad", "torque per rate of the angle error", None, 0.0, 1.0e6, follows=(ANGLE_DAMPING,))
     ]
-    angle_integral: Annotated[
-        float, Number("N m/(rad s)", "torque per integral of the angle error; friction makes it cycle", 0.0, 0.0, 1.0e6)
+    load_time: Annotated[
+        float, Number("s", "time constant of the observed load, 0 for none", None, 0.0, 1.0e3, follows=(LOAD_TIME,))
     ]
     rate_filter: Annotated[
         float, Number("s", "time constant of the filter on the angle's rate", None, 0.0, 10.0, follows=(RATE_FILTER,))
     ]
+    torque_lag: Annotated[
+        float, Number("s", "believed time constant of the torque loop", None, 1.0e-6, 10.0, follows=(TORQUE_LAG,))
+    ]
     torque_gain: Annotated[
         float, Number("1/(N m)", "command per torque error", None, 0.0, 1.0e3, follows=(INNER_GAIN,))
     ]
+    tolerance: Annotated[
+        float, Number("rad", "angle error within which nothing is learnt", None, 0.0, 1.0, follows=(TOLERANCE,))
+    ]
+    rest_distance: Annotated[
+        float, Number("rad", "turn of the joint that shows motion", None, 1.0e-9, 1.0, follows=(REST_DISTANCE,))
+    ]
     gravity_torque: Annotated[
         float, Number("N m", "believed largest gravity torque, 0 for none", None, 0.0, 1.0e4, follows=(GRAVITY,))
+    ]
+    static_torque: Annotated[
+        float, Number("N m", "believed static friction, 0 for none", None, 0.0, 1.0e4, follows=(STATIC_FRICTION,))
     ]
     friction_torque: Annotated[
         float, Number("N m", "believed friction in motion, 0 for none", None, 0.0, 1.0e4, follows=(FRICTION,))
@@ -44,27 +78,50 @@ class CascadeParameters(NamedTuple):
     inertia: Annotated[
         float, Number("kg m^2", "believed inertia about the joint, 0 for none", None, 0.0, 1.0e3, follows=(INERTIA,))
     ]
+    dead_band: Annotated[
+        float,
+        Number("", "believed smallest command that opens the valve", None, 0.0, 0.99, follows=(NOMINAL["dead_band"],)),
+    ]
 
 
 class CascadeState(NamedTuple):
-    """Integral of the torque asked for [N m]; reference and angle one sample ago [rad], and their rates.
+    """Reference and angle one sample ago [rad] and their rates, what is learnt of the joint, and what is asked for.
 
     ``quickening`` is the filtered rate of the reference's rate [rad/s^2], ``started`` the number of samples, 2 at most.
+    ``load`` is the observed load [N m] beside gravity and friction, ``breakaway`` the torque [N m] that grows while the
+    joint rests, ``asked_torque`` the torque asked for and ``lagged_torque`` that behind the lag of the torque loop
+    [N m]. The joint has been near the angle ``place`` [rad] for the time ``still`` [s]. ``is_held`` is 1 while it rests
+    within the tolerance, ``is_full`` while the valve is fully open.
     """
 
-    integral: float
     reference: float
     angle: float
     rate: float
     asked: float
     quickening: float
     started: float
+    load: float
+    breakaway: float
+    asked_torque: float
+    lagged_torque: float
+    place: float
+    still: float
+    is_held: float
+    is_full: float
 
 
 SMOOTHING = 8.0
 """How much slower the filter on the reference's acceleration is than the one on the measured rate: it may jump."""
 SLOW = 0.05
-"""rad/s: rate of the reference from which on all of the friction is made up for."""
+"""rad/s: rate of the joint that is asked for from which on all of the friction is made up for."""
+SHARE_OF_FRICTION = 0.7
+"""Share of the believed friction in motion that is made up for: too much of it makes the joint swing."""
+CREEP_LAGS = 5.0
+"""Lags of the torque loop in which the breakaway torque grows by the static friction at an error of ``CREEP_ERROR``."""
+CREEP_ERROR = math.radians(1.0)
+"""rad."""
+FASTEST_CREEP = 10.0
+"""Times as fast it grows at most, at larger errors."""
 
 
 def cascade_update(
@@ -72,45 +129,103 @@ def cascade_update(
 ) -> tuple[float, CascadeState]:
     """Command u from -1 to 1 for an angle error e [rad], and the torque T [N m] that the sensors show:
 
-        T_wanted = k_a e + d_a (rate of e) + k_i (integral of e) + gravity + friction,    u = k_p (T_wanted - T)
+        T_wanted = k_a e + d_a (rate of e) + load + breakaway + gravity + friction + inertia,    u = k_p (T_wanted - T)
 
-    The measured rate is a backward difference through a filter of first order. Friction has the sign of the reference's
-    rate. The integral stands still while the valve is fully open, where a longer error could not open it further.
+    The load follows the torque that the joint has (what was asked for, behind the lag of the torque loop; the measured
+    one while the valve is fully open) less its acceleration, with the time constant ``load_time``. What the breakaway
+    torque would exceed the static friction by is load.
     """
     error = reference - measurement.angle
-    turned = (measurement.angle - state.angle) * min(state.started, 1.0)
+    is_begun, is_running = min(state.started, 1.0), max(state.started - 1.0, 0.0)
+    turned = (measurement.angle - state.angle) * is_begun
     rate = state.rate + (turned - period * state.rate) / (period + parameters.rate_filter)
-    asked = (reference - state.reference) / period * min(state.started, 1.0)
+    asked = (reference - state.reference) / period * is_begun
     # A rate of the reference has one before it from the third sample on.
-    jerk = ((asked - state.asked) * max(state.started - 1.0, 0.0) - period * state.quickening) / (
+    jerk = ((asked - state.asked) * is_running - period * state.quickening) / (
         period + SMOOTHING * parameters.rate_filter
     )
     quickening = state.quickening + jerk
-    integral = state.integral + parameters.angle_integral * error * period
-    against = gravity_torque(measurement.angle, parameters.gravity_torque)
-    against += parameters.inertia * quickening + parameters.friction_torque * max(-1.0, min(1.0, asked / SLOW))
+    gravity = gravity_torque(measurement.angle, parameters.gravity_torque)
+
+    # A rate from a coarse sensor comes in jumps: a joint rests that has not turned by the distance for long enough.
+    has_turned = abs(measurement.angle - state.place) > parameters.rest_distance
+    still = 0.0 if has_turned else state.still + period * is_begun
+    moves = still * REST_RATE < parameters.rest_distance and state.started > 0.5
+    rests_within = asked == 0.0 and (
+        (state.is_held > 0.5 and abs(error) < 2.0 * parameters.tolerance)
+        or (abs(error) < parameters.tolerance and not moves)
+    )
+    is_held = 1.0 if rests_within else 0.0
+
     acting = max(-parameters.error_limit, min(parameters.error_limit, error))
-    wanted = parameters.angle_stiffness * acting + parameters.angle_damping * (asked - rate) + integral + against
+    # The rate at which the error would fade, by which a joint at rest is expected to move.
+    fading = 2.0 * parameters.angle_stiffness / max(parameters.angle_damping, 1.0e-12) * acting
+    friction = SHARE_OF_FRICTION * parameters.friction_torque * max(-1.0, min(1.0, (asked + fading) / SLOW))
+
+    # At the first sample the joint is at rest, and its torque is the load.
+    before = state.asked_torque if state.started > 0.5 else measurement.torque
+    lagged = state.lagged_torque + (before - state.lagged_torque) * period / (period + parameters.torque_lag)
+    lagged = measurement.torque if state.is_full > 0.5 or state.started < 0.5 else lagged
+    is_observed = parameters.load_time > 0.0
+    first_load = measurement.torque - gravity if is_observed else 0.0
+    load_before = state.load if state.started > 0.5 else first_load
+    slowness = max(parameters.load_time, period)
+    learnt = (lagged - gravity - friction - state.breakaway - load_before) * period / slowness
+    learnt = learnt - parameters.inertia * (rate - state.rate) / slowness
+    speed = min(abs(error) / CREEP_ERROR, FASTEST_CREEP)
+    creep = parameters.static_torque / (CREEP_LAGS * parameters.torque_lag) * speed * period
+    creep = (creep if error > 0.0 else -creep) if abs(error) > parameters.tolerance and not moves else 0.0
+    breakaway = 0.0 if moves else state.breakaway + creep
+    is_beyond = abs(breakaway) > parameters.static_torque
+    learnt = learnt + (creep if is_beyond and state.is_full < 0.5 else 0.0)
+    breakaway = state.breakaway if is_beyond else breakaway
+    load = load_before + (learnt if is_observed else 0.0)
+
+    own = parameters.angle_stiffness * acting + parameters.angle_damping * (asked - rate)
+    needed = load + breakaway + own + gravity + parameters.inertia * quickening + friction
+    wanted = before if rests_within else needed
     unlimited = parameters.torque_gain * (wanted - measurement.torque)
-    command = max(-1.0, min(1.0, unlimited))
+    command = beyond_dead_band(max(-1.0, min(1.0, unlimited)), parameters.dead_band)
     return command, CascadeState(
-        integral=integral if command == unlimited else state.integral,
         reference=reference,
         angle=measurement.angle,
         rate=rate,
         asked=asked,
         quickening=quickening,
         started=min(state.started + 1.0, 2.0),
+        load=load_before if rests_within else load,
+        breakaway=state.breakaway if rests_within else breakaway,
+        asked_torque=wanted,
+        lagged_torque=lagged,
+        place=measurement.angle if has_turned else state.place,
+        still=still,
+        is_held=is_held,
+        is_full=1.0 if abs(unlimited) >= 1.0 else 0.0,
     )
 
 
 CASCADE = ControllerKind(
     name="cascade",
-    summary="Holds an angle: a torque in proportion to the angle error and its rate, made by an inner torque loop.",
-    source="cascade of a position and a pressure loop: Bone and Ning 2007; gains by Skogestad 2003",
+    summary="Holds an angle under load and friction: the torque that the joint needs, made by an inner torque loop.",
+    source="disturbance observer: Ohnishi 1987; cascade: Bone and Ning 2007; gains by Skogestad 2003",
     quantities=quantities_of(CascadeParameters),
     parameters=CascadeParameters,
-    initial=CascadeState(integral=0.0, reference=0.0, angle=0.0, rate=0.0, asked=0.0, quickening=0.0, started=0.0),
+    initial=CascadeState(
+        reference=0.0,
+        angle=0.0,
+        rate=0.0,
+        asked=0.0,
+        quickening=0.0,
+        started=0.0,
+        load=0.0,
+        breakaway=0.0,
+        asked_torque=0.0,
+        lagged_torque=0.0,
+        place=0.0,
+        still=0.0,
+        is_held=0.0,
+        is_full=0.0,
+    ),
     update=cascade_update,
     controls=(ANGLE,),
 )

@@ -119,7 +119,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
     state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
     anew = made_of(restart_anew, f"restart_{name}", AnewParts(law.initial)) if len(law.initial) else keep_state
-    parts = WalkingParts(AT_THRESHOLDS, state, law.update, law.restart or anew)
+    parts = WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
     return replace(
         law,
         name=name,

@@ -190,17 +190,17 @@ def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
 def plant_library(scenario: Scenario) -> dict[str, bytes]:
     """Return the files of the plant in C by name: ``NAME_step(run, command, ...)`` goes on by one step."""
     library = surfaced(plant_of(scenario)).library
-    return {**library_files(library), "expected.csv": expected_csv(_half_open(scenario), library.program.outputs)}
+    return {**library_files(library), "expected.csv": expected_csv(half_open(scenario), library.program.outputs)}
 
 
-_EXAMPLE = 0.5
+EXAMPLE = 0.5
 """Command of the example, which does something."""
 
 
-def _half_open(scenario: Scenario) -> Scenario:
+def half_open(scenario: Scenario) -> Scenario:
     """Return the run of the example by Python: the plant for a tenth of a second or longer under a constant command."""
     plant = _commanded(scenario.motion, scenario)
-    command = replace(plant.controller, settings={"command": _EXAMPLE})
+    command = replace(plant.controller, settings={"command": EXAMPLE})
     duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)
     return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
@@ -210,7 +210,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
     names = [variable.name for variable in alone.inputs]
     by_name = {name: name for name in names}
     # An example whose command does something.
-    example = [_EXAMPLE if variable.name == "command" else variable.start for variable in alone.inputs]
+    example = [EXAMPLE if variable.name == "command" else variable.start for variable in alone.inputs]
     comments = [f" * {variable.name}, {variable.summary} [{variable.unit}]" for variable in alone.inputs]
     entries = [f"- `{variable.name}` [{variable.unit}]: {variable.summary}." for variable in alone.inputs]
     words = {

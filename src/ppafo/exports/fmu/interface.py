@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.files import Library
-from ppafo.exports.c_library.plant import Input, follow_lines, plant_of, surfaced
+from ppafo.exports.c_library.plant import Input, follow_lines, half_open, plant_of, surfaced
 from ppafo.simulation.scenario import Scenario
 
 _LOOP_TIME = (
@@ -35,7 +35,8 @@ class Interface:
     paths of settings that are no variables. ``time`` tells people how the unit goes on, ``tuning`` when it takes a
     changed parameter; both are HTML. ``step`` [s] is the usual communication step; where ``is_step_fixed``, others must
     be multiples of it. ``duration`` [s] is that of the usual experiment. ``clock`` says when the clock of the
-    controller ticks, None for a unit without one.
+    controller ticks, None for a unit without one. ``run`` is a run of Python that it is compared with; a plant's is
+    under the command ``EXAMPLE``.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Interface:
     hidden: frozenset[str]
     inputs: tuple[Input, ...]
     words: Mapping[str, str]
+    run: Scenario
 
 
 def closed_loop(scenario: Scenario) -> Interface:
@@ -73,6 +75,7 @@ def closed_loop(scenario: Scenario) -> Interface:
         hidden=frozenset(),
         inputs=(),
         words={},
+        run=scenario,
     )
 
 
@@ -104,4 +107,5 @@ def plant_alone(scenario: Scenario) -> Interface:
             "follow": follow_lines(alone, "settings", numbers),
             "checked": "the limits of the inputs, inertia, volumes and areas",
         },
+        run=half_open(scenario),
     )

@@ -12,7 +12,8 @@ from ppafo.exports import filled, template
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
 from ppafo.exports.fmu.interface import Interface
-from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, Platform, build
+from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, Platform, build, host_platform
+from ppafo.exports.fmu.trial import check_unit
 from ppafo.exports.fmu.variables import tuning_of, variability_of
 from ppafo.version import __version__
 
@@ -30,7 +31,8 @@ _CALLS = {2: ("fmi2.c", "fmi2_steps.c"), 3: ("fmi3.c",)}
 def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) -> dict[str, bytes]:
     """Return the bytes of a unit by the name of its file; ``fmi`` is the version, 2 or 3.
 
-    ScenarioError for a platform that is none, ProgramError for what cannot be translated or built.
+    ScenarioError for a platform that is none, ProgramError for what cannot be translated or built,
+    and for a unit of this computer that gives other numbers than Python.
     """
     # Before anything is built: a misspelt platform should not cost a compilation.
     chosen = {name: _platform(name, fmi) for name in platforms}
@@ -61,7 +63,10 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
         contents["sources/buildDescription.xml"] = build_description_of_fmi3(identifier, " ".join(FLAGS[1:]))
     for name, platform in chosen.items():
         folder = platform.folder_2 if fmi == 2 else platform.folder_3
-        contents[f"binaries/{folder}/{identifier}{platform.suffix}"] = build(name, sources, main)
+        library = build(name, sources, main)
+        if name == host_platform():
+            check_unit(interface, fmi, token, library)
+        contents[f"binaries/{folder}/{identifier}{platform.suffix}"] = library
     return {f"{identifier}.fmu": _archive(contents)}
 
 

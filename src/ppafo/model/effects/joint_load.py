@@ -20,10 +20,10 @@ class JointLoad(NamedTuple):
     ]
 
 
-def taken(torque: float, angle: float, angular_velocity: float, joint_load: JointLoad) -> float:
+def taken(torque: float, angle: float, rate: float, joint_load: JointLoad) -> float:
     """Torque [N m] that drag, spring and weight take from the joint: ``c w |w| + k (theta - theta_0) + T_w(theta)``."""
-    others = load_torque(torque, angle, angular_velocity)
-    drag = joint_load.drag * angular_velocity * abs(angular_velocity)
+    others = load_torque(torque, angle, rate)
+    drag = joint_load.drag * rate * abs(rate)
     spring = joint_load.stiffness * (angle - joint_load.rest_angle)
     return others + drag + spring + gravity_torque(angle, joint_load.weight)
 

@@ -69,9 +69,12 @@ class ValveModel:
 def valve_problem(valve: ValveModel) -> str:
     """Return where a valve and its function ``connect`` say two things of what it shows or of its ports, else empty."""
     hints = list(get_type_hints(valve.connect).values())
-    if len(hints) == 3 and hints[1] is not Any and hints[1] is not valve.shown:
+    if len(hints) != 3:
+        ports = f"tuple[{_name(valve.port)}, {_name(valve.port)}]"
+        return f"{valve.connect.__name__}(plant, shown) must be annotated with {_name(valve.shown)} and {ports}"
+    if hints[1] is not Any and hints[1] is not valve.shown:
         return f"{valve.connect.__name__} takes a {_name(hints[1])}, and the valve shows a {_name(valve.shown)}"
-    if len(hints) == 3 and hints[2] != tuple[valve.port, valve.port]:  # type: ignore[name-defined]
+    if hints[2] != tuple[valve.port, valve.port]:  # type: ignore[name-defined]
         return f"{valve.connect.__name__} makes {_name(hints[2])}, and the valve has ports {_name(valve.port)}"
     return ""
 

@@ -51,7 +51,7 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
-@checked("parameter_set", "parent")
+@checked
 def audit(
     parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
 ) -> list[Finding]:

@@ -238,7 +238,7 @@ class Catalogue:
         return tuple(part for parts in self.groups.values() for part in parts.values())
 
 
-@checked(name_or_path="catalogue")
+@checked
 def load_catalogue(catalogue: str | Path = DEFAULT) -> Catalogue:
     """Return a catalogue of parts by its name in the package or by the path of a TOML file.
 

@@ -41,21 +41,26 @@ _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """Numbers of a scenario [SI] by path with which the run might follow, and the text that names them."""
+    """Numbers of a scenario [SI] by path with which the run might follow, the same as overrides, and in a sentence."""
 
     numbers: Mapping[str, float]
-    text: str
+    overrides: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """Overrides in a sentence."""
+        return " and ".join(f"`{override.replace('=', ' = ', 1)}`" for override in self.overrides)
 
 
 def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
-    """Remedy with its text in the units of the device."""
+    """Remedy in the units of the device."""
     declared = declared_numbers(scenario)
-    texts = (
-        f"`{path} = {level_text(declared[path].unit, number, scenario)}`"
+    overrides = (
+        f"{path}={level_text(declared[path].unit, number, scenario)}"
         for path, number in numbers.items()
         if not path.endswith(_KEPT_OF_ORIFICE)
     )
-    return Remedy(dict(numbers), " and ".join(texts))
+    return Remedy(dict(numbers), tuple(overrides))
 
 
 def level_text(unit: str, number: float, scenario: Scenario) -> str:
@@ -93,9 +98,7 @@ def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | N
         if abs(float(settings[quantity.name]) - right) <= _SAME_GAIN * right:
             continue
         slopes = {f"controller.{name}": 0.0 for name in _SLOPES if settings.get(name, 0.0) > 0.0}
-        rest = "".join(f" and `{path.rpartition('.')[2]} = 0`" for path in slopes)
-        text = f"for this device `{quantity.name} = {right:.3g} {quantity.unit}`{rest}"
-        return Remedy({f"controller.{quantity.name}": right, **slopes}, text)
+        return remedy(scenario, {f"controller.{quantity.name}": right, **slopes})
     return None
 
 

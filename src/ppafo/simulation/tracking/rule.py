@@ -27,6 +27,8 @@ LARGEST_SHARE = 0.05
 """Share of RMS error in the wanted change above which a law that opens the valve gradually does not follow [-]."""
 LARGEST_SHARE_SWITCHED = 0.25
 """The same for a law that only switches, which swings about its reference by design [-]."""
+LARGEST_MEAN_SWITCHED = 0.15
+"""Share of mean error in the wanted change above which such a law does not follow [-]."""
 LARGEST_SHARE_MOVING = 0.2
 """The same where the reference never rests or the joint is moved: every loop follows late [-]."""
 LARGEST_SHARE_WALK = 0.5
@@ -194,7 +196,8 @@ def failure_of_task(settled: SettledPart, is_restless: bool, only_switches: bool
     if settled.share > LARGEST_SHARE and settled.moved <= SMALLEST_MOVE * settled.wanted:
         return "does not move"
     # A run that ends on its ramp has no settled part: every loop is behind there.
-    is_off = settled.share > most and not settled.ends_on_ramp
+    is_beside = only_switches and settled.rests and abs(settled.missing) > LARGEST_MEAN_SWITCHED * settled.wanted
+    is_off = (settled.share > most or is_beside) and not settled.ends_on_ramp
     if only_switches:
         swings = is_off and settled.swing > abs(settled.missing)
     else:

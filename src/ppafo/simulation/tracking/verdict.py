@@ -1,17 +1,15 @@
 """Verdict on a run: whether what is controlled follows its reference, what hinders it, and what was seen to help."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ppafo.control.kind import ControllerKind
-from ppafo.errors import PpafoError
 from ppafo.metrics.metric import has_reference
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
-from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.causes import Case, cause_of_task, torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
@@ -33,10 +31,6 @@ from ppafo.units.shown import in_units, units_in_force
 if TYPE_CHECKING:
     from ppafo.simulation.at_hand import Recorded
 
-MOST_TRIED = 12
-"""Remedies that are tried side by side."""
-_STRIDES_TRIED = 8.0
-"""Strides of a walk with which a remedy is tried: the first ones, in which a controller learns, are not judged."""
 _FEWEST_SAMPLES = 8
 """Samples of a recording below which nothing is judged."""
 
@@ -168,50 +162,3 @@ def tracking_of(
 def _rate(settled: SettledPart, is_restless: bool, of_command: float) -> float:
     """Reversals a second of the value where these fail, else of the command."""
     return settled.turns / settled.duration if settled.turns and not is_restless else of_command
-
-
-def tried(scenario: Scenario, verdict: Tracking | None) -> Tracking | None:
-    """Verdict with the first of its remedies that lets the run follow, from runs with each, side by side.
-
-    A walk is tried on its first strides. Without such a remedy it is the one that leaves the least error, if that is
-    less than half.
-    """
-    if verdict is None or verdict.accepted or not verdict.remedies:
-        return verdict
-    from ppafo.simulation.simulate import simulate_many
-
-    changed: list[tuple[Remedy, Scenario]] = []
-    for remedy in verdict.remedies[:MOST_TRIED]:
-        try:
-            changed.append((remedy, _on_trial(with_numbers(scenario, remedy.numbers))))
-        except PpafoError:
-            continue
-    try:
-        results = simulate_many([candidate for _, candidate in changed])
-    except PpafoError:
-        return verdict
-    best: tuple[Remedy, float] | None = None
-    for (remedy, _), result in zip(changed, results, strict=True):
-        if not result.status.is_completed:
-            continue
-        left = result.tracking
-        if left is None:
-            return replace(verdict, tried=f"with {remedy.text} it does, as a further run shows")
-        if left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
-            best = (remedy, left.error)
-    if best is not None:
-        error = change_text(verdict.controlled, best[1])
-        return replace(verdict, tried=f"with {best[0].text} an RMS error of {error} is left, as a further run shows")
-    names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
-    advice = f"{verdict.advice}; " if verdict.advice else ""
-    return replace(verdict, tried=f"{advice}other {names} alone did not mend it")
-
-
-def _on_trial(scenario: Scenario) -> Scenario:
-    """Scenario with which a remedy is tried: a task as it is, a walk of some strides."""
-    duration = _STRIDES_TRIED * scenario.motion.stride_time
-    if scenario.follows_reference or not 0.0 < duration < scenario.run.duration:
-        return scenario
-    # A whole number of steps and samples, as the walk itself has.
-    interval = scenario.run.output_interval
-    return replace(scenario, run=replace(scenario.run, duration=round(duration / interval) * interval))

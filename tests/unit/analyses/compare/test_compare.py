@@ -159,7 +159,7 @@ def test_a_loop_that_oscillates_is_said_and_is_on_no_front() -> None:
     assert task.pareto_front == ["paper"]
     said = [text for text in finding.found.remarks if "the torque loop oscillates" in text]
     assert len(said) == 1
-    assert "for this device `proportional_gain" in said[0]
+    assert "device's: `controller.proportional_gain" in said[0]
 
 
 def test_mistakes_are_one_line() -> None:

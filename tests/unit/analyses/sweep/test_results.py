@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import ppafo
 from ppafo.analyses.sweep.answer import finding_of, load_study_results
 from ppafo.analyses.sweep.results import StudyResults
 from ppafo.analyses.sweep.solve import describe, sorted_quantiles, sweep
@@ -86,11 +85,6 @@ def test_results_do_what_everything_solved_does(small_results: StudyResults, tmp
     assert "Sampled by sobol: 8 draws, seed 3." in page
     with pytest.raises(LookupError, match="there is no figure 'pareto'; available: figure"):
         finding.plot("pareto")
-
-
-def test_the_name_of_an_earlier_version_says_the_new_one() -> None:
-    with pytest.raises(AttributeError, match=r"ppafo\.run_study is now called ppafo\.sweep"):
-        _ = ppafo.run_study
 
 
 BAND_SHARES = (0.0, 0.05, 0.25, 0.5, 0.9, 1.0)

@@ -1,0 +1,312 @@
+"""Drawn joints of four kinds of actuator in the tasks of a bench, to count what a verdict on tracking says of them.
+
+Called by ``own_devices.py --joints N --seed S``. A run is judged here by a criterion of its own, written apart from the
+rule of the package: it looks at the last third of a run, at the mean error, the half range and the extremes. Runs near
+its limits are counted as between, since nobody can say whether they are good. All of it is synthetic.
+"""
+
+import math
+import random
+import re
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ppafo.errors import PpafoError
+from ppafo.parameters.reach import torque_reach
+from ppafo.running import tried
+from ppafo.simulation.loading import scenario_from_dict
+from ppafo.simulation.simulate import Result, simulate
+
+KINDS = ("vane", "cylinder", "bladder", "muscles")
+GOOD, FAILS, BETWEEN = "good", "fails", "between"
+_BAND = 1.25
+"""Factor about a limit within which a run is neither good nor failing."""
+_MEAN, _MEAN_OF_PAIR, _HALF_RANGE, _HALF_RANGE_OF_PAIR, _MOVING = 0.05, 0.15, 0.1, 0.45, 0.3
+"""Limits over the wanted change: mean error, half range of the error, mean error of a reference that moves."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrawnTask:
+    """A task of a joint: its name, the scenario as a document, and the file of the set it names."""
+
+    name: str
+    document: dict[str, Any]
+
+    @property
+    def only_switches(self) -> bool:
+        """True for a law that opens the valve fully or not at all."""
+        return bool(self.document["controller"]["kind"].startswith("on_off"))
+
+
+def _number(path: str, value: float, unit: str) -> str:
+    return f'[{path}]\nvalue = {value:.6g}\nunit = "{unit}"\norigin = "datasheet"\nsource = "drawn"\n'
+
+
+def draw_joint(draw: random.Random, kind: str, folder: Path, number: int) -> Path:
+    """Write the parameter set of a drawn joint with a proportional valve and a pair of on/off valves; its file."""
+
+    def log(low: float, high: float) -> float:
+        return float(low * (high / low) ** draw.random())
+
+    first = float(draw.randrange(5, 60))
+    last, gauge = first + draw.randrange(45, 110), draw.uniform(2.0, 8.0)
+    growth = log(3.0, 40.0)
+    numbers = [
+        ("supply.pressure", gauge, "bar_g"),
+        ("supply.atmospheric_pressure", 101325.0, "Pa_a"),
+        ("supply.dorsiflexion_pressure", gauge * draw.choice((1.0, 1.0, 0.6)), "bar_g"),
+        ("flow.linear_ratio", 0.999, ""),
+        ("gas.temperature", draw.uniform(12.0, 30.0), "degC"),
+        ("gas.heat_capacity_ratio", 1.4, ""),
+        ("gas.molar_mass", 28.96, "g/mol"),
+        ("actuator.angle_min", first, "deg"),
+        ("actuator.angle_max", last, "deg"),
+        ("actuator.restitution", 0.0, ""),
+        ("actuator.leak.area", draw.choice((0.0, 0.0, 0.003)), "mm^2"),
+        ("actuator.leak.discharge_coefficient", 0.6, ""),
+    ]
+    section = {"vane": "", "cylinder": '[actuator]\nkind = "cylinder"\n'}.get(
+        kind, f'[actuator]\nkind = "table"\nfile = "joint{number}.csv"\n'
+    )
+    if kind == "vane":
+        numbers.append(("actuator.torque_constant", growth, "cm^3"))
+        dead = (growth * log(0.05, 1.2), growth * log(0.05, 1.2))
+    elif kind == "cylinder":
+        lever, bore = draw.uniform(30.0, 60.0), draw.uniform(10.0, 25.0)
+        growth = math.pi / 4.0 * bore**2 * lever * 1e-3
+        numbers += [
+            ("actuator.bore", bore, "mm"),
+            ("actuator.rod_diameter", 0.4 * bore, "mm"),
+            ("actuator.lever_length", lever, "mm"),
+            ("actuator.base_distance", draw.uniform(3.0, 4.5) * lever, "mm"),
+            ("actuator.lever_offset", 90.0 - 0.5 * (first + last), "deg"),
+        ]
+        dead = (growth * log(0.03, 0.3), growth * log(0.03, 0.3))
+    else:
+        stiffness = draw.uniform(0.0, 0.3) if kind == "bladder" else 0.0
+        numbers += [("actuator.passive_stiffness", stiffness, "N m/rad"), ("actuator.rest_angle", first, "deg")]
+        dead = (growth * log(0.03, 0.3), growth * log(0.03, 0.3))
+        (folder / f"joint{number}.csv").write_text(_table(kind, first, last, gauge, growth), encoding="utf-8")
+    torque = 0.1 * growth * gauge
+    inertia = log(0.0005, 0.01) * max(torque, 0.5)
+    static = torque * log(0.005, 0.08)
+    numbers += [
+        ("actuator.dead_volume_1", dead[0], "cm^3"),
+        ("actuator.dead_volume_2", dead[1], "cm^3"),
+        ("friction.static_torque", static, "N m"),
+        ("friction.dynamic_torque", static * draw.uniform(0.5, 0.9), "N m"),
+        ("friction.viscous_damping", 0.05 * math.sqrt(inertia * torque), "N m s/rad"),
+        ("foot_plate.inertia", inertia, "kg m^2"),
+        ("foot_plate.gravity_torque", torque * draw.choice((0.0, 0.05)), "N m"),
+    ]
+    if draw.random() < 0.5:
+        orifice = [("sonic_conductance", growth * log(0.01, 0.1), "L/(s bar)"), ("critical_ratio", 0.3, "")]
+    else:
+        orifice = [("area", growth * log(0.05, 0.5), "mm^2"), ("discharge_coefficient", 0.7, "")]
+    numbers += [(f"valves.{name}.{item}", value, unit) for name in ("prop", "pair") for item, value, unit in orifice]
+    numbers.append(("valves.prop.delay", log(0.2, 6.0), "ms"))
+    if draw.random() < 0.4:
+        numbers.append(("valves.prop.dead_band", draw.uniform(0.02, 0.1), ""))
+    numbers += [
+        ("valves.pair.opening_delay", log(2.0, 20.0), "ms"),
+        ("valves.pair.closing_delay", log(2.0, 20.0), "ms"),
+        ("valves.pair.switching_interval", log(4.0, 50.0), "ms"),
+    ]
+    head = (
+        f'schema_version = 1\nname = "joint{number}"\ntitle = "Drawn joint {number}: {kind}"\ndefault_valve = "prop"\n'
+        f'[valves.prop]\nkind = "proportional"\n[valves.pair]\nkind = "solenoid"\n{section}'
+        '[gas.species]\nvalue = "air"\norigin = "datasheet"\nsource = "drawn"\n'
+    )
+    file = folder / f"joint{number}.toml"
+    file.write_text(head + "".join(_number(*item) for item in numbers), encoding="utf-8")
+    return file
+
+
+def _table(kind: str, first: float, last: float, gauge: float, growth: float) -> str:
+    """Table of volumes [mL] of a bladder, or of two braided muscles against each other, that grow so [mL/rad]."""
+    angles, pressures = np.linspace(first, last, 8), np.linspace(0.0, 100.0 * gauge, 3)
+    travel = math.radians(last - first)
+    lines = ["angle [deg],pressure [kPa_g],volume_1 [mL]" + (",volume_2 [mL]" if kind == "muscles" else "")]
+    for angle in angles:
+        share = math.radians(angle - first) / travel
+        for pressure in pressures:
+            if kind == "bladder":
+                volume = growth * travel * (0.2 + share - 0.15 * share**2) * (1.0 + 2.0e-4 * pressure)
+                lines.append(f"{angle:.3f},{pressure:.3f},{volume:.5f}")
+                continue
+            # A muscle gives less the more it has shortened: its volume is a parabola over the angle.
+            shortened = (share, 1.0 - share)
+            volumes = [growth * travel * (0.8 + 1.4 * each - 0.5 * each**2) for each in shortened]
+            lines.append(f"{angle:.3f},{pressure:.3f},{volumes[0]:.5f},{volumes[1]:.5f}")
+    return "\n".join(lines) + "\n"
+
+
+def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
+    """Give the tasks of a joint; references lie within the reach of the actuator where the name does not deny it."""
+    probe = _document(file, "prop", _middle(file), {"kind": "pid"}, {"kind": "constant", "level": "0 N m"}, 1.0, 1000)
+    device = scenario_from_dict(probe).device
+    low, high = float(device.actuator.angle_min), float(device.actuator.angle_max)
+    middle = 0.5 * (low + high)
+    rate = draw.choice((500, 1000, 2000))
+
+    def locked(angle: float) -> dict[str, Any]:
+        return {"kind": "locked", "angle": f"{angle:.6f} rad"}
+
+    def task(
+        name: str, motion: dict[str, Any], law: dict[str, Any], reference: dict[str, Any], valve: str = "prop"
+    ) -> DrawnTask:
+        duration = 4.0 if name.startswith("angle") else 2.5
+        return DrawnTask(name, _document(file, valve, motion, law, reference, duration, rate))
+
+    def hold(level: float) -> dict[str, Any]:
+        return {"kind": "ramp_hold", "level": f"{level:.6g} N m", "ramp_time": "0.3 s"}
+
+    at_rest, reach = torque_reach(device, middle)
+    base, travel = max(at_rest, 0.0), reach - max(at_rest, 0.0)
+    pid, level = {"kind": "pid"}, base + travel * draw.uniform(0.3, 0.7)
+    yield task("torque", locked(middle), pid, hold(level))
+    stop = low + 0.03 * (high - low)
+    yield task("torque near a stop", locked(stop), pid, hold(torque_reach(device, stop)[1] * draw.uniform(0.3, 0.7)))
+    yield task("torque beyond reach", locked(middle), pid, hold(reach * draw.uniform(1.1, 2.5)))
+    sine = {"kind": "sine", "level": f"{level:.6g} N m", "amplitude": f"{0.2 * travel:.6g} N m"}
+    yield task("torque sine", locked(middle), pid, {**sine, "frequency": f"{draw.uniform(0.3, 6.0):.3g} Hz"})
+    ramp = {"kind": "ramp_hold", "level": f"{level:.6g} N m", "ramp_time": "5 s"}
+    yield task("torque ramp", locked(middle), pid, ramp)
+    yield task("solenoid pair", locked(middle), {"kind": "on_off"}, hold(level), "pair")
+    yield task("dead zone", locked(middle), {"kind": "on_off_dead_zone"}, hold(level))
+    gain = {"kind": "pid", "proportional_gain": f"{draw.choice((0.003, 0.3, 30.0)):.3g} 1/(N m)"}
+    yield task("gains of another", locked(middle), gain, hold(level))
+    gauge = float(device.supply.pressure) - float(device.supply.atmospheric_pressure)
+    for name, share in (("pressure", draw.uniform(0.3, 0.8)), ("pressure above supply", 1.3)):
+        pressure = {"of": "pressure_1", "kind": "ramp_hold", "ramp_time": "0.3 s", "start_level": "0 Pa_g"}
+        yield task(name, locked(middle), pid, {**pressure, "level": f"{share * gauge:.6g} Pa_g"})
+    start, end = low + 0.3 * (high - low), low + draw.uniform(0.5, 0.7) * (high - low)
+    free = {"kind": "free", "angle": f"{start:.6f} rad"}
+    angle = {"of": "angle", "kind": "ramp_hold", "start_level": free["angle"], "level": f"{end:.6f} rad"}
+    cascade, slow = {"kind": "cascade"}, {**angle, "ramp_time": "0.5 s"}
+    yield task("angle", free, cascade, slow)
+    there = torque_reach(device, end)[1]
+    for name, share in (("angle, load", draw.uniform(0.3, 0.6)), ("angle, load beyond reach", 1.2)):
+        yield task(name, {**free, "external_torque": f"{share * there:.6g} N m"}, cascade, slow)
+    swing = {"of": "angle", "kind": "sine", "level": f"{middle:.6f} rad", "amplitude": f"{0.15 * (high - low):.6f} rad"}
+    yield task(
+        "angle sine",
+        {"kind": "free", "angle": f"{middle:.6f} rad"},
+        cascade,
+        {**swing, "frequency": f"{draw.uniform(0.2, 1.5):.3g} Hz"},
+    )
+
+
+def _middle(file: Path) -> dict[str, Any]:
+    ends = [
+        float(re.search(rf"\[actuator.angle_{end}\]\nvalue = (\S+)", file.read_text(encoding="utf-8"))[1])  # type: ignore[index]
+        for end in ("min", "max")
+    ]
+    return {"kind": "locked", "angle": f"{0.5 * sum(ends):.6g} deg"}
+
+
+def _document(
+    file: Path,
+    valve: str,
+    motion: Mapping[str, Any],
+    law: Mapping[str, Any],
+    reference: Mapping[str, Any],
+    duration: float,
+    rate: int,
+) -> dict[str, Any]:
+    return {
+        "schema_version": 1,
+        "name": "drawn",
+        "device": {"set": str(file), "valve": valve},
+        "run": {"duration": f"{duration} s", "output_interval": "2 ms"},
+        "motion": dict(motion),
+        "controller": {**law, "rate": f"{rate} Hz"},
+        "reference": dict(reference),
+    }
+
+
+def judge(result: Result, only_switches: bool) -> str:
+    """Judge a run by its last third, apart from the rule of the package: good, failing, or between."""
+    recording, of = result.recording, result.scenario.controlled
+    reference = recording["reference" if of == "torque" else f"reference_{of}"]
+    value = recording[of]
+    start = 0.0 if of == "torque" else float(value[0])
+    change = float(np.max(np.abs(reference - start)))
+    last = slice(2 * value.size // 3, None)
+    error = (value - reference)[last] / change
+    if np.ptp(reference[last]) > 0.02 * change:
+        measure = float(np.sqrt(np.mean(error**2))) / (0.2 if not only_switches else _MOVING)
+    else:
+        mean, half = abs(float(np.mean(error))), 0.5 * float(np.ptp(error))
+        turns = int(np.count_nonzero(np.diff(np.sign(error - np.mean(error)))))
+        limits = (_MEAN_OF_PAIR, _HALF_RANGE_OF_PAIR) if only_switches else (_MEAN, _HALF_RANGE)
+        # A range that is not crossed again and again is the end of a transient, which the mean has.
+        measure = max(mean / limits[0], half / limits[1] if turns >= 4 else 0.0)
+    return GOOD if measure < 1.0 / _BAND else FAILS if measure > _BAND else BETWEEN
+
+
+def printed_remedy(sentence: str) -> list[str]:
+    """Overrides of the remedy that a sentence prints as tried; none where it prints none."""
+    found = re.search(r"; with (.*) it does, as a further run shows", sentence)
+    return [] if found is None else [text.replace(" = ", "=", 1) for text in re.findall(r"`([^`]*)`", found[1])]
+
+
+def count_joints(seed: int, joints: int) -> dict[tuple[str, str], Counter[str]]:
+    """Run every task of drawn joints; counts by kind and task."""
+    draw = random.Random(seed)
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for number in range(joints):
+            kind = KINDS[number % len(KINDS)]
+            file = draw_joint(draw, kind, Path(folder), number)
+            for task in draw_tasks(draw, file):
+                row = counts.setdefault((kind, task.name), Counter())
+                row.update(_outcome(task))
+            print(f"{number + 1} of {joints} joints", file=sys.stderr, flush=True)
+    return counts
+
+
+def _outcome(task: DrawnTask) -> list[str]:
+    try:
+        scenario = scenario_from_dict(task.document)
+    except PpafoError:
+        return ["refused"]
+    result = simulate(scenario)
+    if not result.status.is_completed:
+        return ["diverged"]
+    judged, verdict = judge(result, task.only_switches), tried(scenario, result.tracking)
+    found = [judged]
+    if judged != BETWEEN:
+        found += [f"{judged} {'said' if verdict is not None else 'silent'}"]
+    remedy = [] if verdict is None else printed_remedy(verdict.sentence)
+    if remedy:
+        found += ["printed", *(["works"] if _mended(task, remedy) else [])]
+    return found
+
+
+def _mended(task: DrawnTask, overrides: list[str]) -> bool:
+    """True where the printed values, given as overrides, make a run that is not failing."""
+    try:
+        again = simulate(scenario_from_dict(task.document, overrides))
+    except PpafoError:
+        return False
+    return again.status.is_completed and judge(again, task.only_switches) != FAILS
+
+
+def table_text(counts: Mapping[tuple[str, str], Counter[str]]) -> str:
+    """Table of the counts, a line for each kind and task, and the sums."""
+    titles = ("good", "alarms", "fails", "said", "silent", "between", "refused", "diverged", "remedies", "work")
+    keys = ("good", "good said", "fails", "fails said", "fails silent", *titles[5:8], "printed", "works")
+    total: Counter[str] = Counter()
+    lines = [f"{'kind':10}{'task':27}" + "".join(f"{title:>9}" for title in titles)]
+    for (kind, task), row in sorted(counts.items()):
+        lines.append(f"{kind:10}{task:27}" + "".join(f"{row[key]:9}" for key in keys))
+        total += row
+    return "\n".join([*lines, f"{'all':37}" + "".join(f"{total[key]:9}" for key in keys)])

@@ -1,0 +1,141 @@
+"""A unit is loaded once on this computer and compared with Python before it is handed out."""
+
+import ctypes
+from collections.abc import Sequence
+from contextlib import closing
+from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
+from typing import Any, Protocol, final
+
+from ppafo.errors import ProgramError
+from ppafo.exports.c_library.expected import expected_csv
+from ppafo.exports.c_library.plant import EXAMPLE
+from ppafo.exports.fmu.interface import Interface
+from ppafo.exports.fmu.variables import variables_of
+from ppafo.storage.files import temporary_folder
+
+_NAME = b"trial"
+_CO_SIMULATION = 1
+"""fmi2CoSimulation, the kind of an instance of FMI 2."""
+
+
+class _Instance(Protocol):
+    """Calls of a loaded unit by version of FMI; each returns the status, 0 for good."""
+
+    def begin(self, numbers: Any, values: Any) -> int:
+        """Set inputs and come to the first sample."""
+
+    def advance(self, time: float, length: float) -> int:
+        """Do one communication step from a time, both in [s]."""
+
+    def read(self, numbers: Any, values: Any) -> int:
+        """Read outputs into ``values``."""
+
+    def close(self) -> None:
+        """Free the instance."""
+
+
+@final
+class _Fmi2:
+    """Instance of FMI 2."""
+
+    def __init__(self, library: ctypes.CDLL, token: str) -> None:
+        self.library = library
+        library.fmi2Instantiate.restype = c_void_p
+        words = (c_char_p(_NAME), c_int(_CO_SIMULATION), c_char_p(token.encode()), c_char_p(None))
+        self.own = c_void_p(library.fmi2Instantiate(*words, c_void_p(None), c_int(0), c_int(0)))
+
+    def begin(self, numbers: Any, values: Any) -> int:
+        """Set inputs and come to the first sample."""
+        experiment = (c_int(0), c_double(0.0), c_double(0.0), c_int(0), c_double(0.0))
+        return int(
+            self.library.fmi2SetupExperiment(self.own, *experiment)
+            or self.library.fmi2EnterInitializationMode(self.own)
+            or self.library.fmi2SetReal(self.own, numbers, c_size_t(len(numbers)), values)
+            or self.library.fmi2ExitInitializationMode(self.own)
+        )
+
+    def advance(self, time: float, length: float) -> int:
+        """Do one communication step from a time, both in [s]."""
+        return int(self.library.fmi2DoStep(self.own, c_double(time), c_double(length), c_int(1)))
+
+    def read(self, numbers: Any, values: Any) -> int:
+        """Read outputs into ``values``."""
+        return int(self.library.fmi2GetReal(self.own, numbers, c_size_t(len(numbers)), values))
+
+    def close(self) -> None:
+        """Free the instance."""
+        self.library.fmi2FreeInstance(self.own)
+
+
+@final
+class _Fmi3:
+    """Instance of FMI 3, without event mode."""
+
+    def __init__(self, library: ctypes.CDLL, token: str) -> None:
+        self.library = library
+        library.fmi3InstantiateCoSimulation.restype = c_void_p
+        flags = (c_bool(False),) * 4
+        nothing = (c_void_p(None), c_size_t(0), c_void_p(None), c_void_p(None), c_void_p(None))
+        words = (c_char_p(_NAME), c_char_p(token.encode()), c_char_p(None))
+        self.own = c_void_p(library.fmi3InstantiateCoSimulation(*words, *flags, *nothing))
+
+    def begin(self, numbers: Any, values: Any) -> int:
+        """Set inputs and come to the first sample."""
+        count = c_size_t(len(numbers))
+        experiment = (c_bool(False), c_double(0.0), c_double(0.0), c_bool(False), c_double(0.0))
+        return int(
+            self.library.fmi3EnterInitializationMode(self.own, *experiment)
+            or self.library.fmi3SetFloat64(self.own, numbers, count, values, count)
+            or self.library.fmi3ExitInitializationMode(self.own)
+        )
+
+    def advance(self, time: float, length: float) -> int:
+        """Do one communication step from a time, both in [s]."""
+        flags, last = [ctypes.byref(c_bool()) for _ in range(3)], ctypes.byref(c_double())
+        return int(self.library.fmi3DoStep(self.own, c_double(time), c_double(length), c_bool(True), *flags, last))
+
+    def read(self, numbers: Any, values: Any) -> int:
+        """Read outputs into ``values``."""
+        count = c_size_t(len(numbers))
+        return int(self.library.fmi3GetFloat64(self.own, numbers, count, values, count))
+
+    def close(self) -> None:
+        """Free the instance."""
+        self.library.fmi3FreeInstance(self.own)
+
+
+def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> None:
+    """Load the library of a unit for this computer and compare its outputs with the run of Python, to the bit.
+
+    ProgramError where it cannot be loaded, a call fails, or an output is another number.
+    """
+    head, *lines = expected_csv(interface.run, interface.outputs).decode().splitlines()
+    rows = [[float(text) for text in line.split(",")] for line in lines]
+    numbers = {variable.name: variable.number for variable in variables_of(interface)}
+    outputs = head.split(",")[1:]
+    inputs = {item.name: EXAMPLE if item.name == "command" else item.start for item in interface.inputs}
+    with temporary_folder("ppafo-unit", {"unit": library}) as folder:
+        try:
+            loaded = ctypes.CDLL(str(Path(folder, "unit")))
+        except OSError as error:
+            raise ProgramError(f"{interface.name}: the unit was built and cannot be loaded here: {error}") from error
+        instance: _Instance
+        with closing(_Fmi2(loaded, token) if fmi == 2 else _Fmi3(loaded, token)) as instance:
+            given = _array(c_uint, [numbers[name] for name in inputs]), _array(c_double, list(inputs.values()))
+            shown, found = _array(c_uint, [numbers[name] for name in outputs]), (c_double * len(outputs))()
+            status, before = instance.begin(*given), 0.0
+            for time, *expected in rows:
+                status = status or (instance.advance(before, time - before) if time > 0.0 else 0)
+                status, before = status or instance.read(shown, found), time
+                for name, value, wanted in zip(outputs, found, expected, strict=True):
+                    if status or value != wanted:
+                        problem = f"{name} is {value!r}, Python has {wanted!r}" if not status else "a call fails"
+                        raise ProgramError(
+                            f"{interface.name}: the unit is not what Python computes: at {time:g} s {problem}; nothing "
+                            "is written"
+                        )
+
+
+def _array(kind: Any, values: Sequence[Any]) -> Any:
+    return (kind * len(values))(*values)

@@ -1,0 +1,118 @@
+"""What a student changes in the step is right in every backend, or is refused in one line that says where."""
+
+from dataclasses import replace
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from ppafo.engine import run as runs
+from ppafo.engine.groups import Groups, given, handed
+from ppafo.engine.lanes import run_batch
+from ppafo.engine.program import Program
+from ppafo.engine.run import Run, batch_of
+from ppafo.engine.step import isothermal, phases
+from ppafo.engine.step.lane import Lane
+from ppafo.errors import ProgramError
+from ppafo.model.plant import BlendedPort, single_ports
+from ppafo.model.valves.vent_valve import connect_ideal
+from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
+
+begun = phases.begin_step
+BACKENDS = pytest.mark.parametrize("backend", ["", "python"])
+
+
+class Mine(NamedTuple):
+    """A parameter of a gas: its share of the usual change of mass [-]."""
+
+    share: float
+
+
+def groups(parts: Program) -> Groups:
+    """Groups of the gas, with the parameter and one that a phase hands on."""
+    return {**isothermal.groups(parts), "mine": given(Mine), "halved": handed(float)}
+
+
+def change(parts: Program, lane: Any, length: float) -> None:
+    """The change by both stages, of which the parameter leaves a share."""
+    isothermal.change(parts, lane, length)
+    lane.halved = 0.5 * lane.mine.share
+    share = lane.halved + lane.halved
+    lane.change = lane.change._replace(mass_1=share * lane.change.mass_1, supplied=share * lane.change.supplied)
+
+
+def gas_of_mine() -> Any:
+    """The module of a gas that is isothermal but for its change of mass."""
+    made = ModuleType("gas_of_mine")
+    vars(made).update({name: value for name, value in vars(isothermal).items() if not name.startswith("__")})
+    made.groups, made.change = groups, change  # type: ignore[attr-defined]
+    return made
+
+
+def with_gas_of_mine() -> Run:
+    run = plan_run(load_scenario("step-response", ("run.duration=20 ms",)))
+    return replace(run, program=replace(run.program, gas=gas_of_mine()))
+
+
+def test_a_parameter_of_a_gas_that_nothing_gives_is_refused_by_component_and_field() -> None:
+    with pytest.raises(ProgramError, match=r"parameters: 'mine' is a Mine\(share\), and nothing gives it; engine/run"):
+        batch_of(with_gas_of_mine())
+
+
+@BACKENDS
+def test_a_gas_with_a_parameter_and_a_group_that_is_set_and_read_does_what_it_says(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
+    usual = run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=20 ms",))))).record
+    parameters_of = runs._parameters_of
+    records = []
+    for share in (1.0, 0.5):
+        mine = {"mine": Mine(share)}
+        monkeypatch.setattr(runs, "_parameters_of", lambda *given, more=mine: {**parameters_of(*given), **more})
+        records.append(run_batch(batch_of(with_gas_of_mine())).record)
+    assert np.array_equal(records[0], usual)
+    assert not np.array_equal(records[1], usual)
+
+
+def unannotated(plant, shown):  # type: ignore[no-untyped-def]
+    """Ports of a valve that does not say which."""
+    return single_ports(plant, shown)
+
+
+@BACKENDS
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"port": BlendedPort}, r"valve: single_ports makes tuple.*, and the valve has ports BlendedPort"),
+        ({"connect": unannotated}, r"valve: unannotated\(plant, shown\) must be annotated with float and tuple\[Sing"),
+        ({"shown": Mine, "connect": connect_ideal}, r"valve: connect_ideal takes a VentedOpening, and .* shows a Mine"),
+    ],
+)
+def test_a_valve_whose_function_says_another_thing_than_the_valve_is_refused(
+    changed: dict[str, Any], said: str, backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
+    run = plan_run(load_scenario("step-response", ("run.duration=20 ms",)))
+    batch = batch_of(replace(run, program=replace(run.program, valve=replace(run.program.valve, **changed))))
+    with pytest.raises(ProgramError, match=said):
+        run_batch(batch)
+
+
+def unmade(parts: Program, lane: Lane) -> None:
+    """Ask for a group that is misspelt."""
+    begun(parts, lane)
+    lane.before = lane.befor  # type: ignore[attr-defined]
+
+
+@BACKENDS
+def test_a_group_that_nothing_has_is_refused_with_the_nearest_name(
+    backend: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PPAFO_BACKEND", backend)
+    monkeypatch.setattr(phases, "begin_step", unmade)
+    said = r"test_edits_of_the_step\.py:\d+: no phase before this one sets 'lane.befor', .*did you mean 'before'"
+    with pytest.raises(ProgramError, match=said):
+        run_batch(batch_of(plan_run(load_scenario("step-response", ("run.duration=2 ms",)))))
