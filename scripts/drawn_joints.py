@@ -1,8 +1,8 @@
 """Drawn joints of four kinds of actuator in the tasks of a bench, to count what a verdict on tracking says of them.
 
 Called by ``own_devices.py --joints N --seed S``. A run is judged here by a criterion of its own, written apart from the
-rule of the package: it looks at the last third of a run, at the mean error, the half range and the extremes. Runs near
-its limits are counted as between, since nobody can say whether they are good. All of it is synthetic.
+rule of the package: it looks at the last third of a run, at the mean error, the half range and how often the valve is
+thrown over. Runs near its limits are counted as between, since nobody can say whether they are good. All is synthetic.
 """
 
 import math
@@ -29,7 +29,9 @@ GOOD, FAILS, BETWEEN = "good", "fails", "between"
 _BAND = 1.25
 """Factor about a limit within which a run is neither good nor failing."""
 _MEAN, _MEAN_OF_PAIR, _HALF_RANGE, _HALF_RANGE_OF_PAIR, _MOVING = 0.05, 0.15, 0.1, 0.45, 0.3
-"""Limits over the wanted change: mean error, half range of the error, mean error of a reference that moves."""
+"""Limits over the wanted change: mean error, half range of the error, RMS error of a moving one of a pair."""
+_TURNS = 15.0
+"""Reversals of the command a second, from more than half open to more than half open, of a loop that fails."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,11 +246,17 @@ def judge(result: Result, only_switches: bool) -> str:
     if np.ptp(reference[last]) > 0.02 * change:
         measure = float(np.sqrt(np.mean(error**2))) / (0.2 if not only_switches else _MOVING)
     else:
-        mean, half = abs(float(np.mean(error))), 0.5 * float(np.ptp(error))
-        turns = int(np.count_nonzero(np.diff(np.sign(error - np.mean(error)))))
-        limits = (_MEAN_OF_PAIR, _HALF_RANGE_OF_PAIR) if only_switches else (_MEAN, _HALF_RANGE)
-        # A range that is not crossed again and again is the end of a transient, which the mean has.
-        measure = max(mean / limits[0], half / limits[1] if turns >= 4 else 0.0)
+        mean, half = float(np.mean(np.abs(error))), 0.5 * float(np.ptp(error))
+        if only_switches:
+            # It swings by design: its mean counts, and its half range.
+            measure = max(abs(float(np.mean(error))) / _MEAN_OF_PAIR, half / _HALF_RANGE_OF_PAIR)
+        else:
+            measure = max(mean / _MEAN, half / _HALF_RANGE)
+    command = recording["command"][last]
+    open_ways = np.sign(command[np.abs(command) > 0.5])
+    turns = np.count_nonzero(np.diff(open_ways)) / float(np.ptp(recording.time[last][[0, -1]]))
+    # A valve that is opened one way and the other all the time is worn out, however small the error is.
+    measure = measure if only_switches else max(measure, turns / _TURNS)
     return GOOD if measure < 1.0 / _BAND else FAILS if measure > _BAND else BETWEEN
 
 

@@ -126,9 +126,8 @@ class Cascade:
         asked = self.sense(wanted, angle, shown)
         error = wanted - angle
         moves = self.is_begun and 0.02 * self.still < law.rest_distance
-        self.is_held = asked == 0.0 and (
-            (self.is_held and abs(error) < 2.0 * law.tolerance) or (abs(error) < law.tolerance and not moves)
-        )
+        allowed = 2.0 * law.tolerance if self.is_held else law.tolerance
+        self.is_held = asked == 0.0 and abs(error) < allowed and not moves
         acting = max(-law.error_limit, min(law.error_limit, error))
         slip = asked + 2.0 * law.angle_stiffness / law.angle_damping * acting
         friction = 0.7 * law.friction_torque * max(-1.0, min(1.0, slip / 0.05))

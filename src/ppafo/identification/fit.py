@@ -279,7 +279,8 @@ def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
         unidentified=tuple(unidentified(covariance, names)),
         shares=_shares(work, covariance, names),
         evaluations=work.evaluations,
-        has_converged=gain < _CONVERGED,
+        # Where every step leaves the region in which runs succeed nothing says that this is the least.
+        has_converged=-math.inf < gain < _CONVERGED,
         sensors=known,
         jacobian=whitened / work.scale,
         confidence=confidence,

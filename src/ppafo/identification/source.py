@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,6 +107,8 @@ _FRACTION_THAT_MOVES = 0.02
 """Fraction of its largest value by which what drives a channel must move for a constant one to be clipped."""
 _LARGEST_NUMBER = 1.0e12
 """Size of a number above which no bench has measured it, in any SI unit."""
+_MOST_IMPOSSIBLE = 0.1
+"""Share of the readings of a flow meter that may be impossible; more are a mistake of signs or columns."""
 _GROSS_SAMPLE, _GROSS_READING = 1.0 / 6.0, 0.25
 """Shares of the usual range from which a sample over time, by 6 of them, and a reading are grossly wrong.
 
@@ -274,6 +276,54 @@ def check_no_wrong_reading(
         samples = [int(place) - begins for place in places[wrong] if begins <= place < ends[at]]
         samples.sort(key=lambda sample: sample != places[first] - begins)
         _refuse_outlier(sources[at], procedure, name, samples, float(values[first]), float(middle[first]))
+
+
+class MeterReadings(NamedTuple):
+    """Readings of a flow meter: flow with its direction [kg/s], which of them can be, and remarks on the others."""
+
+    flow: Floats
+    possible: NDArray[np.bool_]
+    remarks: tuple[str, ...]
+
+
+def meter_readings(
+    sources: tuple[Source, ...], procedure: str, direction: Floats, zero: float, used: NDArray[np.bool_] | None = None
+) -> MeterReadings:
+    """Readings of the flow meter, each beside the direction that pressures or command give the flow.
+
+    Under every law gas flows from the higher to the lower pressure. A meter that never shows a flow below 0 has no
+    sign: where the flow went the other way in many readings, it gets the sign of its direction. Any other reading
+    against its direction by more than the ``zero`` of the meter [fraction of its largest reading] is impossible, and so
+    is one of a meter without sign at all.
+
+    Arguments: ``direction`` (readings,) of all recordings, above 0 for a flow that counts above 0; ``used`` tells which
+    readings count, all by default. Raises IdentificationError where more than a tenth are impossible.
+    """
+    flow = pool(sources, "mass_flow")
+    counted = np.ones(flow.size, dtype=np.bool_) if used is None else used
+    largest = float(np.abs(flow[counted]).max(initial=0.0))
+    has_sign = bool((flow[counted] < 0.0).any())
+    against = counted & (direction * flow < 0.0) & (np.abs(flow) > (zero * largest if has_sign else 0.0))
+    many = _MOST_IMPOSSIBLE * np.count_nonzero(counted)
+    if not has_sign and np.count_nonzero(against) > many:
+        said = f"{procedure}: the flow meter has no sign; the flow has the direction that the other channels give it"
+        return MeterReadings(np.where(direction < 0.0, -flow, flow), counted, (said,))
+    wrong = np.flatnonzero(against)
+    if wrong.size > many:
+        raise IdentificationError(
+            f"{sources[0].name}: {procedure}: the flow runs against the direction that pressures and command give it "
+            f"in {wrong.size} of {np.count_nonzero(counted)} readings; reverse the sign of 'mass_flow'"
+        )
+    if not wrong.size:
+        return MeterReadings(flow, counted, ())
+    ends = np.cumsum([len(source.recording) for source in sources])
+    at = int(np.searchsorted(ends, wrong[0], side="right"))
+    sample = int(wrong[0]) - (int(ends[at]) - len(sources[at].recording)) + 1
+    said = (
+        f"left out: {wrong.size} of {np.count_nonzero(counted)} readings with a flow against the direction that "
+        f"pressures and command give it, which no opening has; the first is sample {sample} of {sources[at].name}"
+    )
+    return MeterReadings(flow, counted & ~against, (said,))
 
 
 def usual_range(values: Floats) -> float:

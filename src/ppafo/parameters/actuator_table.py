@@ -23,6 +23,8 @@ compiled code has room for a fixed number of both."""
 _NOTHING = Curve((0.0,) * _POWERS, (0.0,) * BENDS)
 _CHECKED_SHARES = np.linspace(0.0, 1.0, 201)
 """Shares of the range of angles [-] at which a curve is looked at; at most 12 angles were measured."""
+_CLEAR = 1.0e-5
+"""Distance of a moved curve from 0, in last digits."""
 _ROUNDING_VOLUME = 1.0e-12
 """Size of a negative volume [m^3] that is rounding of the spline."""
 _ROUNDING_SHARE = 1.0e-9
@@ -37,18 +39,21 @@ def read_actuator_table(path: Path) -> Table:
 def table_of(measured: MeasuredVolumes, file: str) -> Table:
     """Return the curves through measured volumes; ``file`` is what messages call them.
 
-    ParameterError for angles so far apart that a curve between them is negative, or falls with the pressure.
+    Where a curve between the angles would be negative or fall with the pressure, the volumes are moved within their
+    last digit, as little as possible. ParameterError where that is not enough.
     """
     angles = measured.angles
     shares = (angles - angles[0]) / (angles[-1] - angles[0])
     # A bend at each angle but the first two and the last two, so that there are as many coefficients as angles.
     bends = shares[2:-2]
-    chamber_1 = _chamber(measured.volume_1, measured.pressures, shares)
+    volume_1, _ = within_resolution(measured.volume_1, shares, measured.resolution_1)
+    chamber_1 = _chamber(volume_1, measured.pressures, shares)
     _check_curves(chamber_1, bends, angles, "volume_1", file)
     if measured.volume_2 is None:
         chamber_2 = Chamber(_NOTHING, tuple(rise._replace(gain=_NOTHING) for rise in chamber_1.rises))
     else:
-        chamber_2 = _chamber(measured.volume_2, measured.pressures, shares)
+        volume_2, _ = within_resolution(measured.volume_2[::-1], 1.0 - shares[::-1], measured.resolution_2)
+        chamber_2 = _chamber(volume_2[::-1], measured.pressures, shares)
         _check_curves(chamber_2, bends, angles, "volume_2", file)
     return Table(
         first_angle=float(angles[0]),
@@ -58,6 +63,58 @@ def table_of(measured: MeasuredVolumes, file: str) -> Table:
         chamber_1=chamber_1,
         chamber_2=chamber_2,
     )
+
+
+def largest_move(path: Path) -> tuple[float, float]:
+    """Largest move of a volume of a file within its last digit [m^3], and that digit [m^3]; 0 for exact curves."""
+    measured = read_measured_volumes(path)
+    shares = (measured.angles - measured.angles[0]) / (measured.angles[-1] - measured.angles[0])
+    _, first = within_resolution(measured.volume_1, shares, measured.resolution_1)
+    if measured.volume_2 is None:
+        return first, measured.resolution_1
+    _, second = within_resolution(measured.volume_2[::-1], 1.0 - shares[::-1], measured.resolution_2)
+    return max((first, measured.resolution_1), (second, measured.resolution_2))
+
+
+def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tuple[Floats, float]:
+    """Volumes [m^3] (angles, pressures) whose curves are those of a chamber, and how far one is moved at most [m^3].
+
+    The curves are 0 or more, grow with the pressure, and at the highest pressure their numbers grow with the angle.
+    The largest move is the least one, by linear programming; nothing is moved where more than half of the last digit
+    ``resolution`` [m^3] would be needed.
+    """
+    bends = shares[2:-2]
+    spline = _basis(_CHECKED_SHARES, bends)[:, : shares.size] @ np.linalg.inv(_basis(shares, bends)[:, : shares.size])
+    angles, pressures = volume.shape
+    rises = np.diff(np.eye(pressures), axis=0)
+    rules = np.vstack(
+        [
+            np.kron(spline, np.eye(pressures)[:1]),
+            *(np.kron(spline, rise[None, :]) for rise in rises),
+            np.kron(np.diff(np.eye(angles), axis=0), np.eye(pressures)[-1:]),
+        ]
+    )
+    found = rules @ volume.ravel()
+    if resolution == 0.0 or found.min() >= 0.0:
+        return volume, 0.0
+    # SciPy is slow to load, and few tables need it.
+    from scipy.optimize import linprog
+
+    size = volume.size
+    cost = np.append(np.zeros(size), 1.0)
+    # In last digits. A little more than 0, for the solver is exact to 1e-7.
+    limits = found / resolution - _CLEAR
+    rules = np.hstack([-rules, np.zeros((rules.shape[0], 1))])
+    moved = np.hstack([np.vstack([np.eye(size), -np.eye(size)]), -np.ones((2 * size, 1))])
+    solved = linprog(
+        cost,
+        A_ub=np.vstack([rules, moved]),
+        b_ub=np.append(limits, np.zeros(2 * size)),
+        bounds=[*[(-0.5, 0.5)] * size, (0.0, 0.5)],
+    )
+    if solved.status != 0:
+        return volume, 0.0
+    return volume + resolution * solved.x[:size].reshape(volume.shape), float(resolution * solved.x[-1])
 
 
 def highest_pressure(table: Table) -> float:

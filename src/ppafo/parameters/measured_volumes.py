@@ -10,6 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -52,12 +53,15 @@ class MeasuredVolumes:
     """Volumes of the chambers [m^3], each (angles, pressures), at every pair of an angle and a pressure.
 
     ``angles`` [rad] and ``pressures`` [Pa, gauge] grow. ``volume_2`` is None of an actuator with one chamber.
+    ``resolution_1`` and ``resolution_2`` [m^3] are the last digits that the volumes were written with.
     """
 
     angles: Floats
     pressures: Floats
     volume_1: Floats
     volume_2: Floats | None
+    resolution_1: float = 0.0
+    resolution_2: float = 0.0
 
 
 def read_measured_volumes(path: Path) -> MeasuredVolumes:
@@ -69,7 +73,7 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
         raise ParameterError(f"{file}: is not a text file in UTF-8 (byte {error.start})") from error
     except (OSError, ValueError) as error:
         raise ParameterError(f"{file}: cannot be read: {reason(error)}") from error
-    columns = _columns(text, file)
+    columns, digits = _columns(text, file)
     angles, pressures = np.unique(columns["angle"]), np.unique(columns["pressure"])
     _check_grid(columns["angle"], columns["pressure"], file)
     order = np.lexsort((columns["pressure"], columns["angle"]))
@@ -79,8 +83,15 @@ def read_measured_volumes(path: Path) -> MeasuredVolumes:
         if name.startswith("volume")
     }
     for name in sorted(volumes):
-        _check_volume(name, volumes[name], angles, pressures, file)
-    return MeasuredVolumes(angles, pressures, volumes["volume_1"], volumes.get("volume_2"))
+        _check_volume(name, volumes[name], angles, pressures, digits[name], file)
+    return MeasuredVolumes(
+        angles=angles,
+        pressures=pressures,
+        volume_1=volumes["volume_1"],
+        volume_2=volumes.get("volume_2"),
+        resolution_1=digits["volume_1"],
+        resolution_2=digits.get("volume_2", 0.0),
+    )
 
 
 class _Line(NamedTuple):
@@ -100,14 +111,18 @@ def _lines(text: str, file: str) -> list[_Line]:
     return [_Line(number, [cell.strip().strip('"') for cell in line.split(",")]) for number, line in lines]
 
 
-def _columns(text: str, file: str) -> dict[str, Floats]:
-    """Return the columns of a file by name, each (lines,), in SI units; pressures are above the atmosphere."""
+def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]:
+    """Return the columns of a file by name, each (lines,), and their last digits, in SI units.
+
+    Pressures are above the atmosphere.
+    """
     header, *lines = _lines(text, file)
     units = _units(header.cells, file)
     rows = [_numbers(line, tuple(units), file) for line in lines]
     if not rows:
         raise ParameterError(f"{file}: has a header and no line of numbers")
     columns: dict[str, Floats] = {}
+    digits: dict[str, float] = {}
     for index, (name, unit) in enumerate(units.items()):
         declared = COLUMNS[name]
         # Over a vacuum a gauge pressure is its own SI value.
@@ -119,7 +134,16 @@ def _columns(text: str, file: str) -> dict[str, Floats]:
                 f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
             )
         columns[name] = column
-    return columns
+        last = min(_last_digit(line.cells[index]) for line in lines)
+        digits[name] = abs(to_si(last, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
+    return columns, digits
+
+
+def _last_digit(cell: str) -> float:
+    """Return the size of the last digit of a number as it is written: 0.1 for 7.4."""
+    exponent = Decimal(number_text(cell)).as_tuple().exponent
+    assert isinstance(exponent, int), "the number is finite"
+    return math.pow(10.0, exponent)
 
 
 def _units(header: Sequence[str], file: str) -> dict[str, str]:
@@ -197,24 +221,28 @@ def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file
         raise ParameterError(f"{file}: two values of {name} are almost equal; merge or round them")
 
 
-def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, file: str) -> None:
-    """Refuse volumes [m^3] (angles, pressures) that no chamber has.
+def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, resolution: float, file: str) -> None:
+    """Refuse volumes [m^3] (angles, pressures) that no chamber has, written with a last digit of ``resolution`` [m^3].
 
-    They are negative, fall as the pressure grows, or at the highest pressure do not grow with the angle (chamber 1) or
-    shrink with it (chamber 2).
+    They are negative, fall by more than that as the pressure grows, or at the highest pressure do not grow with the
+    angle (chamber 1) or shrink with it (chamber 2).
     """
+    # Half of the last digit each, and what the last bit of two numbers makes of it.
+    unseen = resolution * (1.0 + 1.0e-6)
     if volume.min() < 0.0:
         row, column = np.unravel_index(int(np.argmin(volume)), volume.shape)
         point = _point_text(angles[row], pressures[column])
         raise ParameterError(f"{file}: {name} = {volume.min() * 1e6:.6g} mL at {point} is negative")
-    falls = np.argwhere(np.diff(volume, axis=1) < 0.0)
+    falls = np.argwhere(np.diff(volume, axis=1) < -unseen)
     if falls.size:
         row, column = falls[0]
         raise ParameterError(
             f"{file}: {name} falls with the pressure at {_point_text(angles[row], pressures[column + 1])}"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
-    wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= 0.0)
+    wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)
+    if np.ptp(volume[:, -1]) <= unseen:
+        wrong = np.arange(1)
     if wrong.size:
         raise ParameterError(
             f"{file}: {name} must {direction} with the angle at the highest pressure, and does not at "

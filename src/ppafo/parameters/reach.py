@@ -9,8 +9,8 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import plant_parameters
 
-HIGHEST_PRESSURE = 1.0e8
-"""Supply pressure [Pa gauge] above which no larger one is tried."""
+HIGHEST_PRESSURE = 1.6e6
+"""Highest supply pressure [Pa gauge] that is looked for: what usual pneumatic parts are built for at most."""
 _HALVINGS = 60
 """Bisection steps, which bring any bracket down to rounding."""
 
@@ -47,11 +47,9 @@ def supply_for(device: Device, angle: float, torque: float) -> float | None:
         full = vented + gauge
         return sign * own(angle, *((full, vented) if sign > 0.0 else (vented, full))) >= sign * torque
 
-    low, high = 0.0, 1.0e5
-    while not is_enough(high):
-        low, high = high, 2.0 * high
-        if high > HIGHEST_PRESSURE:
-            return None
+    if not is_enough(HIGHEST_PRESSURE):
+        return None
+    low, high = 0.0, HIGHEST_PRESSURE
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if is_enough(middle) else (middle, high)

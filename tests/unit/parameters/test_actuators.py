@@ -1,5 +1,6 @@
 """Actuators in parameter sets: kinds, what does not fit together, and the file of one that was measured."""
 
+import math
 from importlib import resources
 from pathlib import Path
 
@@ -11,9 +12,10 @@ from ppafo.cli.main import main
 from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError
 from ppafo.model.actuators.table import bases_at, level_of
-from ppafo.parameters.actuator_table import read_actuator_table, table_of
+from ppafo.parameters.actuator_table import read_actuator_table, table_of, within_resolution
+from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
-from ppafo.parameters.measured_volumes import MeasuredVolumes
+from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_volumes
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
@@ -105,6 +107,40 @@ def test_a_file_that_is_wrong_is_refused_in_one_line(tmp_path: Path, lines: tupl
         read_actuator_table(path)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+ROUNDED = (
+    *("20,0,2.7", "20,55,3.8", "20,110,3.8", "34,0,3.5", "34,55,5.0", "34,110,5.0"),
+    *("47,0,4.4", "47,55,6.2", "47,110,6.2", "61,0,5.2", "61,55,7.3", "61,110,7.4"),
+    *("75,0,6.0", "75,55,8.4", "75,110,8.5"),
+)
+
+
+def test_a_table_is_fitted_within_its_last_digit_and_no_further(tmp_path: Path) -> None:
+    measurements = read_measured_volumes(measured(tmp_path, HEADER, *ROUNDED))
+    shares = (measurements.angles - measurements.angles[0]) / np.ptp(measurements.angles)
+    fitted, moved = within_resolution(measurements.volume_1, shares, measurements.resolution_1)
+    assert measurements.resolution_1 == pytest.approx(0.1e-6)
+    assert 0.0 < moved <= 0.05e-6
+    assert np.max(np.abs(fitted - measurements.volume_1)) == pytest.approx(moved)
+    assert read_actuator_table(measured(tmp_path, HEADER, *ROUNDED)).last_angle == pytest.approx(math.radians(75.0))
+    exact = [f"{line}00" for line in ROUNDED]
+    with pytest.raises(ParameterError, match="falls with the pressure near"):
+        read_actuator_table(measured(tmp_path, HEADER, *exact))
+    unmoved, none = within_resolution(measurements.volume_1, shares, 0.0)
+    assert none == 0.0
+    assert unmoved is measurements.volume_1
+
+
+def test_the_audit_says_by_how_much_a_rounded_table_is_moved(tmp_path: Path) -> None:
+    text = (EXAMPLE / "measured-bladder.toml").read_text(encoding="utf-8")
+    path, table = tmp_path / "measured-bladder.toml", tmp_path / "measured-bladder.csv"
+    path.write_text(text.replace("angle_max]\nvalue = 110", "angle_max]\nvalue = 75"), encoding="utf-8")
+    table.write_bytes((EXAMPLE / "measured-bladder.csv").read_bytes())
+    assert "rounded-table" not in {finding.id for finding in audit(path)}
+    table.write_text("\n".join([HEADER, *ROUNDED]), encoding="utf-8")
+    (found,) = (finding for finding in audit(path) if finding.id == "rounded-table")
+    assert "within the last digit of 0.1 mL" in found.paragraph
 
 
 def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:

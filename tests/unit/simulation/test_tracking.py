@@ -25,6 +25,7 @@ def test_the_reach_of_a_cylinder_is_force_times_arm() -> None:
     force = math.pi / 4.0 * settings["bore"] ** 2 * gauge
     most = force * lever * base * math.sin(turned) / length
     assert torque_reach(device, angle)[1] == pytest.approx(most, rel=1e-9)
+    assert supply_for(device, angle, 20.0 * most) is None
     assert supply_for(device, angle, 2.0 * most) == pytest.approx(device.supply.pressure + gauge, rel=1e-6)
 
 

@@ -21,6 +21,8 @@ _INNER = 3
 """Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
 """Smallest fraction of a draw, whose normal score is finite, and so is that of the largest, 1 less it."""
+_ONE = 0.6827
+"""Confidence of one standard deviation."""
 _NEAREST = 0.2
 """Fraction of the runs, nearest to an end of a value, that say what the metric is there."""
 
@@ -223,30 +225,41 @@ def changes(evaluated: Evaluated, confidence: float) -> tuple[Floats, Floats]:
     In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of
     two means of the metric, given that the value is at one or the other end and with all others as drawn, so that
     correlated ones go along. Each mean is read from a parabola through the runs nearest to the end (Cleveland, 1979,
-    without weights): a straight line is off by what the metric bends there, which no band from a spread shows. The
-    bands come from the spread between as many parts of the blocks as there are scrambles.
+    without weights). The bands come from the spread between as many parts of the blocks as there are scrambles and from
+    how far a parabola is off: by at most twice the difference from the change that the nearer half of those runs gives.
     """
     own = np.unique(evaluated.blocks % SCRAMBLES, return_inverse=True)[1]
     part = np.repeat(own, evaluated.values.size // evaluated.blocks.size)
     # About the mean, because the sums of the lines below cancel.
     values = evaluated.values - np.mean(evaluated.values)
-    levels = np.array(
-        [
-            [_levels(values, inputs, end, part) for end in ends]
-            for inputs, ends in zip(evaluated.inputs.T, evaluated.ends.T, strict=True)
-        ]
+    whole, half = (
+        np.array(
+            [
+                np.subtract(*(_levels(values, inputs, end, part, nearest) for end in ends[::-1]))
+                for inputs, ends in zip(evaluated.inputs.T, evaluated.ends.T, strict=True)
+            ]
+        )
+        for nearest in (_NEAREST, 0.5 * _NEAREST)
     )
-    change = levels[:, 1] - levels[:, 0]
-    return change[:, 0], jackknife_reach(change[:, 1:].T, confidence)
+    reach, of_bend = (
+        jackknife_reach(one[:, 1:].T, level) for one, level in ((whole, confidence), (whole - half, _ONE))
+    )
+    # Of the square of the difference, what is chance on average is no bend.
+    bend = np.sqrt(np.maximum((whole - half)[:, 0] ** 2 - of_bend**2, 0.0))
+    return whole[:, 0], reach + 2.0 * bend
 
 
-def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp]) -> Floats:
-    """Return the mean of the metric where a value is at an end: from all parts, then without each (parts + 1,)."""
+def _levels(values: Floats, inputs: Floats, end: float, part: NDArray[np.intp], nearest: float) -> Floats:
+    """Return the mean of the metric where a value is at an end: from all parts, then without each (parts + 1,).
+
+    It is read from the fraction of the runs that is ``nearest`` to the end.
+    """
     count = int(part.max()) + 1
     if math.isnan(end):
         return np.full(count + 1, math.nan)
     away = np.abs(inputs - end)
-    near = away <= np.partition(away, int(_NEAREST * away.size))[int(_NEAREST * away.size)]
+    place = int(nearest * away.size)
+    near = away <= np.partition(away, place)[place]
     along = (inputs[near] - end) / (np.max(away[near]) or 1.0)
     powers = np.stack([along**power for power in range(5)])
     moments = np.stack([np.bincount(part[near], power, count) for power in powers])

@@ -19,6 +19,7 @@ from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage
 from ppafo.units.shown import in_units
@@ -202,13 +203,18 @@ def _options(tuned: Tuned) -> str:
 def _command(tuned: Tuned) -> str:
     """Return the line that runs the scenario with the gains found."""
     scenario = tuned.problem.scenario
-    return f"ppafo {scenario.motion.motion_kind.command} {scenario.origin.file or scenario.name} {_options(tuned)}"
+    return f"ppafo {scenario.motion.motion_kind.command} {_named(scenario)} {_options(tuned)}"
+
+
+def _named(scenario: Scenario) -> str:
+    """Return what finds a scenario again: its file, or the name of one that comes with the package."""
+    return scenario.origin.file or scenario.name
 
 
 def _pasted(tuned: Tuned) -> str:
     """Return the gains found to paste on a command line, into a study file and into Python."""
     listed = ", ".join(f'"{line}"' for line in tuned.overrides)
-    call = tuned.problem.scenario.motion.motion_kind.python_call(tuned.scenario, listed)
+    call = tuned.problem.scenario.motion.motion_kind.python_call(_named(tuned.problem.scenario), listed)
     return (
         f"# {tuned.verdict}\n\n# on the command line\n{_options(tuned)}\n\n# in a study file\n"
         f"overrides = [{listed}]\n\n# in Python\n{call}\n"
@@ -246,8 +252,10 @@ def _change(before: Setting, after: Setting) -> str:
     # Beyond a bound the gains before are no candidates, and the best within may be worse.
     if after.objective >= before.objective:
         return "nothing better than the previous gains was found within the bounds"
-    change = (after.objective - before.objective) / abs(before.objective) if before.objective else math.nan
-    return f"objective {before.objective:.4g} before, {after.objective:.4g} after ({100.0 * change:+.3g} %)"
+    words = f"objective {before.objective:.4g} before, {after.objective:.4g} after"
+    if before.objective == 0.0:
+        return words
+    return f"{words} ({100.0 * (after.objective - before.objective) / abs(before.objective):+.3g} %)"
 
 
 def _by_ceiling(problem: Problem, after: Setting) -> str:

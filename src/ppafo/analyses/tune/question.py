@@ -57,7 +57,7 @@ def tune(
     from ppafo.analyses.tune.answer import finding_of
     from ppafo.analyses.tune.problem import Problem, load_tuning
     from ppafo.analyses.tune.result import FRESH_DRAWS
-    from ppafo.analyses.tune.solve import crossed, judge, rows_of_gains, scales_of, search, setting_of
+    from ppafo.analyses.tune.solve import REFINEMENTS, crossed, judge, rows_of_gains, scales_of, search, setting_of
     from ppafo.errors import StudyError
     from ppafo.studies.distributions import Floats
     from ppafo.studies.sampling import NOISE_DRAWS
@@ -73,7 +73,7 @@ def tune(
             problem = replace(problem, spread=replace(problem.spread, seed=seed))
     effort, spread = problem.effort, problem.spread
     candidates = effort.candidates_per_gain * len(problem.searched) * (effort.generations + 1) * effort.starts
-    expected = candidates + 3
+    expected = candidates + REFINEMENTS * len(problem.searched) * effort.starts + 3
     if spread is not None:
         expected = spread.draws * expected + 2 * (FRESH_DRAWS + NOISE_DRAWS * spread.uncertainty.has_noise)
     metrics = with_companions(problem.metrics, problem.scenario)

@@ -40,7 +40,7 @@ def walk_with_and_without(
     minutes: time to walk; default 1, up to 10 on a bottle, or a whole task sequence
     wearers: number of different wearers to simulate instead of one
     seed: random seed of the wearers; default 1
-    check: end with exit code 1 where the torque loop oscillates; for one wearer
+    check: end with exit code 1 where the torque does not follow what is requested; for one wearer
 
     >>> print(walk_with_and_without("solenoid", minutes=0.1).said[0])
     solenoid: completed, 4 strides of falisse2019-subject1

@@ -151,10 +151,9 @@ def cascade_update(
     has_turned = abs(measurement.angle - state.place) > parameters.rest_distance
     still = 0.0 if has_turned else state.still + period * is_begun
     moves = still * REST_RATE < parameters.rest_distance and state.started > 0.5
-    rests_within = asked == 0.0 and (
-        (state.is_held > 0.5 and abs(error) < 2.0 * parameters.tolerance)
-        or (abs(error) < parameters.tolerance and not moves)
-    )
+    # Once within the tolerance the joint may rest anywhere within twice that, but not drift.
+    allowed = (1.0 + state.is_held) * parameters.tolerance
+    rests_within = asked == 0.0 and abs(error) < allowed and not moves
     is_held = 1.0 if rests_within else 0.0
 
     acting = max(-parameters.error_limit, min(parameters.error_limit, error))

@@ -102,7 +102,7 @@ _LENGTHS = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTable:
     """Return the table with NaN where a marker of these columns was not seen, and a remark on each such marker.
 
-    Not seen is a marker with a coordinate that is no number, with all coordinates exactly 0, or held at its last place
+    Not seen is a marker with a coordinate that is no number, with all coordinates exactly 0, or still at its last place
     until it is found again: equal to the last bit for two frames or more, then further away than a marker at rest
     comes in one interval, ``MOST_ACCELERATION`` times its square [m].
     """
@@ -120,7 +120,7 @@ def without_lost_markers(table: MotionTable, names: Iterable[str]) -> MotionTabl
             "not recorded": ~recorded,
             # A marker that is 0 throughout stands at the origin.
             "all coordinates 0": zero & bool((recorded & ~zero).any()),
-            "held at its last place": _held(at, MOST_ACCELERATION * interval**2),
+            "still at its last place": _held(at, MOST_ACCELERATION * interval**2),
         }
         lost = {cause: frames for cause, frames in causes.items() if frames.any()}
         if not lost:

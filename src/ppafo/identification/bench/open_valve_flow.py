@@ -21,6 +21,7 @@ from ppafo.identification.source import (
     check_no_wrong_reading,
     check_not_clipped,
     check_sources,
+    meter_readings,
     pool,
 )
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
@@ -60,7 +61,7 @@ def open_valve_flow(
     (``valves.main``).
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
-    upstream, downstream, flow, labels = open_readings(sources, gas)
+    upstream, downstream, flow, labels, remarks = open_readings(sources, gas, tolerances)
     # Beside a laminar gap the critical ratio decides whether the opening is an orifice.
     known_ratio = critical_ratio if law == "both" else None
     opening = Opening(gas, law, area or 1.0, known_ratio)
@@ -103,6 +104,7 @@ def open_valve_flow(
         f"scatter {np.std(flow - model) / largest:.2%} of the largest flow",
         with_residuals("Open-valve flow", *axes, marks, ratio, shown - fitted),
         f"{NEXT_LAW[law]}, or leave those readings out",
+        remarks,
     )
 
 
@@ -121,8 +123,10 @@ def _size(opening: Opening, area: float | None, path: str) -> Reported:
     return Reported("open_valve_flow.effective_area", "m^2", "Effective area Cd A")
 
 
-def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floats, Floats, list[str]]:
-    """Return absolute pressures [Pa], flow [kg/s] and a label of the recording, of readings with an open valve.
+def open_readings(
+    sources: tuple[Source, ...], gas: GasAt, tolerances: Tolerances
+) -> tuple[Floats, Floats, Floats, list[str], tuple[str, ...]]:
+    """Absolute pressures [Pa], flow [kg/s] and recording of readings with an open valve; remarks on those left out.
 
     IdentificationError for exchanged pressures and a valve that never was open.
     """
@@ -153,5 +157,8 @@ def open_readings(sources: tuple[Source, ...], gas: GasAt) -> tuple[Floats, Floa
         check_moves(sources[0], PROCEDURE, "mass_flow")
     pressures = [pool(sources, name) for name in CHANNELS[:2]]
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", pressures, is_open)
-    kept = [label for label, is_kept in zip(recordings_of(sources), is_open.tolist(), strict=True) if is_kept]
-    return upstream, downstream, np.abs(flow), kept
+    direction = pressures[0] - pressures[1]
+    read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
+    possible = read.possible[is_open]
+    kept = [label for label, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
+    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, read.remarks

@@ -18,7 +18,7 @@ from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shap
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought
 from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.residuals import Free
-from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, pool
+from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, meter_readings, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.report.kind import Kind
@@ -83,7 +83,9 @@ def valve_map(
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     _check_recordings(sources)
-    sweep = _sweep_of(sources)
+    direction = np.sign(pool(sources, "command") * (pool(sources, PRESSURES[0]) - pool(sources, PRESSURES[1])))
+    read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow)
+    sweep = _sweep_of(sources, read.flow)
     areas = _areas(sources, sweep, gas)
     band = f"{path}.dead_band"
     numbers = (
@@ -99,7 +101,9 @@ def valve_map(
         spool = np.concatenate([spool_of(command, at[_PLAY]) for command in sweep.commands])
         area = area_of_command(spool, at[band], at[_GAIN], at[_SATURATION])
         shape = np.abs(orifice_shape(before, behind, gas.heat_capacity_ratio))
-        return read_flow(at, gas, area * gas.choked_flow_constant * shape)
+        flow = read_flow(at, gas, area * gas.choked_flow_constant * shape)
+        # A play needs every command, so that readings that cannot be drop out of the flow alone.
+        return np.where(read.possible, flow, sweep.flow)
 
     fitted, model = solve(law, _readings(sources, sweep), numbers, confidence)
     values, residuals = fitted.by_name, sweep.flow - model
@@ -116,12 +120,12 @@ def valve_map(
         f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Valve map", *axes, _marks(sweep, model), sweep.command, residuals),
         "the opening is not the same in both directions, or not linear in the command",
-        () if is_clear else (one_way,),
+        (*read.remarks, *(() if is_clear else (one_way,))),
     )
 
 
-def _sweep_of(sources: tuple[Source, ...]) -> Sweep:
-    command, flow, upstream, downstream = (pool(sources, name) for name in CHANNELS)
+def _sweep_of(sources: tuple[Source, ...], flow: Floats) -> Sweep:
+    command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
     return Sweep(
         commands=tuple(source.recording["command"] for source in sources),
         command=command,

@@ -37,11 +37,13 @@ from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.residuals import Free
 from ppafo.identification.source import (
     Source,
+    check_moves,
     check_no_gap,
     check_no_outlier,
     check_no_wrong_reading,
     check_not_clipped,
     check_sources,
+    meter_readings,
     pool,
     window,
 )
@@ -58,7 +60,7 @@ CHANNELS = ("pressure_1", "pressure_2")
 STEADY = (*CHANNELS, "mass_flow")
 MINIMUM_SAMPLES, _FEWEST_STEADY = 20, 8
 EDGE = 20
-"""Samples at either end that are averaged for a first guess."""
+"""Samples at either end that are averaged for a first guess, at most a tenth of a record."""
 
 STANDS_STILL = 0.02
 """Change of a pressure over the other's, up to which a chamber counts as a room."""
@@ -97,9 +99,12 @@ def vane_leak(
     size = _size(opening, discharge_coefficient)
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, opening, size, tolerances, confidence)
-    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("pressure_1",), absolute=CHANNELS)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
+    for source in sources:
+        # One of them may be of a room.
+        check_moves(source, PROCEDURE, max(CHANNELS, key=lambda name: float(np.ptp(source.recording[name]))))
     closed = tuple(closed_chambers(source, start, end) for source in sources)
-    if len({item.fuller for item in closed}) > 1:
+    if len({(item.fuller, item.changing) for item in closed}) > 1:
         raise IdentificationError(
             "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
         )
@@ -129,21 +134,29 @@ class ClosedChambers(NamedTuple):
     fuller: int
 
     @property
+    def edge(self) -> int:
+        """Samples at either end that are averaged."""
+        return max(1, min(EDGE, self.time.size // 10))
+
+    @property
     def changes(self) -> tuple[float, float]:
         """Fall of the first and rise of the second pressure [Pa]."""
-        fall, rise = (float(np.mean(one[-EDGE:]) - np.mean(one[:EDGE])) for one in (self.first, self.second))
+        edge = self.edge
+        fall, rise = (float(np.mean(one[-edge:]) - np.mean(one[:edge])) for one in (self.first, self.second))
         return -fall, rise
 
     @property
-    def is_a_room(self) -> bool:
-        """Whether the second pressure stands still."""
-        fall, rise = self.changes
-        return abs(rise) <= STANDS_STILL * abs(fall)
+    def room(self) -> int | None:
+        """Place of the pressure that stands still, 0 the first and 1 the second; None where both change."""
+        fall, rise = (abs(change) for change in self.changes)
+        if rise <= STANDS_STILL * fall:
+            return 1
+        return 0 if fall <= STANDS_STILL * rise else None
 
     @property
-    def fitted(self) -> tuple[Floats, ...]:
-        """The pressures [Pa] that are fitted: the one of a room is not."""
-        return (self.first,) if self.is_a_room else (self.first, self.second)
+    def changing(self) -> int:
+        """Place of the pressure from which the leak is known: the first, but where that is of a room."""
+        return 1 if self.room == 0 else 0
 
 
 def closed_chambers(source: Source, start: float | None, end: float | None) -> ClosedChambers:
@@ -164,11 +177,12 @@ def closed_chambers(source: Source, start: float | None, end: float | None) -> C
                     f"sensor is saturated, or the chamber was not yet closed; give start"
                 )
     pair = part["pressure_1"], part["pressure_2"]
-    fuller = 1 if np.mean((pair[0] - pair[1])[:EDGE]) > 0.0 else 2
+    edge = max(1, min(EDGE, len(part) // 10))
+    fuller = 1 if np.mean((pair[0] - pair[1])[:edge]) > 0.0 else 2
     first, second = pair if fuller == 1 else pair[::-1]
     difference = first - second
     # Near equal pressures the zeros of the sensors are all that is left.
-    low = np.flatnonzero(difference < _NEARLY_EQUAL * float(np.mean(difference[:EDGE])))
+    low = np.flatnonzero(difference < _NEARLY_EQUAL * float(np.mean(difference[:edge])))
     last = int(low[0]) if low.size else difference.size
     if last < MINIMUM_SAMPLES:
         raise IdentificationError(
@@ -190,20 +204,31 @@ def pressures_of_fall(
     """Return both pressures [Pa] at times [s] as their difference falls; no gas is lost to the outside.
 
     ``sizes`` are those of the opening, ``first`` and ``second`` are the pressures [Pa] at the start, ``ratio`` is
-    V1/V2 [-], 0 beside a room, ``rate`` R T / V1 [Pa/kg].
+    V1/V2 [-], 0 where the second is of a room and infinite where the first is, ``rate`` R T / V1 [Pa/kg], or R T / V2
+    beside a room at the first.
     """
-    start, conserved = max(first - second, 1.0), ratio * first + second
+    start = max(first - second, 1.0)
+    # Parts of the difference by which the second pressure rises, and 1 less that by which the first one falls.
+    rises = 1.0 if math.isinf(ratio) else ratio / (1.0 + ratio)
+    quickened = 1.0 if math.isinf(ratio) else 1.0 + ratio
     # Even in the logarithm, as a laminar fall is in time.
     logs = np.linspace(0.0, -math.log(_LOWEST), _POINTS)
     difference = start * np.exp(-logs)
-    lower = (conserved - ratio * difference) / (1.0 + ratio)
+    lower = second + rises * (start - difference)
     flow = opening.flow(sizes, lower + difference, lower)
-    slowness = difference / np.maximum((1.0 + ratio) * rate * flow, 1.0e-300)
+    slowness = difference / np.maximum(quickened * rate * flow, 1.0e-300)
     steps = 0.5 * (slowness[1:] + slowness[:-1]) * np.diff(logs)
     known = np.concatenate(([0.0], np.cumsum(steps)))
     left = np.exp(np.interp(times, known, np.log(difference)))
-    end = (conserved - ratio * left) / (1.0 + ratio)
+    end = second + rises * (start - left)
     return end + left, end
+
+
+def _at_end(time: Floats, values: Floats, end: float) -> float:
+    """Value at a time [s] of the straight line through the samples beside it."""
+    if values.size < 2:
+        return float(values[0])
+    return float(np.polyfit(time - end, values, 1)[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,13 +246,23 @@ class Decay:
 
     @property
     def fitted(self) -> list[tuple[str, Floats]]:
-        """The pressures [Pa] that are fitted, with their channels."""
-        return list(zip(self.sensors, self.chambers.fitted, strict=False))
+        """The pressures [Pa] that are fitted, with their channels: the one of a room is not."""
+        pairs = zip(self.sensors, (self.chambers.first, self.chambers.second), strict=True)
+        return [pair for place, pair in enumerate(pairs) if place != self.chambers.room]
 
     @property
     def difference(self) -> Floats:
         """Pressure difference [Pa]."""
         return self.chambers.first - self.chambers.second
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Pressure difference at the start and at the end [Pa], each a mean over the samples of an edge.
+
+        Taken from straight lines through them, so that an edge in which the difference falls does not shorten the fall.
+        """
+        edge, difference, time = self.chambers.edge, self.difference, self.chambers.time
+        return _at_end(time[:edge], difference[:edge], time[0]), _at_end(time[-edge:], difference[-edge:], time[-1])
 
     def start_of(self, sensor: str) -> str:
         """Name of the pressure of a chamber at the start [Pa]."""
@@ -240,10 +275,11 @@ class Decay:
     def numbers(self) -> Iterator[Free]:
         """Yield what is sought: pressures at the start, that of a room to its noise, and what is off just then."""
         chambers = self.chambers
-        for sensor, values in zip(self.sensors, (chambers.first, chambers.second), strict=True):
-            size = max(abs(chambers.changes[0]), float(np.std(np.diff(values))), 1.0)
-            found = sought(self.start_of(sensor), float(values[:EDGE].mean()), 1.0, scale=size)
-            if chambers.is_a_room and sensor == self.sensors[1]:
+        pairs = zip(self.sensors, (chambers.first, chambers.second), strict=True)
+        for place, (sensor, values) in enumerate(pairs):
+            size = max(abs(chambers.changes[chambers.changing]), float(np.std(np.diff(values))), 1.0)
+            found = sought(self.start_of(sensor), float(values[: chambers.edge].mean()), 1.0, scale=size)
+            if place == chambers.room:
                 found = replace(found, start=float(values.mean()), deviation=max(float(values.std()), 1.0))
             yield found
         for sensor, _ in self.fitted:
@@ -251,8 +287,9 @@ class Decay:
 
     def halves(self) -> list[str]:
         """Return for each sample of a pressure whether the difference has fallen by less than half or by more."""
+        first, last = self.ends
         difference = self.difference
-        half = int(np.argmax(difference < 0.5 * (difference[:EDGE].mean() + difference[-EDGE:].mean())))
+        half = int(np.argmax(difference < 0.5 * (first + last)))
         return ["the early fall"] * half + ["the late fall"] * (difference.size - half)
 
 
@@ -262,7 +299,7 @@ class DecayLaw:
 
     opening: Opening
     paths: Paths
-    emptied: float
+    volume: float
     decays: tuple[Decay, ...]
 
     @property
@@ -275,17 +312,19 @@ class DecayLaw:
         gas = self.opening.gas
         # Flow goes with 1 / sqrt(T), the pressure that it makes with T.
         warm = gas.specific_gas_constant * np.sqrt(gas.temperature * (gas.temperature + at[TEMPERATURE]))
-        rate = warm * (1.0 + at[GAS_LAW]) / (self.emptied * (1.0 + at[_VOLUME]))
+        rate = warm * (1.0 + at[GAS_LAW]) / (self.volume * (1.0 + at[_VOLUME]))
         relaxed = self.longest / _RELAXED * math.exp(at[_RELAXATION])
         return np.concatenate([part for decay in self.decays for part in self._pressures(decay, at, rate, relaxed)])
 
     def _pressures(self, decay: Decay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
         chambers = decay.chambers
         first, second = (at[decay.start_of(sensor)] for sensor in decay.sensors)
-        ratio = 0.0 if chambers.is_a_room else at[_RATIO]
+        ratio = at[_RATIO] if chambers.room is None else 0.0 if chambers.room == 1 else math.inf
         falls = pressures_of_fall(self.opening, self.paths.sizes(at), first, second, ratio, rate, chambers.time)
         faded = np.exp(-chambers.time / relaxed)
-        for (sensor, _), pressure in zip(decay.fitted, falls, strict=False):
+        for place, (sensor, pressure) in enumerate(zip(decay.sensors, falls, strict=True)):
+            if place == chambers.room:
+                continue
             yield pressure * (1.0 + at[decay.relaxation_of(sensor)] * faded) + at[f"zero of {sensor}"]
 
 
@@ -300,9 +339,11 @@ def _decaying_leak(
     confidence: float,
 ) -> BenchResult:
     fuller = closed[0].fuller
-    volume, other_volume = volumes if fuller == 1 else volumes[::-1]
+    # The chamber whose pressure says how much leaks: the one that empties, or that fills from a room.
+    chamber = fuller if closed[0].changing == 0 else 3 - fuller
+    volume, other_volume = volumes if chamber == 1 else volumes[::-1]
     if volume is None:
-        size, opening = _over_volume(size, fuller), replace(opening, known=1.0)
+        size, opening = _over_volume(size, chamber), replace(opening, known=1.0)
     paths, reported, start, alone = _sought(size, volume is not None, closed, opening, volume or 1.0)
     decays = tuple(Decay(chambers, number) for number, chambers in enumerate(closed, start=1))
     law = DecayLaw(opening, paths, volume or 1.0, decays)
@@ -325,10 +366,9 @@ def _decaying_leak(
         readings_mark("measured", time, readings.measured),
         *(curve_mark("" if number else opening.law, *curve) for number, curve in enumerate(curves)),
     ]
-    is_room = all(chambers.is_a_room for chambers in closed)
-    room = (f"the pressure in chamber {3 - fuller} is constant, so it is treated as a room",) if is_room else ()
-    ends = ((decay.difference[:EDGE].mean(), decay.difference[-EDGE:].mean()) for decay in decays)
-    fall = max(1.0 - float(last / first) for first, last in ends)
+    is_room = all(chambers.room is not None for chambers in closed)
+    room = (f"the pressure in chamber {3 - chamber} is constant, so it is treated as a room",) if is_room else ()
+    fall = max(1.0 - last / first for first, last in (decay.ends for decay in decays))
     return result_of(
         PROCEDURE,
         sources,
@@ -355,7 +395,7 @@ def _ratio(
     closed: tuple[ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
 ) -> tuple[Free, ...]:
     """Return the ratio of the volumes [m^3], each known to the relative deviation or sought; none beside a room."""
-    changes = [chambers.changes for chambers in closed if not chambers.is_a_room]
+    changes = [chambers.changes for chambers in closed if chambers.room is None]
     if not changes:
         return ()
     if volume and other:
@@ -407,9 +447,9 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: Size
     found = []
     for item in closed:
         flow = float(np.mean(opening.flow(unit, item.first, item.second)))
-        scatter = float(np.std(np.diff(item.first)))
+        scatter = float(np.std(np.diff((item.first, item.second)[item.changing])))
         # Of a chamber that holds, what its noise would hide.
-        found.append(max(item.changes[0], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
+        found.append(max(item.changes[item.changing], 0.01 * scatter, 1.0e-9) / (rate * flow * float(item.time[-1])))
     return float(np.mean(found))
 
 
@@ -422,11 +462,10 @@ def _steady_leak(
         check_not_clipped(source, PROCEDURE, "mass_flow", "pressure_1", source.recording["pressure_1"])
     first, second, flow = (pool(sources, name) for name in STEADY)
     check_no_wrong_reading(sources, PROCEDURE, "mass_flow", (first, second), np.ones(flow.size, dtype=bool))
+    read = meter_readings(sources, PROCEDURE, first - second, tolerances.zero_of_flow)
+    first, second, flow = (each[read.possible] for each in (first, second, read.flow))
+    names = [name for name, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
     difference = first - second
-    if float(difference @ flow) <= 0.0:
-        raise IdentificationError(
-            f"{sources[0].name}: {PROCEDURE}: the flow runs from the lower to the higher pressure; reverse its sign"
-        )
     # A leak of another law parts low from high pressures.
     is_high = difference > np.median(difference)
     halves = np.where(is_high, "flow at higher pressures", "flow at lower pressures").tolist()
@@ -439,7 +478,7 @@ def _steady_leak(
         opening,
         paths,
         {"pressure_1": first, "pressure_2": second},
-        Readings(flow, ["mass_flow"] * flow.size, recordings_of(sources), (halves,)),
+        Readings(flow, ["mass_flow"] * flow.size, names, (halves,)),
         tolerances,
         confidence,
     )
@@ -454,4 +493,5 @@ def _steady_leak(
         f"{flow.size} steady readings; scatter {scatter:.2%} of the largest flow",
         with_residuals("Steady leak", *axes, marks, difference, flow - model),
         _REMEDY.format(NEXT_LAW[opening.law]),
+        read.remarks,
     )

@@ -14,6 +14,7 @@ from ppafo.identification.trajectory.numbers import (
     full_path,
     number_at,
 )
+from ppafo.model.declaration import Quantity
 from ppafo.parameters.parameter_set import ParameterSet
 from ppafo.parameters.plant import switches_of
 from ppafo.signals.faults import noise_of, resolution_of
@@ -28,7 +29,7 @@ _WIDEST = 12.0
 _EXACT = ("area", "angle_min", "angle_max", "linear_ratio", "critical_ratio", "atmospheric_pressure")
 """Names of numbers that only go with another one, or that the zero of a sensor moves as well."""
 
-_STRIBECK = "effects.stribeck.velocity"
+_STRIBECK, _SHARE = "effects.stribeck.velocity", "effects.stribeck.share"
 _FACTOR, _ONE_SIDED, _LEAST = 1.5, 1.645, 0.01
 """Standard deviation of the logarithm of that velocity, how many of them its limit is above, and its least over that.
 
@@ -90,15 +91,19 @@ def tolerance_parameters(
 
 
 def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: set[str]) -> Iterator[FreeParameter]:
-    """Yield the velocity up to which friction at rest lasts, of which 95 % are below the limit, where the set has none.
+    """Yield velocity and share of the fall from static to dynamic friction, where the set has none.
 
     With an abrupt fall static friction is traded for damping. What a step response says of static friction goes with
-    the logarithm of this velocity, so that is moved.
+    the logarithm of the velocity up to which friction at rest lasts, of which 95 % are below the limit, so that is
+    moved. A share that is held would make all of its error one of the static friction.
     """
     limit, scenario = tolerances.stribeck_velocity, experiments[0].scenario
     moves = any(vane_motion(one.scenario).profile is None and ANGLE not in one.inputs for one in experiments)
-    friction, has_own = scenario.device.friction, _STRIBECK in given or number_at(scenario, _STRIBECK) > 0.0
-    if limit > 0.0 and moves and not has_own and friction.static_torque > friction.dynamic_torque:
+    friction, has_own = scenario.device.friction, number_at(scenario, _STRIBECK) > 0.0
+    if has_own or not moves or friction.static_torque <= friction.dynamic_torque:
+        return
+    is_sought = _STRIBECK in given
+    if not is_sought and limit > 0.0:
         yield FreeParameter(
             _STRIBECK,
             limit * math.exp(-_ONE_SIDED * _FACTOR),
@@ -108,6 +113,10 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
             is_tolerance=True,
             is_logarithm=True,
         )
+    share = number_at(scenario, _SHARE)
+    deviation = tolerances.deviation_of(_SHARE, share, 0.0)
+    if (is_sought or limit > 0.0) and _SHARE not in given and deviation > 0.0:
+        yield _held(_SHARE, share, deviation, declared_numbers(scenario)[_SHARE])
 
 
 def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[float, float]]:
@@ -166,13 +175,16 @@ def _of_set(
         kind = path.replace(f"valves.{scenario.device.valve_name}.", "valve.")
         deviation = tolerances.deviation_of(kind, value, half_width)
         if deviation > 0.0:
-            low, high = (
-                max(quantity.minimum, value - _WIDEST * deviation),
-                min(quantity.maximum, value + _WIDEST * deviation),
-            )
-            # A volume or a friction of 0 would make no device.
-            low = max(low, 0.05 * value) if quantity.minimum >= 0.0 else low
-            yield FreeParameter(path, value, low, high, deviation, is_tolerance=True)
+            yield _held(path, value, deviation, quantity)
+
+
+def _held(path: str, value: float, deviation: float, quantity: Quantity) -> FreeParameter:
+    """Return a number of the device that is held at a value, known to a standard deviation [SI]."""
+    low = max(quantity.minimum, value - _WIDEST * deviation)
+    high = min(quantity.maximum, value + _WIDEST * deviation)
+    # A volume or a friction of 0 would make no device.
+    low = max(low, 0.05 * value) if quantity.minimum >= 0.0 else low
+    return FreeParameter(path, value, low, high, deviation, is_tolerance=True)
 
 
 def _parameter(path: str, start: float, deviation: float, recordings: tuple[str, ...]) -> FreeParameter:

@@ -9,7 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from ppafo.arguments import checked
-from ppafo.parameters.audit.chambers import check_filling, check_rotation, check_virtual_work, check_volumes
+from ppafo.parameters.audit.chambers import (
+    check_filling,
+    check_rotation,
+    check_rounded_table,
+    check_virtual_work,
+    check_volumes,
+)
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import Evidence, Finding, NamedValue, Severity, Side
 from ppafo.parameters.audit.flow import check_bores, check_choked_flow, check_flow, check_orifices, check_sonic_flow
@@ -42,6 +48,7 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
     "inertia": check_inertia,
     "virtual work": check_virtual_work,
     "volumes": check_volumes,
+    "rounded table": check_rounded_table,
     "rotation": check_rotation,
     "filling": check_filling,
     "torque ceiling": check_torque_ceiling,

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 
 from ppafo.parameters.audit.evidence import Evidence, Finding, Side, density_change
 
@@ -221,3 +222,30 @@ def check_filling(evidence: Evidence) -> Iterator[Finding]:
             )
         ),
     )
+
+
+# Were the numbers of a measured table moved within their last digit, so that its curves are those of a chamber?
+
+
+def check_rounded_table(evidence: Evidence) -> Iterator[Finding]:
+    """Yield a note that says by how much the volumes of a rounded table were moved."""
+    parameter_set = evidence.parameter_set
+    path = Path(parameter_set.file).parent / parameter_set.actuator_file
+    if parameter_set.actuator_table is None or not path.is_file():
+        return
+    from ppafo.parameters.actuator_table import largest_move
+
+    moved, digit = largest_move(path)
+    if moved > 0.0:
+        yield Finding(
+            id="rounded-table",
+            severity="note",
+            title="the measured volumes are rounded",
+            values=(),
+            sides=(Side("largest move", moved, "m^3"), Side("last digit", digit, "m^3")),
+            paragraph=(
+                f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would be those of "
+                f"no chamber: negative, or falling with the pressure. They are moved by {1e6 * moved:.2g} mL at most, "
+                f"within the last digit of {1e6 * digit:.2g} mL. More digits would need no move."
+            ),
+        )

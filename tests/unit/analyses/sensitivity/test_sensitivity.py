@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from ppafo.analyses.sensitivity.answer import overlapping_pairs, remarks
-from ppafo.analyses.sensitivity.methods import METHODS
+from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, changes
 from ppafo.analyses.sensitivity.question import sensitivity
 from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse
 from ppafo.errors import StudyError
@@ -333,3 +334,26 @@ def test_mistakes_are_one_line() -> None:
         sensitivity(STUDY, method="sobol", configuration="solenoid", samples=64)
     with pytest.raises(StudyError, match="has no 'gas': it needs a walk"):
         sensitivity(STUDY, metrics=["gas"], configuration="solenoid")
+
+
+@pytest.mark.parametrize(
+    ("metric", "fewest"),
+    [(lambda x: np.exp(1.5 * x), 14), (lambda x: np.maximum(x - 0.07, 0.0), 19), (lambda x: np.sin(6.0 * x), 19)],
+    ids=["curve", "kink", "wave"],
+)
+def test_the_band_of_a_change_has_what_the_metric_bends_beside_the_spread(
+    metric: Callable[[np.ndarray], np.ndarray], fewest: int
+) -> None:
+    """Of 20 bands none held of a kink or a wave, whose spread says nothing of what a parabola leaves."""
+    held = 0
+    for seed in range(20):
+        points = np.empty((8 * 1024, 2, 2))
+        for scramble in range(8):
+            points[scramble::8, 0] = qmc.Sobol(2, scramble=True, seed=100 * seed + scramble).random(1024)
+        points[:, 1] = points[:, 0, ::-1]
+        drawn = points.reshape(-1, 2)
+        values = metric(drawn[:, 0]) + 0.1 * drawn[:, 1]
+        ends = np.array([[0.05, 0.05], [0.95, 0.95]])
+        change, band = changes(Evaluated(drawn, drawn, values, np.arange(len(points)), ends, seed), 0.95)
+        held += bool(abs(change[0] - np.diff(metric(np.array([0.05, 0.95])))[0]) <= band[0])
+    assert held >= fewest

@@ -98,8 +98,21 @@ def test_every_generation_is_asked_at_once() -> None:
         return np.asarray(np.sum(shares, axis=1))
 
     search(costs, [0.5, 0.5], Effort(starts=1, generations=4, candidates_per_gain=10, seed=1))
-    assert set(asked) == {20}
-    assert len(asked) <= 5
+    generations = [count for count in asked if count > 1]
+    assert set(generations) == {20}
+    assert len(generations) <= 5
+
+
+def test_a_flat_valley_that_is_not_along_an_axis_is_followed_to_its_end() -> None:
+    """A few generations of Rosenbrock's valley end a hundredth above the least cost, which is 1."""
+
+    def costs(shares: Floats) -> Floats:
+        x, y = 4.0 * shares.T - 2.0
+        return np.asarray(1.0 + 0.1 * (1.0 - x) ** 2 + 10.0 * (y - x**2) ** 2)
+
+    for seed in range(3):
+        (start,) = search(costs, [0.1, 0.9], Effort(starts=1, generations=12, candidates_per_gain=6, seed=seed))
+        assert start.cost == pytest.approx(1.0, abs=1e-3)
 
 
 def test_feasible_comes_before_infeasible_and_both_before_failed() -> None:

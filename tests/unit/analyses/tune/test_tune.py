@@ -3,6 +3,7 @@
 import copy
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import jsonschema
@@ -186,6 +187,21 @@ def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
     document = changed(objective=[{"metric": "mechanical_work"}])
     with pytest.raises(StudyError, match="'mechanical_work' is 0 before tuning, which cannot be the scale; give one"):
         tune(document)
+
+
+def test_an_objective_that_was_zero_has_no_percentage() -> None:
+    found = tune(DOCUMENT).found
+    before = replace(found.before, objective=0.0)
+    after = replace(found.after, objective=-0.5)
+    assert verdict(found.problem, before, after).endswith("objective 0 before, -0.5 after")
+
+
+def test_a_scenario_of_a_file_is_pasted_by_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_bytes((Path(ppafo.__file__).parent / "scenarios" / "torque-task-proportional.toml").read_bytes())
+    finding = tune(changed(scenario=str(file), effort={"starts": 1, "generations": 1, "candidates_per_gain": 4}))
+    pasted = finding.files["overrides.txt"]().decode()
+    assert f"ppafo.simulate({str(file)!r}, [" in pasted
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def test_a_command_that_only_rises_leaves_hysteresis_out() -> None:
 
 
 def test_flow_with_the_wrong_sign_is_told() -> None:
-    with pytest.raises(IdentificationError, match="reverse the sign of one of them"):
+    with pytest.raises(IdentificationError, match="reverse the sign of 'mass_flow'"):
         valve_map((planted.sweep(sign=-1.0),), planted.CO2)
 
 
@@ -232,7 +232,7 @@ def test_a_steady_orifice_leak_gives_its_area_beside_the_zero_of_the_meter() -> 
 
 
 def test_steady_flow_with_the_wrong_sign_is_told() -> None:
-    with pytest.raises(IdentificationError, match="reverse its sign"):
+    with pytest.raises(IdentificationError, match="reverse the sign of 'mass_flow'"):
         vane_leak((planted.steady("orifice", -EFFECTIVE),), planted.CO2)
 
 

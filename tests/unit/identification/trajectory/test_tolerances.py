@@ -78,9 +78,15 @@ def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(
 def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_says_nothing_of_it(
     experiment: Experiment,
 ) -> None:
-    (found,) = (one for one in tolerance_parameters(Tolerances(), (experiment,), ()) if "stribeck" in one.path)
+    found, share = (one for one in tolerance_parameters(Tolerances(), (experiment,), ()) if "stribeck" in one.path)
     assert found.is_logarithm
     assert math.log(0.5 / found.start) == pytest.approx(1.645 * found.deviation)
+    # A share that is held would make its error one of the static friction: it is a tolerance as every other number.
+    assert (share.path, share.start) == ("effects.stribeck.share", 0.9)
+    assert share.deviation == pytest.approx(0.3 * 0.9 / math.sqrt(3.0))
+    sought = FreeParameter("effects.stribeck.velocity", start=0.2)
+    beside = [one.path for one in tolerance_parameters(Tolerances(), (experiment,), (sought,)) if "stri" in one.path]
+    assert beside == ["effects.stribeck.share"]
     own = replace(experiment, scenario=with_numbers(experiment.scenario, {"effects.stribeck.velocity": 0.2}))
     (stated,) = (
         one for one in tolerance_parameters(Tolerances(), (own,), ()) if one.path.endswith("stribeck.velocity")
