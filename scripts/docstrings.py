@@ -5,6 +5,7 @@ An extension of Sphinx, named in ``docs/conf.py``.
 
 import importlib
 import re
+import textwrap
 from collections.abc import Iterable
 from typing import Any
 
@@ -24,6 +25,7 @@ _MARKS = re.compile(r"([\\*|])|(?<=\w)(_)(?!\w)")
 _ALIAS = re.compile(r"Alias for field number \d+")
 _DOTTED = re.compile(r"(ppafo(?:\.\w+)+)(?:\(.*\))?")
 _ARGUMENT = re.compile(r"(\w+): (.+)")
+_HEADINGS = ("Arguments:", "Returns:", "Raises:")
 _ACCENT = re.compile(r'<munderover>\s*(<mi>\w</mi>)(.*?)(<mo stretchy="false">\S</mo>)\s*</munderover>', re.DOTALL)
 """Docutils puts the index of an accented symbol below it."""
 
@@ -31,10 +33,15 @@ _ACCENT = re.compile(r'<munderover>\s*(<mi>\w</mi>)(.*?)(<mo stretchy="false">\S
 def restructured(lines: Iterable[str]) -> list[str]:
     """Return a plain docstring as reStructuredText: code in backticks, indented blocks as they stand, marks as text.
 
-    Arguments of a command, ``name: help`` with further lines indented, are a list.
+    Arguments of a command, ``name: help`` with further lines indented, are a list; so is what stands under
+    ``Arguments:``, ``Returns:`` and ``Raises:``.
     """
     text: list[str] = []
-    for block in re.split(r"\n{2,}", "\n".join(lines).strip("\n")):
+    for paragraph in re.split(r"\n{2,}", "\n".join(lines).strip("\n")):
+        heading, _, below = paragraph.partition("\n")
+        if heading in _HEADINGS:
+            text.append(f"**{heading.removesuffix(':')}**")
+        block = textwrap.dedent(below) if heading in _HEADINGS else paragraph
         entries = [_ARGUMENT.fullmatch(entry) for entry in re.sub(r"\n {4}", " ", block).split("\n")]
         if block.startswith("    "):
             text += ["::", block]

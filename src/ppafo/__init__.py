@@ -183,6 +183,10 @@ def __getattr__(name: str) -> Any:
             raise
         raise AttributeError(f"ppafo.{name} is part of {error.name}, which is not installed") from None
     value = getattr(module, name)
+    # Loaded by every function that has a door.
+    from ppafo.arguments.values import show_plainly
+
+    show_plainly(value)
     globals()[name] = value
     return value
 

@@ -42,12 +42,22 @@ def load_scenario(
 ) -> Scenario:
     """Return a scenario, walks among them, by its name in the package or by the path of a TOML file, in SI units.
 
-    ``overrides`` are texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
-    ``valve.area=12.6mm^2``, or a dictionary of such paths, in which a number is in SI. ``parameter_set``, an object, a
-    name or a file, takes the place of the set that the scenario names; what the scenario changes in its device is
-    changed in this one. ``plugins`` are modules of your own, files or names, whose objects files may name:
-    ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError, ParameterError or DataError for anything that
-    cannot be used.
+    Arguments:
+        scenario: name of a shipped scenario or walk, or a .toml file
+        overrides: texts whose path begins in the scenario, ``run.duration=1 s``, or in its device,
+            ``valve.area=12.6mm^2``, or a dictionary of such paths, in which a number is in SI
+        parameter_set: a ParameterSet, a name or a file in place of the set that the scenario names; what the scenario
+            changes in its device is changed in this one
+        plugins: modules of your own, files or names, whose objects files may name:
+            ``["laws.py"]`` for ``kind = "laws:KIND"``
+
+    Returns:
+        the Scenario, all numbers in SI units
+
+    Raises:
+        ScenarioError: a scenario that cannot be used
+        ParameterError: a parameter set that cannot be used
+        DataError: a file that the scenario names and that cannot be read
 
     >>> import ppafo
     >>> scenario = ppafo.load_scenario("torque-task-proportional", ["supply.pressure=70 psi_g"])

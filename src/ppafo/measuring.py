@@ -21,9 +21,15 @@ def evaluate(
 ) -> dict[str, Metric]:
     """Return every metric [SI] that the channels of a recording allow, by name; one sample alone allows none.
 
-    A file, a result folder, a pandas DataFrame or an xarray Dataset stands for its recording; ``columns`` is
-    the column map of a file with other columns.
-    DataError for one that cannot be used.
+    Arguments:
+        recording: a Recording, or a file, a result folder, a pandas DataFrame or an xarray Dataset that holds one
+        columns: a column map of a file with other columns, or the name of one
+
+    Returns:
+        the metrics by name, each with value, unit and meaning
+
+    Raises:
+        DataError: a recording that cannot be used
 
     >>> import ppafo
     >>> recording = ppafo.simulate("torque-task-proportional").recording

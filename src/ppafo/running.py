@@ -30,15 +30,24 @@ _STRIDES_TRIED = 8.0
 
 @checked
 def simulate(scenario: Scenario | str | Path, overrides: Overrides = (), *, plugins: Plugins = ()) -> Result:
-    """Run one scenario: an object, or the name of a shipped one or a file.
+    """Run one scenario: a task, or a walk with the device.
 
-    ``overrides`` are texts as on the command line, ``["supply.pressure=70 psi_g"]``, or a dictionary,
-    ``{"supply.pressure": "70 psi_g", "reference.level": 4.0}``, in which a number is in SI.
+    A scenario that walks is one walk with the device; ``compare_walks`` shows it beside the same without.
 
-    A scenario that walks is one walk with the device; ``compare_walks`` shows it beside the same without. A run that
-    diverges is a Result with that status, up to the time of failure. ``plugins`` are modules of your own, files or
-    names, whose objects files may name: ``plugins=["laws.py"]`` for ``kind = "laws:KIND"``. ScenarioError or
-    ParameterError for bad input.
+    Arguments:
+        scenario: a Scenario, the name of a shipped one, or a .toml file
+        overrides: texts as on the command line, ``["supply.pressure=70 psi_g"]``, or a dictionary,
+            ``{"supply.pressure": "70 psi_g", "reference.level": 4.0}``, in which a number is in SI
+        plugins: modules of your own, files or names, whose objects files may name:
+            ``["laws.py"]`` for ``kind = "laws:KIND"``
+
+    Returns:
+        a Result: status, recording and metrics in SI units. A run that diverges has that status, and what was recorded
+        up to the time of failure
+
+    Raises:
+        ScenarioError: a scenario that cannot be used
+        ParameterError: a parameter set, or a value of it, that cannot be used
 
     >>> import ppafo
     >>> result = ppafo.simulate("torque-task-proportional", {"reference.level": 4.0})
@@ -120,7 +129,17 @@ def simulate_many(
 ) -> list[Result]:
     """Run many scenarios side by side, objects, names or files, each exactly as if it ran alone.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Arguments:
+        scenarios: Scenario objects, names of shipped ones, or .toml files
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        the Result of each scenario, in their order
+
+    Raises:
+        ScenarioError: a scenario that cannot be used
+        ParameterError: a parameter set, or a value of it, that cannot be used
 
     >>> import ppafo
     >>> runs = ppafo.simulate_many(["torque-task-proportional", "torque-task-solenoid"])

@@ -45,6 +45,19 @@ def test_the_arguments_of_a_command_are_a_list_with_its_further_lines() -> None:
     assert restructured(lines) == ["- ``draws``: how many; default 4096", "- ``seed``: of the draws"]
 
 
+def test_arguments_returns_and_raises_are_lists_under_their_names() -> None:
+    lines = ["Arguments:", "    draws: how many; default", "        4096", "", "Returns:", "    a Result"]
+    assert restructured(lines) == [
+        "**Arguments**",
+        "",
+        "- ``draws``: how many; default 4096",
+        "",
+        "**Returns**",
+        "",
+        "a Result",
+    ]
+
+
 def test_a_function_leads_to_its_file_on_a_forge_and_to_its_description_on_the_site(tmp_path: Path) -> None:
     assert "](../src/ppafo/model/plant.py)" in (DOCS / "equations.md").read_text(encoding="utf-8")
     stage(tmp_path)

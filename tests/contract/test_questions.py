@@ -55,7 +55,7 @@ def test_there_are_at_most_as_many_commands_as_somebody_can_look_over() -> None:
 def test_every_parameter_of_a_verb_has_its_help_and_every_option_one_meaning(name: str) -> None:
     verb = VERBS[name].function()
     for parameter, reading in parameters_of(verb):
-        said = re.search(rf"^{parameter.name}: \S", inspect.getdoc(verb) or "", re.MULTILINE)
+        said = re.search(rf"^(?: {{4}})?{parameter.name}: \S", inspect.getdoc(verb) or "", re.MULTILINE)
         assert said is not None or reading.word.help, parameter.name
     options = [option_of(parameter, reading) for parameter, reading in parameters_of(verb)]
     named = [option for option in options if option]

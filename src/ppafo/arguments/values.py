@@ -1,6 +1,7 @@
 """What a parameter takes of a call in Python, by the annotation that makes it an argument of a command as well."""
 
 import builtins
+import dataclasses
 import inspect
 import os
 import reprlib
@@ -46,10 +47,74 @@ def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.P
 
     A parameter without an annotation has that of ``inspect``, as a function of somebody else may.
     """
-    names = _Names(vars(sys.modules[function.__module__]))
-    said = typing.get_type_hints(function, localns=names, include_extras=True)
-    parameters = inspect.signature(function).parameters.values()
+    said = _annotations(function)
+    # As the function was written: a reader of help may be shown another signature.
+    parameters = inspect.signature(inspect.unwrap(function)).parameters.values()
     return {each.name: each.replace(annotation=said.get(each.name, each.annotation)) for each in parameters}
+
+
+def _annotations(function: Callable[..., Any]) -> Mapping[str, Any]:
+    """Return the annotations of a function by name; a class that is not loaded is a ``NotLoaded``."""
+    names = _Names(vars(sys.modules[function.__module__]))
+    return typing.get_type_hints(function, localns=names, include_extras=True)
+
+
+class _Shown(NamedTuple):
+    """A type or a default as help shows it: a text without quotation marks."""
+
+    text: str
+
+    def __repr__(self) -> str:
+        """Return the text itself."""
+        return self.text
+
+
+def show_plainly(value: Any) -> None:
+    """Give a function, or the fields of a dataclass, the signature that help shows: plain types, functions by name.
+
+    The annotations themselves, of which the door and the command line are made, stay.
+    """
+    function = vars(value)["__init__"] if dataclasses.is_dataclass(value) else value
+    if not inspect.isfunction(function):
+        return
+    said = {name: _Shown(_type_text(annotation)) for name, annotation in _annotations(function).items()}
+    signature = inspect.signature(function)
+    function.__signature__ = signature.replace(  # type: ignore[attr-defined]  # of all functions, says inspect
+        parameters=[
+            each.replace(annotation=said.get(name, each.annotation), default=_default_shown(each.default))
+            for name, each in signature.parameters.items()
+        ],
+        return_annotation=said.get("return", signature.return_annotation),
+    )
+
+
+def _default_shown(default: Any) -> Any:
+    """Return a default as help shows it: a function and what a field makes anew have no text of their own."""
+    if default is inspect.Parameter.empty or not repr(default).startswith("<"):
+        return default
+    return _Shown(getattr(default, "__name__", "..."))
+
+
+def _type_text(annotation: Any) -> str:
+    """Return an annotation as people write it: ``Scenario | str | Path``, without modules and what ``Word`` says."""
+    origin, inner = typing.get_origin(annotation), typing.get_args(annotation)
+    if origin is Annotated:
+        return _type_text(inner[0])
+    if origin in (typing.Union, types.UnionType):
+        texts = dict.fromkeys(_type_text(each) for each in inner if each is not types.NoneType)
+        return " | ".join([*texts, "None"] if types.NoneType in inner else texts)
+    if origin is Literal:
+        return " | ".join(map(repr, inner))
+    if isinstance(annotation, list):
+        return f"[{', '.join(map(_type_text, annotation))}]"
+    # What an array is made of says nothing that its docstring does not.
+    parts = [] if origin is None or origin.__module__ == "numpy" else [_type_text(each) for each in inner]
+    name = _NAMES.get(annotation) or getattr(origin or annotation, "__name__", str(annotation))
+    return f"{name}[{', '.join(parts)}]" if parts else str(name)
+
+
+_NAMES: Mapping[Any, str] = {types.NoneType: "None", ...: "..."}
+"""Names that annotations have for people and not for Python."""
 
 
 class Taken(NamedTuple):

@@ -115,15 +115,16 @@ class Reading:
 def _help_by_parameter(verb: Verb, names: Sequence[str]) -> dict[str, str]:
     """Return the lines ``name: help`` of the docstring; more indented lines go on with them."""
     found: dict[str, str] = {}
-    latest = ""
+    latest, depth = "", 0
     for line in (inspect.getdoc(verb) or "").splitlines():
+        indent = len(line) - len(line.lstrip())
         # Only names of parameters: a sentence of the docstring may have a colon too.
-        begun = _PARAMETER.fullmatch(line)
-        if begun is not None and begun[1] in names:
-            latest = begun[1]
-            found[latest] = begun[2]
-        elif latest and line.startswith(" "):
+        begun = _PARAMETER.fullmatch(line.strip())
+        if latest and indent > depth:
             found[latest] += f" {line.strip()}"
+        elif begun is not None and begun[1] in names:
+            latest, depth = begun[1], indent
+            found[latest] = begun[2]
         else:
             latest = ""
     return found

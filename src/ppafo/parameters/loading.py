@@ -204,10 +204,17 @@ def load_device(
 ) -> Device:
     """Return the device of a parameter set with one of its valves (default: the set's own choice), in SI units.
 
-    ``overrides`` are texts such as ``valve.area=12.6mm^2`` or ``supply.pressure=55 psi_g``. ParameterError for one of
-    another valve than the one that is named.
+    Arguments:
+        parameter_set: a ParameterSet, the name of a shipped one, or a .toml file
+        overrides: values to change, texts such as ``valve.area=12.6mm^2``, or a dictionary in which a number is in SI
+        valve: name of a valve of the set; default: the set's own choice
+        plugins: modules of your own, files or names, whose objects files may name
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Returns:
+        the Device, all numbers in SI units
+
+    Raises:
+        ParameterError: a set that cannot be used, and an override of another valve than the one that is named
 
     >>> import ppafo
     >>> device = ppafo.load_device("ppafo2011", overrides={"supply.pressure": "70 psi_g"})

@@ -296,10 +296,19 @@ def read_recording(
 ) -> Recording:
     """Return the recording in a ``.nc`` or ``.parquet`` file, a table of text such as ``.csv``, or a result folder.
 
-    A pandas DataFrame or an xarray Dataset is taken as well: columns ``name [unit]``, or units in its ``attrs``. Gauge
-    pressure in a table counts from ``atmosphere`` [Pa absolute]. ``columns`` is a column map, or the name of one,
-    ``logger.toml:bench``, for a table with other columns, signs or separators and for a ``.mat`` file. DataError for a
-    file that is not usable.
+    A pandas DataFrame or an xarray Dataset is taken as well: columns ``name [unit]``, or units in its ``attrs``.
+
+    Arguments:
+        path: a file, a result folder, a pandas DataFrame or an xarray Dataset
+        atmosphere: pressure [Pa absolute] from which gauge pressure in a table counts
+        columns: a column map, or the name of one, ``logger.toml:bench``, for a table with other columns, signs or
+            separators and for a ``.mat`` file
+
+    Returns:
+        a Recording, its channels of shape (samples,) in SI units, pressures absolute
+
+    Raises:
+        DataError: a file that is not usable
 
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("step")

@@ -67,12 +67,26 @@ def walk(
     """Walk for ``minutes`` [min]: a scenario that is a walk, the name of a shipped one, or a file.
 
     Unless ``minutes`` are given it is as long as the file says, or its task sequence, or one minute where there is
-    none, and up to ten on a bottle, which may end it before. With a name or a file go overrides as for the command,
-    and a ``gait``, ``task_sequence`` or ``bottle`` in place of its own. A walk that diverges is a result with that
-    status, up to the time of failure. ScenarioError or ParameterError for bad input. ``progress`` gets the minutes done
-    and those in all, part by part.
+    none, and up to ten on a bottle, which may end it before.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Arguments:
+        scenario: a Scenario that is a walk, the name of a shipped one, or a .toml file; what follows changes one that
+            is given by name or file
+        overrides: values to change, texts or a dictionary as of ``simulate``
+        gait: name or file of a gait in place of the scenario's
+        task_sequence: name or file of a task sequence in place of the scenario's
+        bottle: name or file of a bottle in place of the scenario's
+        minutes: length of the walk [min]
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with the minutes done and those in all, part by part
+
+    Returns:
+        a WalkResult: recording, strides and metrics in SI units. A walk that diverges has that status, and what was
+        recorded up to the time of failure
+
+    Raises:
+        ScenarioError: a scenario that cannot be used, or is no walk
+        ParameterError: a parameter set, or a value of it, that cannot be used
 
     >>> import ppafo
     >>> result = ppafo.walk("solenoid", minutes=0.1)

@@ -44,17 +44,30 @@ def compare(
     All have common random numbers. ``configurations`` are scenarios by name (or a list of names, files or Scenario
     objects). Draws are randomised Sobol replicates whatever the study's sampling method; where a controller receives
     noise, each has a noise stream of its own, the same in all configurations, and without a study the noise alone is
-    drawn. StudyError for bad input and where more than the fraction ``maximum_failed`` of a configuration's runs fails;
-    fewer are left out in pairs.
+    drawn. Runs that fail are left out in pairs.
 
-    configurations: names of scenarios or .toml files; default: the configurations of --study
-    study: study file that gives the distributions and, without SCENARIO, the configurations
-    tasks: a task for all configurations, for example 'slow:reference.ramp_time=2 s'; default: as the scenarios are
-        written
-    baseline: configuration that all others are compared with; default: the first
-    draws: draws of the uncertain values; default 4096
-    check: end with exit code 1 where a nominal run does not follow its reference
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        configurations: names of scenarios or .toml files; default: the configurations of the study
+        study: study file that gives the distributions and, without others, the configurations
+        tasks: a task for all configurations, for example 'slow:reference.ramp_time=2 s'; default: as the scenarios are
+            written
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        baseline: configuration that all others are compared with; default: the first
+        draws: draws of the uncertain values; default 4096
+        seed: random seed; default: the file's
+        confidence: confidence of all intervals; default 95%
+        maximum_failed: fraction of the runs that may fail before the study is refused; default 1%
+        threads: number of threads; default: all cores
+        check: end with exit code 1 where a nominal run does not follow its reference
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a Compared: per task the cases with their metrics, and the differences from the
+        baseline
+
+    Raises:
+        StudyError: a study or a configuration that cannot be used, and more than ``maximum_failed`` of its runs fail
 
     >>> import ppafo
     >>> compared = ppafo.compare(["torque-task-proportional", "torque-task-solenoid"]).found

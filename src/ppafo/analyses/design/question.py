@@ -36,18 +36,27 @@ def design(
     """Find a device: for a wearer or for a torque profile.
 
     A wearer has a body mass and may have a stature; torque, pressure and minutes of walking are what the device is for,
-    and the toes have to clear the ground.
-    StudyError or ParameterError for bad input, and where every run with a valve fails.
+    and the toes have to clear the ground. In Python a number is in SI, minutes in minutes, and a text has its unit.
 
-    problem: name of a design file, or a .toml file
-    mass: body mass of the wearer, '72.5 kg'
-    stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2
-    torque: peak torque of push-off, '2.5 N m'
-    pressure: supply pressure, '50 psi_g'
-    minutes: minutes of walking on one bottle
-    toes: lowest height of the toes in mid-swing; default: '1 cm', or the healthy gait's own where that is less
-    catalogue: a .toml file with parts of your own; default: the catalogue of the package
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        problem: name of a design file, or a .toml file
+        threads: number of threads; default: all cores
+        mass: body mass of the wearer, '72.5 kg'
+        stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2
+        torque: peak torque of push-off, '2.5 N m'
+        pressure: supply pressure, '50 psi_g'
+        minutes: minutes of walking on one bottle
+        toes: lowest height of the toes in mid-swing; default: '1 cm', or the healthy gait's own where that is less
+        catalogue: a .toml file with parts of your own; default: the catalogue of the package
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is the sizing: every part that was tried, and the one suggested
+
+    Raises:
+        StudyError: a problem that cannot be used, and a valve with which every run fails
+        ParameterError: a catalogue or a parameter set that cannot be used
 
     >>> import ppafo
     >>> ppafo.design("push-off").passed

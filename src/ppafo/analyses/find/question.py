@@ -38,14 +38,25 @@ def find(
 
     A grid of values over the range is run side by side; between the last one that does not meet the condition and the
     first one that does, the bracket is divided again and again down to 1e-6 of the range. What happens between two
-    values of the grid on one side of the condition is not seen. StudyError or ScenarioError for bad input, and where
-    every run fails.
+    values of the grid on one side of the condition is not seen.
 
-    vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
-    such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m'
-    highest: find the highest value
-    grid: number of evenly spaced values to try first; default 64
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        scenario: name of a scenario, or a .toml file
+        vary: a number of the scenario or its device, and its range, for example 'supply.pressure=20..90 psi_g'
+        such_that: a metric, <= or >=, and a limit, for example 'final_error <= 0.3 N m'
+        highest: find the highest value
+        grid: number of evenly spaced values to try first; default 64
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a Threshold: the value, and the metric there
+
+    Raises:
+        StudyError: a range or a condition that cannot be used, and a grid of which every run fails
+        ScenarioError: a scenario that cannot be used
 
     >>> import ppafo
     >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"

@@ -26,11 +26,21 @@ def identify(
     """Identify a parameter set, with uncertainty, from bench recordings.
 
     The procedures of the problem file run in the recommended order; the trajectory fit comes last and starts from what
-    they found. Estimates are in SI units. IdentificationError for a problem that makes no sense, ParameterError for a
-    set that does not, and DataError for a recording that cannot be read; each in one line that begins with the file.
+    they found.
 
-    problem: a problem file (.toml); see 'ppafo doctor --schema identification'
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        problem: a problem file (.toml); see 'ppafo doctor --schema identification'
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is an Identification: estimates in SI units with their uncertainty, and the new
+        parameter set
+
+    Raises:
+        IdentificationError: a problem that makes no sense
+        ParameterError: a parameter set that makes no sense
+        DataError: a recording that cannot be read
 
     >>> import ppafo
     >>> from ppafo.cli.new import new

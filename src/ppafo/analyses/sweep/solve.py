@@ -213,16 +213,28 @@ def sweep(
 ) -> Finding[StudyResults]:
     """Return the results of a study: a name, a TOML file, data laid out as one, or a Study.
 
-    ``out`` is a folder, or an address that fsspec knows; a study that was begun there resumes. Without it the results
-    live in a temporary folder as long as the returned object. ``overrides`` change every configuration, ``draws``
-    and ``seed`` replace the number of draws and the random seed of the file. ``threads`` are this process's, all
-    cores by default; ``scheduler`` is the address of a Dask scheduler whose workers do the work, ``agreed`` the consent
-    to a folder that takes much of the disk, and ``progress`` hears of every finished chunk. ``plugins`` are modules of
-    your own whose objects files may name, as of ``simulate``.
-
     Columns of the results are arrays of shape (runs,), trajectories (runs, samples), in SI units, pressures absolute;
-    nan where a run failed, which is a row that says so. StudyError for a study that cannot be used or does not fit onto
-    the disk, and where the folder has results of another one; DataError for a folder that cannot be used.
+    nan where a run failed, which is a row that says so.
+
+    Arguments:
+        study: name of a study, a .toml file, data laid out as one, or a Study
+        overrides: values to change in every configuration, texts or a dictionary as of ``simulate``
+        draws: number of draws in place of the file's
+        seed: random seed in place of the file's
+        threads: threads of this process; default: all cores
+        out: a folder, or an address that fsspec knows, where a study that was begun resumes; default: a temporary
+            folder that lives as long as the returned object
+        scheduler: address of a Dask scheduler whose workers do the work
+        agreed: consent to a folder that takes much of the disk
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every finished chunk
+
+    Returns:
+        a Finding whose ``found`` is the StudyResults: columns by name, and ``summary``
+
+    Raises:
+        StudyError: a study that cannot be used or does not fit onto the disk, and a folder with results of another one
+        DataError: a folder that cannot be used
 
     >>> import ppafo
     >>> study = ppafo.sweep("torque-task-uncertainty", draws=4).found

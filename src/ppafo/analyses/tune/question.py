@@ -30,11 +30,22 @@ def tune(
 ) -> Finding[Tuned]:
     """Tune gains for an objective under constraints, optionally robust.
 
-    Every generation is one ensemble, and every candidate sees the same draws. StudyError for bad input, and where a
-    goal has no scale because the scenario as it is gives 0 or nothing.
+    Every generation is one ensemble, and every candidate sees the same draws.
 
-    tuning: name of a tuning, or a .toml file
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        tuning: name of a tuning, or a .toml file
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        seed: random seed; default: the file's
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a Tuned: the gains found and the objective before and after
+
+    Raises:
+        StudyError: a tuning that cannot be used, and a goal without a scale because the scenario as it is gives 0 or
+            nothing
 
     >>> import ppafo
     >>> print(ppafo.tune("pid-gains").said[0])

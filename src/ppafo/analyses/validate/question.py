@@ -49,25 +49,35 @@ def validate(
 
     The model is run on the recorded command, supply pressure and external torque; residuals are measured - model.
     With no threshold an RMS error may be 3 % of full range, and less where that is over half of the variance of a
-    signal, beside noise and the usual zero of a sensor; a cause is named whether it passes or not. The result's
-    ``found`` has ``passes`` and, in ``recordings``, one ``RecordingAgreement`` each: ``measured`` and ``model`` are
-    recordings, their channels of shape (samples,) in SI; ``channels`` has RMS error, bias, largest error and delay
-    [s] of each channel in its SI unit (rad, Pa, N m). DataError, ParameterError or SimulationError for bad input.
+    signal, beside noise and the usual zero of a sensor; a cause is named whether it passes or not.
 
-    parameter_set: name of a parameter set, or a .toml file
-    recordings: a .csv or .nc file, or a result folder; several may be given
-    valve: valve of the parameter set; default: its default valve
-    motion: free: the model moves the vane; measured: the vane follows the recorded angle; locked: the vane stays at
-        its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
-    volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
-        compared
-    initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
-    thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7 psi_d';
-        default: 3%, and half of the variance of the signal is explained
-    longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
-    columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may contain
-        it
-    plugins: modules of your own, files or names, whose objects files may name
+    Arguments:
+        parameter_set: name of a parameter set, or a .toml file
+        recordings: a .csv or .nc file, or a result folder; several may be given
+        valve: valve of the parameter set; default: its default valve
+        overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
+        motion: free: the model moves the vane; measured: the vane follows the recorded angle; locked: the vane stays at
+            its initial angle; leg: the model moves vane and foot on the fixture of step-response (default free)
+        volume: no vane: the valve fills and vents chamber 1 of this fixed volume, for example '60 cm^3'; pressure_1 is
+            compared
+        initial: initial value of a channel that was not recorded, for example 'pressure_2=0 psi_g'
+        thresholds: maximum RMS error, as a fraction of full range or with a unit: 5%, angle=10%, 'pressure_1=3.7
+            psi_d'; default: 3%, and half of the variance of the signal is explained
+        longest_delay: maximum delay of the measurement to estimate; default '20 ms', '0 s' for none
+        columns: file with a column map [columns.NAME], for recordings with other column names; a problem file may
+            contain it
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with every count of a long computation
+
+    Returns:
+        a Finding whose ``found`` is a Validation with ``passes`` and, in ``recordings``, one ``RecordingAgreement``
+        each: ``measured`` and ``model`` are recordings, their channels of shape (samples,) in SI; ``channels`` has
+        RMS error, bias, largest error and delay [s] of each channel in its SI unit (rad, Pa, N m)
+
+    Raises:
+        DataError: a recording that cannot be used
+        ParameterError: a parameter set that cannot be used
+        SimulationError: a model that cannot be run on the recording
 
     >>> import ppafo
     >>> folder = ppafo.simulate("step-response").save("bench")
