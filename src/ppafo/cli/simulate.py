@@ -1,5 +1,6 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
+import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -48,7 +49,10 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     from ppafo.running import gains, tried
     from ppafo.simulation.simulate import simulate
+    from ppafo.simulation.tracking.pair_step import coarse_pair
 
+    if coarse := coarse_pair(chosen):
+        print(f"ppafo: {coarse}", file=sys.stderr, flush=True)
     result = simulate(chosen)
     in_force, verdict = gains(chosen), tried(chosen, result.tracking)
     # A run that diverged has no result to repeat; its exit code says so already.
