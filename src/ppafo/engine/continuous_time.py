@@ -90,8 +90,10 @@ def isothermal_rates(
     # Flows are true masses; where the gas is not ideal its content grows by another amount.
     gained_1 = content_rate(content_1, at.now.volume_1, at.growth_1, in_1.total - leak)
     gained_2 = content_rate(content_2, at.now.volume_2, at.growth_2, in_2.total + leak)
+    rate_1, rate_2 = pressure_rates(plant, at, pressure_1, pressure_2, gained_1, gained_2)
     return GasRates(
-        *pressure_rates(plant, at, pressure_1, pressure_2, gained_1, gained_2),
+        pressure_1=rate_1,
+        pressure_2=rate_2,
         temperature_1=0.0,
         temperature_2=0.0,
         supplied=supplied,
@@ -124,12 +126,24 @@ def thermal_rates(
         give_2=pressure_2 * at.now.compliance_2 / at.now.volume_2,
     )
     # Neither motion nor totals act on the rates of the gas: zeros stand for them.
-    state = PlantState(0.0, 0.0, content_1, content_2, 0.0, 0.0, 0.0)
-    masses = ThermalState(mass_1, mass_2, 0.0, 0.0, 0.0, 0.0)
+    state = PlantState(
+        angle=0.0,
+        angular_velocity=0.0,
+        mass_1=content_1,
+        mass_2=content_2,
+        supplied_mass=0.0,
+        vented_mass=0.0,
+        leaked_mass=0.0,
+    )
+    masses = ThermalState(
+        mass_1=mass_1, mass_2=mass_2, supplied_content=0.0, vented_content=0.0, heat_content=0.0, gas_work=0.0
+    )
     found = thermal_flows(thermal, state, masses, warm, in_1, in_2, leak)
+    # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
+    rate_1, rate_2 = pressure_rates(plant, at, pressure_1, pressure_2, found.content_1, found.content_2)
     return GasRates(
-        # The contents have the work of the moving wall in them: of equation (3) only the volumes are left.
-        *pressure_rates(plant, at, pressure_1, pressure_2, found.content_1, found.content_2),
+        pressure_1=rate_1,
+        pressure_2=rate_2,
         # A temperature is the walls' times content over mass.
         temperature_1=temperature_1 * (found.content_1 / content_1 - found.mass_1 / mass_1),
         temperature_2=temperature_2 * (found.content_2 / content_2 - found.mass_2 / mass_2),

@@ -1,15 +1,19 @@
 """A run that does not follow its reference says so, with what hinders it; one that does is left alone."""
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.running import simulate, tried
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
+from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.study.runs import follows, with_companions
 
 TASK = "torque-task-proportional"
@@ -58,6 +62,37 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
     pushed = simulate("cylinder-servo", ["motion.external_torque=14 N m"]).tracking
     assert pushed is not None
     assert "the joint lies on its lower stop: 14 N m work against it" in pushed.sentence
+
+
+@pytest.mark.parametrize(
+    ("changes", "share"),
+    [
+        (["reference.level=4 N m"], "2.19 N m in the 75 ms that it is late, 0.55 times the 4 N m wanted"),
+        (["reference.level=4 N m", "valve.switching_interval=5 ms", "controller.rate=300 Hz"], ""),
+        (["reference.level=4 N m", "valve.area=4.5 mm^2"], ""),
+        (["device.valve=proportional", "valve.area=60 mm^2"], ""),
+        (
+            ["reference.of=pressure_1", "reference.start_level=0 psi_g", "reference.level=30 psi_g"],
+            "0.73 times the 30 psi wanted",
+        ),
+    ],
+)
+def test_a_pair_too_coarse_for_its_reference_is_told_before_the_run(changes: list[str], share: str) -> None:
+    scenario = load_scenario("torque-task-solenoid", changes)
+    told = coarse_pair(scenario)
+    assert share in told
+    assert bool(told) == bool(share)
+
+
+def test_the_area_offered_before_the_run_makes_a_pair_fine_enough(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    command = ["simulate", "torque-task-solenoid", "--set", "run.duration=0.1 s", "--out", str(tmp_path / "run")]
+    assert main(command) == 0
+    offered = re.search(r"`valve.area = ([^`]*)`", capsys.readouterr().err)
+    assert offered is not None
+    assert main([*command, "--set", f"valve.area={offered[1]}"]) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:

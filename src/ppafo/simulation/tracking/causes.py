@@ -13,11 +13,10 @@ from ppafo.model.plant import gravity_torque
 from ppafo.parameters.reach import supply_for, torque_reach
 from ppafo.report.display_units import metric_change
 from ppafo.signals import Recording
-from ppafo.simulation.gains import terms_of
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.place import quicker_at
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.torque_loop import DEAD_TIME, RATE
+from ppafo.simulation.tracking.pair_step import pair_step
 from ppafo.simulation.tracking.remedies import (
     Remedy,
     change_text,
@@ -195,10 +194,9 @@ def oscillation(case: Case) -> Cause | None:
 def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> Cause:
     """What a pair of on/off valves changes during its dead time, over what is wanted."""
     scenario = case.scenario
-    terms = terms_of(scenario, law)
-    rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
+    step, late = pair_step(scenario, law)
+    step *= quicker
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    step = rate * quicker * late
     share = step / case.settled.wanted
     text = (
         f"its valves change it by {change_text(controlled, step)} in the {1.0e3 * late:.3g} ms that they are late, "

@@ -135,7 +135,7 @@ def tracking_of(
         failure = failure_of_task(settled, is_restless, law is not None and law.only_switches)
     else:
         failure = failure_of_walk(settled, is_restless, limit)
-    case = Case(scenario, law, recording, settled, failure == "oscillates")
+    case = Case(scenario=scenario, law=law, recording=recording, settled=settled, oscillates=failure == "oscillates")
     # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
     if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
         failure = "does not follow" if torque_beyond_reach(case) is not None else None

@@ -83,7 +83,7 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         kind = kind_of_comments(line for line in lines if line.startswith("#"))
     with refused_as(DataError, f"{path}: column {names[at]!r}", UnitError):
         seconds = to_si(1.0, units[at] or _TIMES[names[at].lower()], "s")
-    block = Block(lines, first + 1, delimiter, "," if has_comma else ".", is_ragged=False)
+    block = Block(lines=lines, first=first + 1, delimiter=delimiter, decimal="," if has_comma else ".", is_ragged=False)
     cells = Cells([*[""] * at, *names[at:]], units)
     return table_of(path, block, cells, names[at], seconds=seconds, kind=kind)
 

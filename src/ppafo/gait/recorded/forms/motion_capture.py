@@ -112,7 +112,8 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     units = [*cells_of(head[3], delimiter), *[""] * len(axes)][: len(axes)]
     rate = _rate_in(path, cells_of(head[0], delimiter)[0], start + 2)
     end = next((n for n in range(start + 5, len(lines)) if not lines[n].strip(",;\t ")), len(lines))
-    return _NexusBlock(rate, labels, axes, units, Block(lines[:end], start + 5, delimiter))
+    rows = Block(lines[:end], start + 5, delimiter)
+    return _NexusBlock(rate=rate, labels=labels, axes=axes, units=units, rows=rows)
 
 
 def _nexus_motion(path: str | Path, block: _NexusBlock) -> MotionTable:
