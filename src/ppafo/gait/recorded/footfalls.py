@@ -155,7 +155,7 @@ def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
     if events == FORCE:
         return [start for start, _ in contacts_of(walk[FORCE]) if start is not None]
     smooth = low_pass(walk[SHANK], _SMOOTH)
-    return smooth.time[_ends_of_swings(smooth)].tolist()
+    return [float(smooth.time[peak]) for peak in _ends_of_swings(smooth)]
 
 
 _LEAST_LEAN = 0.5
