@@ -60,7 +60,8 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     error = None if checked is None else checked.error
     if checked is None and result.status.is_completed and chosen.motion.motion_kind.is_repeated_for_its_error:
         error = result.error()
-    first = [item.sentence for item in (verdict, in_force) if item is not None]
+    # Gains that are in force are no news: they stand last.
+    follows, tuned = ([] if item is None else [item.sentence] for item in (verdict, in_force))
     from ppafo.documents.json_text import plain
 
     metrics = {name: plain(metric) for name, metric in result.metrics.items()}
@@ -78,17 +79,17 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     is_useful = verdict is None or not verdict.is_useless
     is_good = result.status.is_completed and (checked is None or (checked.is_determined and is_useful))
     return Said(
-        _text(result, error, checked, first),
+        _text(result, error, checked, follows, tuned),
         document,
-        finish=partial(_write, result, checked, first, folder),
+        finish=partial(_write, result, checked, follows, tuned, folder),
         exit_code=EXIT_GOOD if is_good else EXIT_CHECK_FAILED,
         aside="" if result.status.is_completed else f"{chosen.name}: {result.status.message}",
     )
 
 
-def _finding(result: "Result", check: "Check | None", first: Sequence[str]) -> "Finding[None]":
+def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str]) -> "Finding[None]":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
-    from ppafo.report.display_units import metric_level, metric_words
+    from ppafo.report.display_units import metric_text, metric_words
     from ppafo.report.finding import Finding, Part, columns_of
     from ppafo.report.live_parts import live_part
 
@@ -97,10 +98,9 @@ def _finding(result: "Result", check: "Check | None", first: Sequence[str]) -> "
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
     caption = "What the device does over time. Pressures count from the atmosphere."
     zero = result.scenario.device.supply.atmospheric_pressure
-    shown = {name: metric_level(metric.value, metric.unit, zero) for name, metric in result.metrics.items()}
     rows = [
-        (metric_words(name), f"{value:.4g} {unit}".strip(), result.metrics[name].summary)
-        for name, (value, unit) in shown.items()
+        (metric_words(name), metric_text(metric.value, metric.unit, zero), metric.summary)
+        for name, metric in result.metrics.items()
     ]
     return Finding(
         name="run",
@@ -108,10 +108,11 @@ def _finding(result: "Result", check: "Check | None", first: Sequence[str]) -> "
         title=scenario.name,
         said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         parts=(
-            Part(remarks=(*first, *(() if status.is_completed else (f"The run {status.message}",)))),
+            Part(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *follows)),
             Part("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
             Part("Over time", name=FIGURE, caption=caption, draw=result.plot),
             Part() if check is None else Part("What can be repeated", code=repr(check)),
+            Part(remarks=tuned),
         ),
         found=None,
         live=lambda: live_part([scenario]),
@@ -126,7 +127,7 @@ def list_descriptions() -> list[dict[str, Any]]:
 
 
 @in_units(lambda result, *_: result.scenario.device.shown)
-def _write(result: "Result", check: "Check | None", first: Sequence[str], folder: Path) -> str:
+def _write(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str], folder: Path) -> str:
     """Draw the figure and the page, write the result folder, and return the last lines of text."""
     # Before anything else imports Matplotlib, so that it comes without what it does for others.
     from ppafo.report.drawing import load_drawing
@@ -136,7 +137,7 @@ def _write(result: "Result", check: "Check | None", first: Sequence[str], folder
     from ppafo.report.recording_figure import figure_files
 
     figures = figure_files(result.plot())
-    report = page_of(_finding(result, check, first), {FIGURE: figures[f"{FIGURE}.svg"]})
+    report = page_of(_finding(result, check, follows, tuned), {FIGURE: figures[f"{FIGURE}.svg"]})
     checks = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **checks})
     files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
@@ -145,8 +146,16 @@ def _write(result: "Result", check: "Check | None", first: Sequence[str], folder
     return "\n".join(["", *([further] if further else []), f"written: {folder} ({written})"])
 
 
-def _text(result: "Result", error: "ErrorEstimate | None", check: "Check | None", first: Sequence[str]) -> str:
-    checked = ["", repr(check)] if check is not None else [] if error is None else ["", error.sentence]
-    # The gains in force stand below the verdict, which knows more than the result's own: its remedies were tried.
+def _text(
+    result: "Result",
+    error: "ErrorEstimate | None",
+    check: "Check | None",
+    follows: Sequence[str],
+    tuned: Sequence[str],
+) -> str:
+    """Return how the run ended, how it follows its reference, the numbers, how exact they are, and the gains."""
+    exact = [repr(check)] if check is not None else [] if error is None else [error.sentence]
+    # In place of the result's own verdict, whose remedies were not tried.
     metrics = str(result).partition("\n\n")[2]
-    return "\n".join([f"{result.scenario.name}: {result.status.kind}", *first, "", metrics, *checked])
+    last = ["", *exact, *tuned] if exact or tuned else []
+    return "\n".join([f"{result.scenario.name}: {result.status.kind}", *follows, "", metrics, *last])

@@ -126,12 +126,7 @@ def check_shank(walk: MeanStride) -> None:
     where = f"{walk.file['shank_angle']}: shank_angle"
     # The range is free of the zero, so that a wrong unit shows before a wrong zero.
     travel = float(np.ptp(phi))
-    low, high = SHANK_RANGE
-    if not low <= travel <= high:
-        raise DataError(
-            f"{where} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
-            f"{_unit_hint(travel, low, high)}"
-        )
+    check_shank_range(where, travel, SHANK_RANGE[1])
     # Means of five samples at both ends: a single one may lie on a tremor.
     growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
     if growth > _TURNED_BACK * travel:
@@ -144,6 +139,16 @@ def check_shank(walk: MeanStride) -> None:
             f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is above "
             "-10 and -50 to 10 deg (0 is vertical, above 0 the ankle is in front); its zero or its columns are wrong"
             f"{_other_foot(walk)}"
+        )
+
+
+def check_shank_range(where: str, travel: float, most: float = float("inf")) -> None:
+    """Raise DataError for a shank that turns by less [deg] than any leg that walks, or by more than ``most``."""
+    low, high = SHANK_RANGE
+    if not low <= travel <= most:
+        raise DataError(
+            f"{where} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; "
+            f"{_unit_hint(travel, low, high)}"
         )
 
 

@@ -21,37 +21,43 @@ Floats = NDArray[np.float64]
 
 
 class Units(NamedTuple):
-    """The unit of a quantity in SI, and the one in which it is shown unless a parameter set writes another."""
+    """The unit of a quantity in SI, and the one in which it is shown unless a parameter set writes another.
+
+    A run computes nothing up to ``zero`` [SI]: what is not larger is rounding, and is shown as 0. It is 0 for
+    quantities that are given and not computed.
+    """
 
     si: str
     shown: str
+    zero: float = 0.0
 
 
 QUANTITIES: Mapping[str, Units] = MappingProxyType(
     {
-        "acceleration": Units("m/s^2", "m/s^2"),
-        "angle": Units("rad", "deg"),
-        "angular acceleration": Units("rad/s^2", "rad/s^2"),
-        "angular velocity": Units("rad/s", "deg/s"),
+        "acceleration": Units("m/s^2", "m/s^2", 1.0e-9),
+        "angle": Units("rad", "deg", 1.0e-9),
+        "angular acceleration": Units("rad/s^2", "rad/s^2", 1.0e-9),
+        "angular velocity": Units("rad/s", "deg/s", 1.0e-9),
         "area": Units("m^2", "mm^2"),
         "duration": Units("s", "min"),
-        "energy": Units("J", "J"),
-        "force": Units("N", "N"),
-        "fraction": Units("1", "%"),
+        "energy per gas mass": Units("J/kg", "J/kg", 1.0e-6),
+        "energy": Units("J", "J", 1.0e-9),
+        "force": Units("N", "N", 1.0e-9),
+        "fraction": Units("1", "%", 1.0e-12),
         "frequency": Units("Hz", "Hz"),
-        "gas mass": Units("kg", "g"),
-        "gas mass per energy": Units("kg/J", "g/J"),
-        "length": Units("m", "mm"),
+        "gas mass": Units("kg", "g", 1.0e-12),
+        "gas mass per energy": Units("kg/J", "g/J", 1.0e-12),
+        "length": Units("m", "mm", 1.0e-9),
         "mass": Units("kg", "kg"),
-        "mass flow": Units("kg/s", "g/s"),
+        "mass flow": Units("kg/s", "g/s", 1.0e-12),
         "part mass": Units("kg", "g"),
-        "power": Units("W", "W"),
-        "pressure": Units("Pa_a", "psi_g"),
-        "pressure change": Units("Pa_d", "psi_d"),
+        "power": Units("W", "W", 1.0e-9),
+        "pressure": Units("Pa_a", "psi_g", 1.0e-4),
+        "pressure change": Units("Pa_d", "psi_d", 1.0e-4),
         "temperature": Units("K", "degC"),
-        "time": Units("s", "s"),
-        "torque": Units("N m", "N m"),
-        "velocity": Units("m/s", "m/s"),
+        "time": Units("s", "s", 1.0e-12),
+        "torque": Units("N m", "N m", 1.0e-9),
+        "velocity": Units("m/s", "m/s", 1.0e-9),
         "volume": Units("m^3", "cm^3"),
         "displacement per radian": Units("m^3/rad", "cm^3/rad"),
         "volume flow": Units("m^3/s", "L/min"),
@@ -75,6 +81,8 @@ _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$"
 """Units that an axis writes in a form of their own."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
 """What an axis writes for the end of a unit of pressure."""
+_METRIC = ".4g"
+"""Digits of a metric."""
 
 
 def quantity_of_unit(si_unit: str) -> str:
@@ -119,11 +127,17 @@ def axis_unit(quantity: str) -> str:
 
 
 def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
-    """Return a value in SI in the unit in which it is shown; gauge counts from ``atmosphere`` [Pa absolute]."""
+    """Return a value in SI in the unit in which it is shown; gauge counts from ``atmosphere`` [Pa absolute].
+
+    What is zero within the accuracy of a run is 0.
+    """
     if quantity not in QUANTITIES or not math.isfinite(value):
         return float(value)
-    si, unit = QUANTITIES[quantity].si, _unit(quantity)
-    return float(value) if si == unit else from_si(float(value), unit, si, atmosphere)
+    (si, _, zero), unit = QUANTITIES[quantity], _unit(quantity)
+    shown, further = (
+        each if si == unit else from_si(each, unit, si, atmosphere) for each in (float(value), float(value) + zero)
+    )
+    return 0.0 if abs(shown) <= abs(further - shown) else shown
 
 
 def display_difference(value: float, quantity: str) -> float:
@@ -169,12 +183,18 @@ def metrics_lines(metrics: Mapping[str, Metric], atmosphere: float = STANDARD_AT
     Gauge pressures count from ``atmosphere`` [Pa absolute].
     """
     levels = [metric_level(metric.value, metric.unit, atmosphere) for metric in metrics.values()]
-    values, units = [f"{value:.4g}" for value, _ in levels], [unit for _, unit in levels]
+    values, units = [without_exponent(value, _METRIC) for value, _ in levels], [unit for _, unit in levels]
     name_width, value_width, unit_width = (max(map(len, texts), default=0) for texts in (metrics, values, units))
     return [
         f"{name:<{name_width}}  {value:>{value_width}} {unit:<{unit_width}}  {metric.summary}"
         for (name, metric), value, unit in zip(metrics.items(), values, units, strict=True)
     ]
+
+
+def metric_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+    """Return a value of a metric or channel as text with its unit, as people are shown them."""
+    shown, unit = metric_level(value, si_unit, atmosphere)
+    return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
 
 
 def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> tuple[float, str]:

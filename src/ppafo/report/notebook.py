@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ppafo.metrics import Metric
 from ppafo.parameters.device import Device
-from ppafo.report.display_units import metric_level, metric_words
+from ppafo.report.display_units import metric_text, metric_words
 from ppafo.report.style import render_figure
 
 if TYPE_CHECKING:
@@ -20,8 +20,7 @@ def result_html(head: str, metrics: Mapping[str, Metric], device: Device, figure
     atmosphere = device.supply.atmospheric_pressure
     rows = []
     for name, metric in metrics.items():
-        value, unit = metric_level(metric.value, metric.unit, atmosphere)
-        cells = (metric_words(name), f"{value:.4g} {unit}".strip(), metric.summary)
+        cells = (metric_words(name), metric_text(metric.value, metric.unit, atmosphere), metric.summary)
         rows.append("".join(f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in cells))
     table = "".join(f"<tr>{row}</tr>" for row in rows)
     picture = base64.b64encode(png_of(figure)).decode()

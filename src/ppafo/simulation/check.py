@@ -21,6 +21,7 @@ from ppafo.engine.scheme.actuators import pressures_of, volumes_of
 from ppafo.errors import SimulationError
 from ppafo.signals.recording import Recording
 from ppafo.simulation.scenario import Scenario
+from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 
 SHORTER = 4
@@ -80,7 +81,7 @@ class ErrorEstimate:
 
         errors = {"rad": self.angle, "Pa": self.pressure, "K": self.temperature}
         shown = [metric_change(error, unit) for unit, error in errors.items() if error is not None]
-        texts = [f"{value:.1e} {unit}" for value, unit in shown]
+        texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in shown]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
         of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
         return f"Estimated error of the steps: at most {over_time} over time{of_metrics}."
@@ -180,9 +181,7 @@ class Check:
         shown += [(row, metric_change(row.value, row.unit)) for row in self.courses]
         rows = [["", "value", *names, ""]]
         for row, (value, unit) in shown:
-            changes = [
-                f"{metric_change(row.changes[name], row.unit)[0]:+.1e}" if row.changes[name] else "0" for name in names
-            ]
+            changes = [without_exponent(metric_change(row.changes[name], row.unit)[0], "+.1e") for name in names]
             verdict = "" if row.is_determined else "sensitive"
             rows.append([row.name, f"{value:.4g} {unit}".rstrip(), *changes, verdict])
         head = f"Check of '{self.scenario}': what changes in runs that should be the same"

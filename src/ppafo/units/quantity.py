@@ -164,9 +164,15 @@ _LARGEST_WITHOUT_EXPONENT = 1.0e6
 def without_exponent(value: float, form: str) -> str:
     """Return a number formatted as ``form`` says, in plain digits where that would write thousands with an exponent.
 
+    Zero has neither a sign nor an exponent.
+
     >>> without_exponent(2641.3, ".3g"), without_exponent(2.0e7, ".3g"), without_exponent(0.12345, ".3g")
     ('2640', '2e+07', '0.123')
+    >>> without_exponent(0.0, "+.3g"), without_exponent(0.0, ".1e"), without_exponent(-0.0, ".2f")
+    ('0', '0', '0.00')
     """
+    if value == 0.0:
+        return "0" if form[-1:] == "e" else f"{0.0:{form.removeprefix('+')}}"
     text = f"{value:{form}}"
     is_long = "e+0" in text and form[-1:] == "g" and abs(value) < _LARGEST_WITHOUT_EXPONENT
     return f"{float(text):{form.partition('.')[0]}.0f}" if is_long else text

@@ -113,7 +113,7 @@ def test_a_walk_the_other_way_is_seen_in_the_markers_and_a_map_may_name_axes_and
     assert same(seen.gait, normative)
     assert knee_error(seen.gait, normative) < 0.15
     assert "the walk goes along -x, upwards is z" in seen.remarks
-    forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK")})
+    forwards = columns.model_copy(update={"shank_angle": ShankMap(knee="RKNE", ankle="RANK", forward="x")})
     with pytest.raises(DataError, match="shank_angle grows by 13 deg while the foot stands"):
         import_gait([path], ImportSettings(normative.body_mass, columns=forwards))
 

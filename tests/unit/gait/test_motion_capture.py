@@ -7,9 +7,10 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.gait.recorded import ImportSettings, import_gait
+from ppafo.gait.recorded.mapping import load_map
 from ppafo.gait.recorded.source import form_of, read_table
 from ppafo.signals.recording import Floats
-from tests.unit.gait.laboratory import MASS, STRIDE, markers
+from tests.unit.gait.laboratory import MASS, STRIDE, markers, trc
 
 TIME = np.arange(0.0, 5.2, 0.01)
 POINTS = {name: point[:, : TIME.size] for name, point in markers(TIME).items()}
@@ -141,3 +142,49 @@ def test_a_counter_before_the_time_is_passed_over(tmp_path: Path) -> None:
     assert list(table.columns) == ["a", "b"]
     assert np.isnan(table.columns["a"][1])
     assert table.columns["b"].tolist() == [2.0, 4.0, 6.0]
+
+
+def standing(path: Path, sway: float) -> Path:
+    """One posture of the walk for 5 s, with the noise of markers, leaning by some degrees."""
+    still, noise = markers(np.array([0.3 * STRIDE])), np.random.default_rng(1).normal(0.0, 0.1, (3, TIME.size))
+    points = {name: point + noise for name, point in still.items()}
+    points["RKNE"][0] += 400.0 * np.radians(sway) * np.sin(TIME)
+    return trc(path, TIME, points)
+
+
+@pytest.mark.parametrize("sway", [0.0, 2.0])
+def test_of_a_standing_trial_it_is_said_alone_that_nobody_walks(sway: float, tmp_path: Path) -> None:
+    path = standing(tmp_path / "standing.trc", sway)
+    with pytest.raises(DataError, match="deg in the whole record, a walk 25 or more: nobody walks in it;") as refused:
+        import_gait([path], ImportSettings())
+    assert not refused.value.parts
+    assert "sign" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("forward", "vertical", "said"),
+    [
+        ("y", "z", "along x: shank_angle.forward is 'y'; give 'x' or '-x', where the walk goes, in a gait map"),
+        ("x", "y", "is longest along z, and shank_angle.vertical is 'y': give 'z' in a gait map, for the ankle too"),
+    ],
+)
+def test_a_wrong_axis_of_a_map_is_named_before_any_sign(forward: str, vertical: str, said: str, tmp_path: Path) -> None:
+    path, axes = trc(tmp_path / "walk.trc", TIME, POINTS), f'forward = "{forward}"\nvertical = "{vertical}"'
+    (tmp_path / "map.toml").write_text(
+        f'schema_version = 1\n[shank_angle]\nknee = "RKNE"\nankle = "RANK"\n{axes}\n'
+        f'[ankle_angle]\nheel = "RHEE"\ntoe = "RTOE"\npositive = "dorsiflexion"\n{axes}\n'
+    )
+    with pytest.raises(DataError, match=said) as refused:
+        import_gait([path], ImportSettings(MASS, columns=load_map(tmp_path / "map.toml")))
+    assert not refused.value.parts
+
+
+def test_columns_that_neither_angle_has_are_listed_once_and_not_at_any_length(tmp_path: Path) -> None:
+    points = {f"a very long name of a marker, number {n}": ROWS[:, :3].T for n in range(40)}
+    path = trc(tmp_path / "walk.trc", TIME, points)
+    with pytest.raises(
+        DataError, match=r"shank_angle: there is no column 'RKNE.x'.*; ankle_angle: there is"
+    ) as refused:
+        import_gait([path], ImportSettings(MASS))
+    assert str(refused.value).count("number 0,") == 1
+    assert len(str(refused.value)) < 500 + len(str(path))

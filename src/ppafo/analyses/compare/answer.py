@@ -11,6 +11,7 @@ import numpy as np
 from ppafo.analyses.compare.pairs import Paired, pareto_front
 from ppafo.errors import count_of
 from ppafo.metrics import Metric
+from ppafo.report.display_units import display_difference
 from ppafo.report.finding import Column, Finding, Part
 from ppafo.report.kind import Interval, Kind, of_metric
 from ppafo.report.live_parts import live_part
@@ -21,6 +22,7 @@ from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
+from ppafo.units import without_exponent
 from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
@@ -211,15 +213,19 @@ def _paired(comparison: Compared, task: OnTask, name: str) -> list[Column]:
     """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
     pairs = task.pairs[name]
     kinds = [of_metric(pair.metric, "+.3g") for pair in pairs]
-    nominal = []
-    for pair in pairs:
+    nominal: list[str] = []
+    scales: list[float] = []
+    for kind, pair in zip(kinds, pairs, strict=True):
         first, other = (task.case(each).value(pair.metric) for each in (comparison.baseline, name))
-        nominal.append(_percent((other - first) / abs(first)) if first else "")
+        # Nothing is a percentage of what is zero within the accuracy of a run.
+        scales.append(display_difference(first, kind.quantity))
+        change = display_difference(other - first, kind.quantity)
+        nominal.append(_percent(change / abs(scales[-1])) if scales[-1] else "")
     spread = [
         f"{_percent(pair.change)} ({_percent(pair.change_low)} to {_percent(pair.change_high)})"
-        if math.isfinite(pair.change)
+        if math.isfinite(pair.change) and scale
         else ""
-        for pair in pairs
+        for pair, scale in zip(pairs, scales, strict=True)
     ]
     better = [
         "" if pair.better is None else "equal in all" if pair.equal == 1.0 else _PROBABILITY.interval(pair.better)
@@ -239,7 +245,7 @@ def _paired(comparison: Compared, task: OnTask, name: str) -> list[Column]:
 
 
 def _percent(fraction: float) -> str:
-    return "" if math.isnan(fraction) else f"{100.0 * fraction:+.3g} %"
+    return "" if math.isnan(fraction) else f"{without_exponent(100.0 * fraction, '+.3g')} %"
 
 
 def remarks_of(comparison: Compared) -> list[str]:

@@ -42,7 +42,7 @@ def design(
         problem: name of a design file, or a .toml file
         threads: number of threads; default: all cores
         mass: body mass of the wearer, '72.5 kg'
-        stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2
+        stature: height of the wearer, '1.75 m'; default: of a body mass index of 22 kg/m^2, for 46.3 to 88 kg
         torque: peak torque of push-off, '2.5 N m'
         pressure: supply pressure, '50 psi_g'
         minutes: minutes of walking on one bottle

@@ -21,7 +21,7 @@ from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import fraction_text
-from ppafo.units import percentage
+from ppafo.units import percentage, without_exponent
 from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
@@ -255,7 +255,8 @@ def _change(before: Setting, after: Setting) -> str:
     words = f"objective {before.objective:.4g} before, {after.objective:.4g} after"
     if before.objective == 0.0:
         return words
-    return f"{words} ({100.0 * (after.objective - before.objective) / abs(before.objective):+.3g} %)"
+    change = 100.0 * (after.objective - before.objective) / abs(before.objective)
+    return f"{words} ({without_exponent(change, '+.3g')} %)"
 
 
 def _by_ceiling(problem: Problem, after: Setting) -> str:

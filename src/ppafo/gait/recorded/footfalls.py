@@ -14,6 +14,7 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError, count_of
 from ppafo.gait.gait import REQUIRED
+from ppafo.gait.plausible import check_shank_range
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
@@ -119,12 +120,11 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
     before the swing, after Aminian et al. 2002, J Biomech 35:689, who find both in a gyroscope on the shank. DataError
     where there is no toe-off.
     """
-    from scipy.signal import find_peaks
-
     smooth = low_pass(shank, _SMOOTH)
     high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
-    apart = max(1, int(_SHORTEST_STRIDE * smooth.rate))
-    peaks = find_peaks(smooth.values, height=high - _TOP * (high - low), distance=apart)[0].tolist()
+    # A unit that is wrong would be told as a sign that is.
+    check_shank_range(f"{shank.file}: shank_angle", float(np.degrees(high - low)))
+    peaks = _ends_of_swings(smooth)
     rate = np.gradient(smooth.values, smooth.time)
     strides = []
     for first, last in pairwise(peaks):
@@ -139,6 +139,23 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
         off = middle + int(np.argmin(rate[middle:lowest]))
         strides.append(Stride(*(float(smooth.time[sample]) for sample in (first, off, last))))
     return strides
+
+
+def _ends_of_swings(smooth: Signal) -> list[int]:
+    """Return the samples at which the forward swings of a smooth shank end."""
+    from scipy.signal import find_peaks
+
+    high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
+    apart = max(1, int(_SHORTEST_STRIDE * smooth.rate))
+    return [int(peak) for peak in find_peaks(smooth.values, height=high - _TOP * (high - low), distance=apart)[0]]
+
+
+def heel_strikes(events: str, walk: Mapping[str, Signal]) -> list[float]:
+    """Return the times [s] of all heel strikes that a force or a shank shows, with a stride behind them or not."""
+    if events == FORCE:
+        return [start for start, _ in contacts_of(walk[FORCE]) if start is not None]
+    smooth = low_pass(walk[SHANK], _SMOOTH)
+    return [float(smooth.time[peak]) for peak in _ends_of_swings(smooth)]
 
 
 _LEAST_LEAN = 0.5

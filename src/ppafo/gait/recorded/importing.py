@@ -29,7 +29,9 @@ from ppafo.gait.recorded.footfalls import (
     SHANK,
     Footfalls,
     Stride,
+    contacts_of,
     find_footfalls,
+    heel_strikes,
     lost_in,
     strides_of_curve,
     strides_within,
@@ -230,10 +232,9 @@ def _check_enough(strides: Strides, usable: list[Stride], walk: Mapping[str, Sig
         return
     spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
     count = count_of(taken, "whole stride")
-    where = list(walk)[-1]
-    events = (
-        f"{len(usable)} in the events" if usable else f"no heel strikes were found in {where}: is it the right column?"
-    )
+    where = FORCE if FORCE in walk else SHANK
+    events = f"{len(usable)} in the events" if usable else _said_of_no_stride(where, walk)
+    fewer = ", or accept fewer with --minimum-strides" if taken else ""
     longest = max(lost_span(signal) for signal in walk.values())
     if longest > 0.0:
         # Rounded up, so that the value in the remedy fills the gap.
@@ -241,13 +242,23 @@ def _check_enough(strides: Strides, usable: list[Stride], walk: Mapping[str, Sig
         filled = f"fill the gaps (--fill-gaps '{needed:g} s')"
         remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
         raise DataError(
-            f"{walk['shank_angle'].file}: has {count} without a lost sample, {least} are needed; {remedy}, give "
-            "a longer recording, or accept fewer with --minimum-strides"
+            f"{walk['shank_angle'].file}: has {count} without a lost sample, {least} are needed; {remedy}"
+            f"{', give' if fewer else ', or give'} a longer recording{fewer}"
         )
     raise DataError(
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
-        "give a longer recording, or accept fewer with --minimum-strides"
+        f"give a longer recording{fewer}"
     )
+
+
+def _said_of_no_stride(where: str, walk: Mapping[str, Signal]) -> str:
+    """Return why the events of a force or a shank make no stride: none, one alone, or none with a swing before it."""
+    strikes = heel_strikes(where, walk)
+    if strikes:
+        return f"the only heel strike in {where} is at {strikes[0]:.3g} s, and a stride ends with the next one"
+    if where == FORCE and any(off is not None for _, off in contacts_of(walk[FORCE])):
+        return f"no heel strike in {where}: the foot stands at the start, and a strike has a swing before it"
+    return f"no heel strikes were found in {where}: is it the right column?"
 
 
 def _spread(values: Sequence[float]) -> float:

@@ -4,9 +4,11 @@ Each is read from the one table that has its columns, from lines between markers
 that turns against it), or, for the knee, from hip and thigh.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from textwrap import shorten
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from ppafo.errors import (
     refused_as,
 )
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
-from ppafo.gait.plausible import SignSource, other_sign
+from ppafo.gait.plausible import SHANK_RANGE, SignSource, other_sign
 from ppafo.gait.recorded.mapping import (
     AngleMap,
     GaitMap,
@@ -110,8 +112,8 @@ def low_pass(signal: Signal, cut_off: float) -> Signal:
 LOADS = ("ankle_moment", "vertical_force", "centre_of_pressure")
 """Curves that are not measured off a force plate, which is no gap."""
 
-_LONGEST_SHOWN = 12
-"""Names of columns that a message shows."""
+_MOST_SHOWN, _LONGEST_SAID = 12, 160
+"""Names of columns that a message shows, and letters of them, and of a remark."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,26 +188,46 @@ def find_columns(
         return CurveColumns(f"{curve}.unit", holders[0], terms, curve in LOADS)
     if optional and not any(name in table.columns for name in bare for table in tables):
         return None
+    raise DataError(f"{_why_missing(curve, bare, tables)} {_said_of_columns(tables)}")
+
+
+def _check_angles(columns: GaitMap, tables: Sequence[MotionTable]) -> None:
+    """Raise DataError where neither angle has its columns: what the files have is said once for both."""
+    named = {name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED}
+    if not any(all(name in table.columns for name in bare) for table in tables for bare in named.values()):
+        why = "; ".join(_why_missing(curve, bare, tables) for curve, bare in named.items())
+        raise DataError(f"{why} {_said_of_columns(tables)}")
+
+
+def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable]) -> str:
+    """Return which column of a curve no table has, and the nearest; DataError where several have its name."""
     known = [name for table in tables for name in table.columns]
     missing = next((name for name in bare if name not in known), bare[0])
-    shown = ", ".join(one_line(name) for name in known[:_LONGEST_SHOWN]) + (
-        ", ..." if len(known) > _LONGEST_SHOWN else ""
-    )
-    files = ", ".join(table.file for table in tables)
     twins = [name for name in known if re.fullmatch(re.escape(_whole(missing)) + r"#\d+(\.[xyz])?", name)]
-    hint = nearest_column(missing, known)
-    why = f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
     if twins:
+        files = ", ".join(table.file for table in tables)
         either = " or ".join(repr(_whole(name)) for name in twins if name[-2:] not in (".y", ".z"))
         raise DataError(
             f"{curve}: {files} has {_whole(missing)!r} more than once, and they differ: name the one that is meant, "
             f"{either}, in a gait map (--map)"
         )
-    said = "".join(f"; {remark}" for table in tables for remark in table.remarks)
-    raise DataError(
-        f"{curve}: {why} ({files}: {shown}{said}); name the columns in a gait map (--map), "
-        "'ppafo doctor --schema gait-map'"
+    hint = nearest_column(missing, known)
+    return f"{curve}: " + (
+        f"there is no column {missing!r}{hint}" if missing not in known else "no file has all of its columns"
     )
+
+
+def _said_of_columns(tables: Sequence[MotionTable]) -> str:
+    """Return what files have and remark, each to a length that can be read, and where columns are named."""
+    # A marker counts once, not by its coordinates.
+    names = list(dict.fromkeys(one_line(_whole(name)) for table in tables for name in table.columns))
+    shown = ", ".join(names[:_MOST_SHOWN]) + (", ..." if len(names) > _MOST_SHOWN else "")
+    said = (
+        shorten(one_line(remark), _LONGEST_SAID, placeholder=" ...") for table in tables for remark in table.remarks
+    )
+    files = ", ".join(table.file for table in tables)
+    listed = "; ".join([shorten(shown, _LONGEST_SAID, placeholder=" ..."), *said])
+    return f"({files}: {listed}); name the columns in a gait map (--map), 'ppafo doctor --schema gait-map'"
 
 
 def _whole(name: str) -> str:
@@ -401,10 +423,14 @@ def walk_signals(
     has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured. DataError
     where an angle cannot be used, with everything in ``wrong``.
     """
+    try:
+        _check_angles(columns, tables)
+    except DataError as error:
+        raise_noted([*wrong, error])
     walk: dict[str, Signal] = {}
     # The shank stands first: an ankle from markers of the foot turns against it.
     for name in _UNITS:
-        mapped = getattr(columns, name)
+        mapped, found = getattr(columns, name), None
         if mapped is None:
             continue
         with noted_in(wrong):
@@ -419,12 +445,59 @@ def walk_signals(
                 continue
             signal = replace(signal, columns=tuple(column for _, column in found.terms))
             walk[name] = with_absence(signal) if name in LOADS else without_ends(signal)
+        if isinstance(mapped, ShankMap) and found is not None and name in walk:
+            # Nothing else that is wrong matters in what is no walk.
+            check_walks(walk[name], found, mapped)
     with noted_in(wrong):
         knee = {} if columns.knee is None else knee_signals(columns.knee, tables, person.stature, is_default)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}
     if any(name not in walk for name in REQUIRED):
         raise_noted(wrong)
     return walk
+
+
+_SHORTEST_WALK = 1.0
+"""Seconds; a shorter record may be of a part of a stride, in which the shank turns little."""
+_LEAST_UPRIGHT = 0.5
+"""Fraction of its length by which a shank is longest along the vertical, on average over a walk."""
+
+
+def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
+    """Raise DataError for a shank along wrong axes, or one that turns too little for anybody to walk."""
+    if shank.time[-1] - shank.time[0] < _SHORTEST_WALK:
+        return
+    low, high = SHANK_RANGE
+    travel = float(np.ptp(np.degrees(shank.values)))
+    said = f"{shank.file}: shank_angle covers a range of {travel:.2g} deg in the whole record, a walk {low:g} or more"
+    if mapped.terms is not None:
+        # Radians that are called degrees have no event either, but a unit as a remedy.
+        if travel < low and not low <= np.degrees(travel) <= high:
+            raise DataError(f"{said}: nobody walks in it, or its columns are not of the shank")
+        return
+    ends = {
+        axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"
+    }
+    # A text of two axes has no third, and one of a marker that was lost throughout no number.
+    shin = {axis: below - above for axis, (above, below) in ends.items() if above is not None and below is not None}
+    means = {axis: float(np.nanmean(along)) for axis, along in shin.items() if np.isfinite(along).any()}
+    length, longest = math.hypot(*means.values()), max(means, key=lambda axis: abs(means[axis]))
+    if abs(means[mapped.vertical]) < _LEAST_UPRIGHT * length:
+        raise DataError(
+            f"{shank.file}: the line from {mapped.knee!r} to {mapped.ankle!r} is longest along {longest}, and "
+            f"shank_angle.vertical is {mapped.vertical!r}: give {longest!r} in a gait map, for the ankle too"
+        )
+    if travel >= low:
+        return
+    leans, across = 0.0, min(means.keys() - {mapped.forward[-1], mapped.vertical}, default="")
+    if across:
+        lean = np.degrees(np.arctan2(shin[across], -shin[mapped.vertical]))
+        leans = float(np.nanmax(lean) - np.nanmin(lean))
+    if leans >= low:
+        raise DataError(
+            f"{said}, and {leans:.2g} deg along {across}: shank_angle.forward is {mapped.forward!r}; give {across!r} "
+            f"or '-{across}', where the walk goes, in a gait map, for the ankle too"
+        )
+    raise DataError(f"{said}: nobody walks in it; give a recording of walking")
 
 
 _UNITS = {

@@ -47,11 +47,8 @@ class Wish:
 
     @property
     def height(self) -> float:
-        """Stature [m]; unless one is given, of a wearer with ``BODY_MASS_INDEX``, as far as adults have it."""
-        if self.stature is not None:
-            return self.stature
-        low, high = STATURES
-        return min(max(math.sqrt(self.mass / BODY_MASS_INDEX), low), high)
+        """Stature [m]; unless one is given, of a wearer with ``BODY_MASS_INDEX``."""
+        return math.sqrt(self.mass / BODY_MASS_INDEX) if self.stature is None else self.stature
 
     @property
     def clearance(self) -> float:
@@ -77,6 +74,11 @@ def check_wish(wish: Wish) -> None:
     if not mass.minimum <= wish.mass <= mass.maximum:
         raise StudyError(
             f"--mass: {wish.mass:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg"
+        )
+    if wish.stature is None and not low <= wish.height <= high:
+        raise StudyError(
+            f"--mass: {wish.mass:g} kg: with a body mass index of {BODY_MASS_INDEX:g} kg/m^2 the wearer would be "
+            f"{wish.height:.3g} m tall, and segments are known of adults of {low:g} to {high:g} m; give --stature"
         )
     if not wish.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")

@@ -18,7 +18,7 @@ from ppafo.analyses.design.wearer.electrical import electrical_of, valve_power
 from ppafo.analyses.design.wearer.offers import offers_instead
 from ppafo.analyses.design.wearer.shelf import shelf_of
 from ppafo.analyses.design.wearer.strides import few_strides
-from ppafo.analyses.design.wearer.wish import Device, WearerSizing, Wish
+from ppafo.analyses.design.wearer.wish import Device, WearerSizing, Wish, check_wish
 from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, StudyError
 from ppafo.parameters.parts import load_catalogue
@@ -161,7 +161,17 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
     assert wish.height == pytest.approx(math.sqrt(60.0 / 22.0))
     said = text_of(finding_of(WearerSizing(wish, 0.0052, tuple(found), None, ())))
     assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give --stature)" in said
-    assert Wish(40.0, None, 5.0, 4.0e5, 60.0).height == 1.45, "no adult is smaller"
+
+
+@pytest.mark.parametrize(("mass", "tall"), [(35.0, "1.26"), (95.0, "2.08")])
+def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float, tall: str) -> None:
+    with pytest.raises(ppafo.StudyError) as caught:
+        ppafo.design(mass=mass, torque=2.5, pressure=4.5e5, minutes=1.0)
+    assert str(caught.value) == (
+        f"--mass: {mass:g} kg: with a body mass index of 22 kg/m^2 the wearer would be {tall} m tall, and segments are "
+        "known of adults of 1.45 to 2 m; give --stature"
+    )
+    check_wish(Wish(mass, 1.5, 2.5, 4.5e5, 60.0))
 
 
 PARTS = """
