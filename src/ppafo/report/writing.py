@@ -52,13 +52,20 @@ def with_paths_as_code(text: str) -> "Markup":
     return Markup(_PATH.sub(lambda found: f"<code>{found[0]}</code>", str(escape(text))))
 
 
-def sentence(text: str) -> str:
-    """Return a text with a capital at its beginning and a full stop at its end; a path or symbol stays as it is."""
+def sentence(text: str, title: str = "") -> str:
+    """Return a text with a capital at its beginning and a full stop at its end; a path or symbol stays as it is.
+
+    So does a name: a word with a digit, the first word of the ``title`` of the page, and before a colon any of its
+    words.
+    """
     stripped = text.strip()
     if not stripped:
         return ""
-    is_symbol = any(mark in stripped.partition(" ")[0].rstrip(".:,") for mark in "._")
-    capital = stripped if is_symbol else stripped[0].upper() + stripped[1:]
+    first, named = stripped.partition(" ")[0], title.split()
+    word = first.rstrip(".:,")
+    is_symbol = any(mark in "._" or mark.isdecimal() for mark in word)
+    is_name = word in (named if first.endswith(":") else named[:1])
+    capital = stripped if is_symbol or is_name else stripped[0].upper() + stripped[1:]
     return capital if capital.endswith((".", "!", "?")) else f"{capital}."
 
 

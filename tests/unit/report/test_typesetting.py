@@ -45,6 +45,25 @@ def test_a_path_or_a_symbol_at_the_beginning_stays_as_it_is() -> None:
     assert sentence("k_p") == "k_p."
 
 
+@pytest.mark.parametrize(
+    ("text", "title"),
+    [
+        ("knoechel does not agree with 2 recordings.", "knoechel against 2 recordings"),
+        ("co2-40oz: a cylinder of 40 oz.", "Parts"),
+        ("ppafo2011 agrees.", ""),
+        ("solenoid: 20 wearers.", "20 wearers with solenoid"),
+        ("pid-gains: objective 1 before.", "pid-gains"),
+    ],
+)
+def test_a_name_at_the_beginning_stays_as_it_is(text: str, title: str) -> None:
+    assert sentence(text, title) == text
+
+
+def test_a_word_that_is_no_name_gets_its_capital_whatever_the_title_says() -> None:
+    assert sentence("with it the run follows", "20 wearers with solenoid") == "With it the run follows."
+    assert sentence("gas use: a recording", "Endurance") == "Gas use: a recording."
+
+
 def test_a_quantity_keeps_its_digits_and_a_missing_one_is_a_dash() -> None:
     assert quantity(1.0, "N m", 3) == "1.00 N m"
     assert quantity(10.0, "-", 3) == "10"
