@@ -187,7 +187,8 @@ def check_not_alone(source: Source, procedure: str, name: str) -> None:
 
 
 def _shown(source: Source, name: str, value: float) -> str:
-    number, unit = in_shown_unit(value, source.recording.unit(name))
+    channel = source.recording.channels[name]
+    number, unit = in_shown_unit(value, channel.unit, channel.stated)
     return f"{number:.6g} {unit}".removesuffix(" -")
 
 

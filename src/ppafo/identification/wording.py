@@ -6,6 +6,7 @@ from ppafo.identification.conflict import SMOOTH, STATED
 from ppafo.identification.fit import Fit
 from ppafo.units import from_si, percentage
 from ppafo.units.shown import shown_unit
+from ppafo.units.spelling import split_pressure_kind
 
 _SHOWN_IN = {"Pa": ("Pa_d", "kPa_d"), "rad": ("rad", "deg"), "N m": ("N m", "N m")}
 """Unit in SI to the difference that it is shown as, and in which unit where the set does not write another."""
@@ -17,12 +18,17 @@ _SHARE, _MOST_NAMED = 0.05, 3
 """Smallest fraction of the variance for which a tolerance is named, and how many are."""
 
 
-def in_shown_unit(number: float, unit: str) -> tuple[float, str]:
-    """Return a number in an SI unit in the unit of the set, else in kPa, degrees, or the unit itself."""
+def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, str]:
+    """Return a number in an SI unit in that of a file, where one is ``stated``, else of the set, else kPa or degrees.
+
+    A pressure that a file has as gauge is shown absolute, as it is kept.
+    """
     if unit not in _SHOWN_IN or not math.isfinite(number):
         return number, unit
     si_unit, usual = _SHOWN_IN[unit]
     shown = shown_unit(si_unit, usual)
+    if stated:
+        shown = f"{split_pressure_kind(stated)[0]}_d" if si_unit == "Pa_d" else stated
     return from_si(float(number), shown, si_unit), shown.removesuffix("_d")
 
 

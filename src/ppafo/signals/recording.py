@@ -135,12 +135,13 @@ class Channel:
     """Values of one quantity, read-only, and their unit as SI text: ``rad``, ``Pa`` (absolute), ``N m``, ``-``.
 
     ``between`` says what it does between two samples, ``hold`` or ``linear``; None is what its name usually means: a
-    command holds.
+    command holds. ``stated`` is the unit in which a file has it, in which messages about the file speak.
     """
 
     values: Floats
     unit: str
     between: Between | None = None
+    stated: str = ""
 
     def __post_init__(self) -> None:
         # Frozen: what is checked once stays true, and a channel can belong to several recordings.
@@ -163,7 +164,7 @@ class Channel:
 
     def __reduce__(self) -> tuple[Callable[..., "Channel"], tuple[Any, ...]]:
         """Copy and unpickle through the constructor, so that the values stay read-only."""
-        return Channel, (self.values, self.unit, self.between)
+        return Channel, (self.values, self.unit, self.between, self.stated)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -284,7 +285,7 @@ class Recording:
         if not inside.any():
             raise DataError(f"{self.label}: there is no sample between {start:g} s and {end:g} s; {_span(self)}")
         kept = {
-            name: Channel(channel.values[inside], channel.unit, channel.between)
+            name: Channel(channel.values[inside], channel.unit, channel.between, channel.stated)
             for name, channel in self.channels.items()
         }
         return Recording(self.label, self.time[inside], kept, self.kind)
@@ -297,7 +298,7 @@ class Recording:
                 f"{self.label}: nothing is known from {wanted.min():g} s to {wanted.max():g} s; {_span(self)}"
             )
         moved = {
-            name: Channel(between_samples(self, name, wanted), channel.unit, channel.between)
+            name: Channel(between_samples(self, name, wanted), channel.unit, channel.between, channel.stated)
             for name, channel in self.channels.items()
         }
         return Recording(self.label, wanted, moved, self.kind)

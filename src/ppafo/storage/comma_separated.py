@@ -217,7 +217,7 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
         series[0] = counted_on(series[0])
         check_clock(series[0], range(first + 2, first + 2 + len(values)))
         named = {
-            column.name: Channel(one, column.si_unit, column.between)
+            column.name: Channel(one, column.si_unit, column.between, column.unit)
             for column, one in zip(columns[1:], series[1:], strict=True)
         }
         kind = "simulated" if is_of_frame(header) else kind_of_comments(lines[:first])

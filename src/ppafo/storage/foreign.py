@@ -205,7 +205,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
             value, unit = split_number(mapped.constant)
             column = Column(name, _flow_unit(name, unit, mapped, surroundings.gas) or PLAIN_NUMBER)
             values = in_si(column, np.full(table.size, value), surroundings.atmosphere)
-            return Channel(values, column.si_unit, mapped.between)
+            return Channel(values, column.si_unit, mapped.between, column.unit)
     numbers = table.numbers.get(name, np.empty(0))
     values, unit = mapped.sign * (mapped.factor * numbers + mapped.offset), mapped.unit
     key = f"unit = {mapped.unit!r}"
@@ -216,7 +216,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
         key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
         column = Column(name, _flow_unit(name, unit, mapped, surroundings.gas))
-        return Channel(in_si(column, values, surroundings.atmosphere), column.si_unit, mapped.between)
+        return Channel(in_si(column, values, surroundings.atmosphere), column.si_unit, mapped.between, column.unit)
 
 
 def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:

@@ -161,7 +161,7 @@ def _recording(
             series.append(in_si(column, numbers, atmosphere))
     check_clock(series[0], range(len(series[0])), "row")
     channels = {
-        column.name: Channel(numbers, column.si_unit, column.between)
+        column.name: Channel(numbers, column.si_unit, column.between, column.unit)
         for column, numbers in zip(columns[1:], series[1:], strict=True)
     }
     return Recording(label, series[0], channels, kind)
