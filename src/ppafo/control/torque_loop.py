@@ -30,6 +30,8 @@ INTEGRAL_RATE = "integral rate of the torque loop"
 BOUNDARY = "boundary layer of the torque loop"
 CONVERGENCE = "convergence rate of the torque loop"
 OPENING = "opening of the torque loop"
+DEAD_ZONE = "dead zone of the torque loop"
+RELEASE = "release of the torque loop"
 LEARNING_GAIN = "learning gain of the torque loop"
 LEAD = "lead of the torque loop"
 """What a default may follow: the numbers that the functions below give."""
@@ -39,6 +41,12 @@ LEAST_TORQUE = 5.0e-4
 
 LARGEST_OPENING = 0.77
 """Opening of the law with a dead zone where a chamber is slow: the rest is left to the pressure that falls."""
+
+DEAD_ZONE_SHARE, RELEASE_SHARE = 0.042, 0.0062
+"""Errors at which a law with a dead zone opens the valve and closes it again, over the reach [-].
+
+They are 0.21 N m and 0.031 N m of the 5 N m that the paper's actuator reaches at 50 psi_g.
+"""
 
 USUAL_LEAD = 0.0185
 """s: how much earlier than the dead time the learnt table is read, for the way from an error to the next stride's."""
@@ -88,6 +96,16 @@ def convergence_rate(loop: TorqueLoop) -> float:
 def dead_zone_opening(loop: TorqueLoop, dead_zone: float) -> float:
     """Opening [-] of a law with a dead zone [N m]: with it the torque does not pass the zone in the dead time."""
     return min(LARGEST_OPENING, dead_zone / torque_in_dead_time(loop))
+
+
+def dead_zone(reach: float) -> float:
+    """Error [N m] at which a law with a dead zone opens the valve, of an actuator with a torque reach [N m]."""
+    return DEAD_ZONE_SHARE * reach
+
+
+def release(reach: float) -> float:
+    """Error [N m] at which a law with a dead zone closes the valve again, of an actuator with a torque reach [N m]."""
+    return RELEASE_SHARE * reach
 
 
 def learning_gain(proportional: float) -> float:

@@ -35,8 +35,9 @@ def read_followers(
     for section, items in sections.items():
         for quantity in items:
             path, read = f"{section}.{quantity.name}", quantity
-            # A setting of this list may follow one before it.
-            if quantity.follows and value_at(reading.document, path) is None:
+            # A setting of this list may follow one before it; what no number of the device decides is to be given.
+            is_decided = quantity.follows and terms.keys() >= set(quantity.follows)
+            if is_decided and value_at(reading.document, path) is None:
                 link = Follows(tuple(terms[name] for name in quantity.follows), quantity.default or 0.0)
                 links[path] = (link,)
                 read = replace(quantity, default=float(link.number(number)))

@@ -21,6 +21,8 @@ _OF_LOOP = frozenset(
         torque_loop.INTEGRAL_RATE,
         torque_loop.BOUNDARY,
         torque_loop.CONVERGENCE,
+        torque_loop.DEAD_ZONE,
+        torque_loop.RELEASE,
         torque_loop.OPENING,
         torque_loop.LEARNING_GAIN,
         torque_loop.LEAD,

@@ -177,6 +177,13 @@ class GainParts(NamedTuple):
     rule: Callable[..., float]
 
 
+class ReachParts(NamedTuple):
+    """What a share of a reach is made of: the reach of a device, and a rule of ``control.torque_loop``."""
+
+    reach_of: Callable[..., float]
+    rule: Callable[[float], float]
+
+
 class GainOfJointParts(NamedTuple):
     """What a gain is made of that the joint decides too: loop and joint, and a rule of ``control.angle_loop``."""
 
@@ -273,6 +280,24 @@ def loop_of(
     )
 
 
+def reach_of(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    _numbers: FlowNumbers,
+    _valve: Any,
+    signals: Any,
+    *,
+    parts: LoopParts,
+) -> float:
+    """Largest change of a torque [N m] or a pressure [Pa] that one supply gives while the other chamber is vented."""
+    place, _ = parts.places(stops, signals)
+    mean = parts.chambers_at(settings, stops, around, place)
+    gauge_1 = around.supply_pressure - around.atmospheric_pressure
+    gauge_2 = around.dorsiflexion_pressure - around.atmospheric_pressure
+    return max(parts.per_pressure_1(mean) * gauge_1, parts.per_pressure_2(mean) * gauge_2, 0.0)
+
+
 def time_with_angle(signals: Any) -> float:
     """How old a measurement is [s], and how late the slower of the sensors follow."""
     late: float = max(lag_of_sensor(signals.bandwidth), lag_of_sensor(signals.angle_bandwidth))
@@ -358,6 +383,20 @@ def gain_of_loop(
     return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals))
 
 
+def share_of_reach(
+    settings: Any,
+    stops: Range,
+    around: Surroundings,
+    numbers: FlowNumbers,
+    valve: Any,
+    signals: Any,
+    *,
+    parts: ReachParts,
+) -> float:
+    """What a rule makes of the reach of a device."""
+    return parts.rule(parts.reach_of(settings, stops, around, numbers, valve, signals))
+
+
 def gain_of_loop_and_setting(
     settings: Any,
     stops: Range,
@@ -399,6 +438,11 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     DEAD_TIME: torque_loop.dead_time,
 }
 """What follows the torque loop alone, and by which rule."""
+_OF_REACH: dict[str, Callable[[float], float]] = {
+    torque_loop.DEAD_ZONE: torque_loop.dead_zone,
+    torque_loop.RELEASE: torque_loop.release,
+}
+"""What follows the reach of a device, and by which rule."""
 
 
 _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
@@ -428,10 +472,11 @@ _PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanCh
 class LoopFrames(NamedTuple):
     """The loop of what is controlled and the torque loop, as functions of rows; the rows, what fills them, components.
 
-    ``joint`` is the joint, None where it is not known.
+    ``reach`` is the reach of the torque or pressure. ``joint`` is the joint, None where it is not known.
     """
 
     loop: PlainFunction
+    reach: PlainFunction
     torque_loop: PlainFunction
     rows: tuple[type, ...]
     sources: tuple[str, ...]
@@ -511,7 +556,8 @@ def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFra
         *seen.paths,
     )
     rows = (*chambers.rows, FlowNumbers, valve.settings, seen.signals)
-    return LoopFrames(loop=loop, torque_loop=inner, rows=rows, sources=sources, joint=joint)
+    reach = made_of(reach_of, "reach_of_device", parts)
+    return LoopFrames(loop=loop, reach=reach, torque_loop=inner, rows=rows, sources=sources, joint=joint)
 
 
 def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str = TORQUE) -> dict[str, Term]:
@@ -528,6 +574,8 @@ def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str 
         if frame is gain_of_joint:
             assert frames.joint is not None, "a law of the angle knows its joint"
             made = made_of(frame, f"{by.__name__}_of_device", GainOfJointParts(frames.torque_loop, frames.joint, by))
+        elif frame is share_of_reach:
+            made = made_of(frame, f"{by.__name__}_of_device", ReachParts(frames.reach, by))
         else:
             made = made_of(frame, f"{by.__name__}_of_device", GainParts(own_loop, by))
         return Term((*frames.sources, *settings), made, frames.rows)
@@ -538,6 +586,9 @@ def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str 
     terms = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
     for name, of_joint in _OF_JOINT.items() if TORQUE not in law.controls else ():
         terms[name] = term(gain_of_joint, of_joint, "controller.error_limit")
+    # Of an angle no reach is known: its dead zone is to be given.
+    for name, of_reach in _OF_REACH.items() if controlled != ANGLE else ():
+        terms[name] = term(share_of_reach, of_reach)
     opening = opening_beyond_band if "dead_band" in names else gain_of_loop_and_setting
     terms[torque_loop.OPENING] = term(opening, torque_loop.dead_zone_opening, "controller.dead_zone")
     # An integral, and what is learnt, go with the proportional gain, also where that one is given.

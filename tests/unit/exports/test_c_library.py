@@ -324,17 +324,21 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
 
 
 @pytest.mark.parametrize(
-    ("name", "change"),
-    [("cylinder-servo", ("foot_plate.inertia", 12.0e-3)), ("pressure-loop", ("supply.pressure", 5.0e5))],
-    ids=["cylinder-servo", "pressure-loop"],
+    ("name", "law", "change"),
+    [
+        ("cylinder-servo", (), ("foot_plate.inertia", 12.0e-3)),
+        ("pressure-loop", (), ("supply.pressure", 5.0e5)),
+        ("torque-task-slow-valve", ("controller.kind=on_off_dead_zone",), ("supply.pressure", 5.0e5)),
+    ],
+    ids=["cylinder-servo", "pressure-loop", "dead zone"],
 )
-def test_what_is_no_torque_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
-    name: str, change: tuple[str, float], tmp_path: Path
+def test_a_library_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
+    name: str, law: tuple[str, ...], change: tuple[str, float], tmp_path: Path
 ) -> None:
     path, number = change
     unit = {"foot_plate.inertia": "kg m^2", "supply.pressure": "Pa_a"}[path]
-    overrides = ("run.duration=0.2 s", f"{path}={number!r} {unit}")
-    library = Loaded(name, tmp_path)
+    overrides = (*law, "run.duration=0.2 s", f"{path}={number!r} {unit}")
+    library = Loaded(name, tmp_path, law)
     recording = simulate(name, overrides).recording
     columns = [recording.time, *(recording[channel] for channel in library.exported.program.outputs)]
     found = Run(library, run_duration=0.2, **{path.replace(".", "_"): number}).course()

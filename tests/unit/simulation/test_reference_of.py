@@ -83,7 +83,7 @@ def test_a_profile_has_levels_and_differences() -> None:
             document("angle", "90 deg", "cascade", device={"set": "ppafo2011", "valve": "solenoid"}, **FREE),
             "vents both chambers at a command of 0 and holds no angle",
         ),
-        (document("pressure_1", "20 psi_g", "on_off_dead_zone"), "'controller.dead_zone' is missing"),
+        (document("angle", "90 deg", "on_off_dead_zone", **FREE), "'controller.dead_zone' is missing"),
         (
             document("pressure_1", "60 psi_g"),
             "leaves the range between atmosphere and supply.*it is at 60 psi_g at 0 s",

@@ -10,6 +10,7 @@ import pytest
 from ppafo.control.torque_loop import TorqueLoop, lead, proportional_gain
 from ppafo.loading import load_scenario
 from ppafo.parameters.plant import plant_parameters
+from ppafo.parameters.reach import torque_reach
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import moving_together, with_numbers
@@ -64,8 +65,27 @@ def test_the_other_words_for_the_same_bandwidth() -> None:
     assert learning.lead == pytest.approx(0.02 + theta - 0.0015)
     assert (learning.learning_gain, learning.damping) == (0.5 * learning.proportional_gain, 0.0)
     zone = load_walk("proportional", ["controller.kind=on_off_dead_zone", "valve.dead_band=0.1", *SMALL_AIR])
-    assert zone.controller.opening == pytest.approx(0.1 + 0.9 * min(0.77, 0.21 / (rate * theta)))
+    assert zone.controller.opening == pytest.approx(0.1 + 0.9 * min(0.77, zone.controller.dead_zone / (rate * theta)))
     assert load_walk("proportional", ["controller.kind=on_off_dead_zone"]).controller.opening == 0.77
+
+
+def test_a_dead_zone_that_nobody_gives_is_a_share_of_what_the_device_reaches() -> None:
+    zone = "controller.kind=on_off_dead_zone"
+    paper = load_scenario("torque-task-solenoid", [zone])
+    weak = with_numbers(paper, {"supply.pressure": 3.0e5, "supply.dorsiflexion_pressure": 2.0e5})
+    for scenario in (paper, weak):
+        _, reach = torque_reach(scenario.device, 1.3)
+        zones = scenario.controller.dead_zone, scenario.controller.release
+        assert zones == pytest.approx((0.042 * reach, 0.0062 * reach), rel=1e-9)
+    assert paper.controller.dead_zone == pytest.approx(0.21, rel=1e-3)
+    other = paper.device.supply.dorsiflexion_pressure
+    turned = with_numbers(paper, {"supply.pressure": 1.5e5, "supply.dorsiflexion_pressure": other})
+    assert turned.controller.dead_zone == paper.controller.dead_zone, "chamber 2 reaches as far as before"
+    pressure = load_scenario("pressure-loop", [zone])
+    supply = pressure.device.supply
+    assert pressure.controller.dead_zone == pytest.approx(0.042 * (supply.pressure - supply.atmospheric_pressure))
+    given = load_scenario("torque-task-solenoid", [zone, "controller.dead_zone=0.4 N m", "supply.pressure=70 psi_g"])
+    assert given.controller.dead_zone == 0.4
 
 
 def test_a_gain_is_the_same_through_every_door() -> None:

@@ -3,7 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
-from ppafo.control.torque_loop import OPENING
+from ppafo.control.torque_loop import DEAD_ZONE, OPENING, RELEASE
 from ppafo.model.controlled import ANYTHING, seen_error
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
@@ -74,8 +74,11 @@ ON_OFF = ControllerKind(
 class OnOffDeadZoneParameters(NamedTuple):
     """Errors at which the valve opens and at which it closes again [N m]; command while it is open [-]."""
 
-    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", 0.21, 0.0, 100.0)]
-    release: Annotated[float, Number("N m", "error at which it closes again; the dead zone at most", 0.031, 0.0, 100.0)]
+    dead_zone: Annotated[float, Number("N m", "error at which the valve opens", None, 0.0, 100.0, follows=(DEAD_ZONE,))]
+    release: Annotated[
+        float,
+        Number("N m", "error at which it closes again; the dead zone at most", None, 0.0, 100.0, follows=(RELEASE,)),
+    ]
     opening: Annotated[float, Number("", "command while it is open", None, 0.0, 1.0, follows=(OPENING,))]
 
 

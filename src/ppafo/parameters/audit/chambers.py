@@ -244,8 +244,8 @@ def check_rounded_table(evidence: Evidence) -> Iterator[Finding]:
             values=(),
             sides=(Side("largest move", moved, "m^3"), Side("last digit", digit, "m^3")),
             paragraph=(
-                f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would be those of "
-                f"no chamber: negative, or falling with the pressure. They are moved by {1e6 * moved:.2g} mL at most, "
+                f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would fit no "
+                f"chamber: negative, or falling with the pressure. They are moved by {1e6 * moved:.2g} mL at most, "
                 f"within the last digit of {1e6 * digit:.2g} mL. More digits would need no move."
             ),
         )
