@@ -86,6 +86,9 @@ class ColumnMap(StrictTable):
     skip_rows: Annotated[
         int, Field(ge=0, description="rows below the header to leave out: a line of units, or numbers")
     ] = 0
+    trial: Annotated[
+        int | None, Field(ge=1, description="which one, from 1, of trials below each other with a clock from 0 each")
+    ] = None
     channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
     direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None
 

@@ -4,6 +4,7 @@ What cannot be read is named with file, line and column, and what is wrong in th
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -189,11 +190,27 @@ def read_foreign(
                 if name != TIME
             }
             time = _time(columns.channels[TIME], table, atmosphere)
-        check_clock(time, table.rows, table.noun)
+            rows = slice(None) if columns.trial is None else _rows_of_trial(time, columns.trial)
+        time = time[rows]
+        channels = {name: replace(channel, values=channel.values[rows]) for name, channel in channels.items()}
+        check_clock(time, table.rows[rows], table.noun)
         # A synthetic recording stays one through a column map.
         recording = Recording(label or one_line(Path(path).stem), time, channels, table.kind)
         with in_map(map_name):
             return recording if columns.direction is None else with_direction(recording, columns.direction)
+
+
+def _rows_of_trial(time: Floats, trial: int) -> slice:
+    """Return the rows of one of the trials in a file, each of which begins where the time [s] falls; from 1.
+
+    DataError where there are fewer.
+    """
+    starts = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), time.size]
+    if trial >= len(starts):
+        raise DataError(
+            f"trial = {trial}: the clock begins again {len(starts) - 2} times: there is 1 to {len(starts) - 1}"
+        )
+    return slice(starts[trial - 1], starts[trial])
 
 
 def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings: _Surroundings) -> Channel:

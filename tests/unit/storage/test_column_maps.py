@@ -352,3 +352,22 @@ def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path
     )
     assert ppafo.evaluate(log, columns=f"{maps}:bench")["peak_torque"].value == pytest.approx(2.5)
     assert ppafo.read_recording(log, columns=load_column_map(maps))["torque"].tolist() == pytest.approx([0, 1.205, 2.5])
+
+
+def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Path) -> None:
+    rows = [f"{10 * n},{100 * trial + n}\n" for trial in (1, 2, 3) for n in range(5 - trial)]
+    path, channels = written(tmp_path, "".join(rows)), {"torque": {"column": 2, "unit": "N m"}}
+    for trial in (1, 2, 3):
+        recording = read_foreign(path, mapped(channels=channels, trial=trial))
+        assert recording["torque"].tolist() == [100.0 * trial + n for n in range(5 - trial)]
+        assert recording.time[0] == 0.0
+    with pytest.raises(DataError, match=r"raw.csv: trial = 4: the clock begins again 2 times: there is 1 to 3"):
+        read_foreign(path, mapped(channels=channels, trial=4))
+    with pytest.raises(DataError, match=r"line 5, column 'time'.*, or take one of 3 trials with trial = 1 in a column"):
+        read_foreign(path, mapped(channels=channels))
+
+
+def test_a_clock_that_falls_back_within_a_trial_is_no_other_trial(tmp_path: Path) -> None:
+    channels = {"torque": {"column": 2, "unit": "N m"}}
+    with pytest.raises(DataError, match=r"time must increase from sample to sample$"):
+        read_foreign(written(tmp_path, "0,1\n10,1\n20,1\n15,1\n"), mapped(channels=channels))
