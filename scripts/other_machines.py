@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.engine.compilers import FLAGS
+from ppafo.engine.compilers import FLAGS, Effort
 from ppafo.engine.lanes import Batch, BatchResult
 from ppafo.errors import SimulationError
 from ppafo.translation.c99 import program_source
@@ -132,7 +132,7 @@ def on_other_machine(name: str, batch: Batch) -> Callable[[Batch], BatchResult]:
     program = Path(folder.name) / f"program{machine.suffix}"
     source = program.with_name("program.c")
     source.write_text(program_source(batch.program) + DRIVER, encoding="utf-8")
-    line = [*compiler("zig").command, *FLAGS, *machine.target, str(source), "-o", str(program)]
+    line = [*compiler("zig").command, *FLAGS, Effort.FULL.value, *machine.target, str(source), "-o", str(program)]
     subprocess.run(line, check=True, capture_output=True)
 
     def run(given: Batch) -> BatchResult:

@@ -4,8 +4,9 @@ Every refusal names the file and the remedy.
 """
 
 import hashlib
+import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -19,10 +20,11 @@ from ppafo.signals import CHANNELS, Recording, RecordingKind
 from ppafo.signals.faults import (
     FEWEST_AT_LIMIT,
     is_at_limit,
-    isolated_samples,
     longest_gap,
     noise_of,
+    outlying_samples,
     plateaus,
+    resolution_of,
     scatters,
 )
 from ppafo.signals.recording import Floats
@@ -114,6 +116,10 @@ _GROSS_SAMPLE, _GROSS_READING = 1.0 / 6.0, 0.25
 
 A real logger's glitch of a third of the range is one of many samples, and no reason to refuse the recording.
 """
+_MOST_LEFT_OUT = 0.02
+"""Share of the samples of a recording over time that may be wrong, and are left out."""
+_COARSEST = 0.05
+"""Step of a converter over the largest right sample, from which it is none: two wrong samples may be alike."""
 _NO_DECAY = 0.5
 """Share of the range by which a first sample differs from the next four where it is wrong."""
 _ALIKE, _FEWEST_ALIKE = 6, 8
@@ -222,23 +228,51 @@ def check_not_clipped(
         )
 
 
-def check_no_outlier(source: Source, procedure: str, name: str, part: Recording) -> None:
-    """Refuse samples of a channel that are far off the samples around them, in a part of a recording over time.
+def without_wrong_samples(
+    sources: tuple[Source, ...], procedure: str, names: Sequence[str], start: float | None, end: float | None
+) -> tuple[tuple[Source, ...], tuple[str, ...]]:
+    """Return recordings over time without the samples that no sensor made, and remarks on these.
 
-    IdentificationError names the recording, the sample, its value and the median of the samples around.
+    They are far off the samples around them by the rule of a fit of motion, in a channel of ``names`` from ``start`` to
+    ``end`` [s]; a step of the converter is none. IdentificationError where there are more than 2 in 100, with the
+    recording, the sample, its value and the median of those around.
     """
-    values = part[name]
+    kept, said = [], []
+    for source in sources:
+        recording = source.recording
+        inside = np.flatnonzero(np.isin(recording.time, window(recording, start, end).time))
+        right = np.ones(len(recording), dtype=np.bool_)
+        for name in (name for name in names if name in recording):
+            values, most = recording[name][inside], max(1, int(_MOST_LEFT_OUT * inside.size))
+            wrong = np.flatnonzero(_far_off(values, most))
+            if not wrong.size:
+                continue
+            first = int(wrong[0])
+            if wrong.size > most:
+                around = float(np.median(values[max(first - 2, 0) : first + 3]))
+                _refuse_outlier(source, procedure, name, inside[wrong].tolist(), float(values[first]), around)
+            right[inside[wrong]] = False
+            said.append(
+                f"left out: {wrong.size} of {inside.size} samples with '{name}' far off those around them; the first "
+                f"is sample {inside[first] + 1} of {source.name}, {_shown(source, name, values[first])}"
+            )
+        channels = {name: replace(one, values=one.values[right]) for name, one in recording.channels.items()}
+        kept.append(replace(source, recording=replace(recording, time=recording.time[right], channels=channels)))
+    return tuple(kept), tuple(said)
+
+
+def _far_off(values: Floats, most: int) -> NDArray[np.bool_]:
+    """Return which samples are far off those around them; where more than ``most`` are, a converter may step so."""
     # Of samples that stand still the noise is 0, and what moves first among them is no error.
     noise = max(noise_of(values), _GROSS_SAMPLE * usual_range(values))
-    is_out = isolated_samples(values, noise)
+    is_out = outlying_samples(values, noise)
+    # One wrong sample among samples that stand still is no step of their converter.
+    step = resolution_of(values if np.count_nonzero(is_out) > most else values[~is_out])
+    if step <= _COARSEST * np.abs(values[~is_out]).max(initial=0.0):
+        is_out &= outlying_samples(values, math.hypot(noise, step / math.sqrt(12.0)))
     # A decay is fast at its start, with no sample before: there only what no decay does is an error.
     is_out[:2] &= np.abs(values - np.median(values[:5]))[:2] > _NO_DECAY * np.ptp(values)
-    wrong = np.flatnonzero(is_out)
-    if wrong.size:
-        first = int(wrong[0])
-        around = float(np.median(values[max(first - 2, 0) : first + 3]))
-        skipped = int(np.searchsorted(source.recording.time, part.time[0]))
-        _refuse_outlier(source, procedure, name, (wrong + skipped).tolist(), float(values[first]), around)
+    return is_out
 
 
 def check_no_wrong_reading(

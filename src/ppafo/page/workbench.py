@@ -131,8 +131,8 @@ def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) 
         raise ScenarioError(f"two scenarios are called '{repeated}'; a workbench distinguishes them by name")
     simulated = []
     for scenario in loaded:
-        spoken = scenario.name.replace("-", " ").replace("_", " ")
-        label = _LABELS.get(scenario.name, spoken[:1].upper() + spoken[1:])
+        # A name of one's own stays as it is.
+        label = _LABELS.get(scenario.name, scenario.name)
         simulated.append(Simulated(scenario, module_of(scenario), label))
     return simulated
 

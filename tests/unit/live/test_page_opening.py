@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ import pytest
 
 from ppafo.analyses.endurance.draw import draw_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
+from ppafo.loading import load_scenario
 from ppafo.page import html as pages
 from ppafo.page import workbench as workbench_module
 from ppafo.page.opening import LEAST_CHANGE, MOST_FIRST, _key
@@ -35,6 +37,12 @@ def _opening() -> dict[str, Any]:
 
 
 # Runs of the last fail at both ends of a setting.
+def test_a_scenario_of_ones_own_is_called_by_its_name_as_it_is() -> None:
+    own = replace(load_scenario("step-response"), name="knoechel-bench")
+    labels = [simulated.label for simulated in workbench_module._simulated([own, "step-response"], ())]
+    assert labels == ["knoechel-bench", "Step response"]
+
+
 @pytest.mark.parametrize("name", ["torque-task-proportional", "swing-foot-angle"])
 def test_what_the_package_keeps_of_a_scenario_is_what_its_program_gives(name: str) -> None:
     """Else run ``python scripts/page_tables.py``."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.source import Source, check_moves, check_no_gap, check_no_outlier, window
+from ppafo.identification.source import Source, check_moves, check_no_gap, window
 from ppafo.signals import Recording
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
@@ -57,8 +57,6 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
             f"{noise:.3g} rad; push the vane"
         )
     skipped = check_no_gap(source, PROCEDURE, part)
-    for name in (name for name in (ANGLE, VELOCITY) if name in part):
-        check_no_outlier(source, PROCEDURE, name, part)
     rows, sign = _falling_part(source, part, start is not None)
     _check_not_saturated(source, part[ANGLE][rows], skipped + rows.start)
     if VELOCITY in part:

@@ -33,7 +33,7 @@ from ppafo.identification.bench.decay import (
 from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, Reported, result_of
 from ppafo.identification.residuals import Free
-from ppafo.identification.source import Source, check_sources
+from ppafo.identification.source import Source, check_sources, without_wrong_samples
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
@@ -135,6 +135,7 @@ def free_decay(
     IdentificationError for recordings that cannot say it, with the file, the sample and the remedy.
     """
     check_sources(sources, PROCEDURE, (ANGLE,), MINIMUM_SAMPLES)
+    sources, said = without_wrong_samples(sources, PROCEDURE, (ANGLE, VELOCITY), start, end)
     decays = tuple(decay_of(source, start, end) for source in sources)
     pushes = [_push_of(decay) for decay in decays]
     law = _Law(decays, inertia or 1.0, *(_OF_THE_DEVICE if inertia else _OVER_INERTIA))
@@ -161,6 +162,7 @@ def free_decay(
         f"{slowing.deceleration:.4g} rad/s^2{unknown}",
         _panels(decays, model, slowing),
         "another torque acts, such as gravity, an end stop or a friction of another shape",
+        said,
     )
 
 

@@ -39,13 +39,13 @@ from ppafo.identification.source import (
     Source,
     check_moves,
     check_no_gap,
-    check_no_outlier,
     check_no_wrong_reading,
     check_not_clipped,
     check_sources,
     meter_readings,
     pool,
     window,
+    without_wrong_samples,
 )
 from ppafo.identification.tolerances import DEFAULTS, HELD, Tolerances
 from ppafo.report.kind import TIME, Kind
@@ -99,6 +99,8 @@ def vane_leak(
     size = _size(opening, discharge_coefficient)
     if sources and all("mass_flow" in source.recording for source in sources):
         return _steady_leak(sources, opening, size, tolerances, confidence)
+    check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES)
+    sources, said = without_wrong_samples(sources, PROCEDURE, CHANNELS, start, end)
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, absolute=CHANNELS)
     for source in sources:
         # One of them may be of a room.
@@ -109,7 +111,8 @@ def vane_leak(
             "chamber 1 empties in some recordings and chamber 2 in others; give each its own procedure"
         )
     volumes = volume_1, volume_2
-    return _decaying_leak(sources, closed, opening, size, volumes, volume_deviation, tolerances, confidence)
+    found = _decaying_leak(sources, closed, opening, size, volumes, volume_deviation, tolerances, confidence)
+    return replace(found, remarks=(*said, *found.remarks))
 
 
 def _size(opening: Opening, discharge_coefficient: float | None) -> Reported:
@@ -167,7 +170,6 @@ def closed_chambers(source: Source, start: float | None, end: float | None) -> C
     part = window(source.recording, start, end)
     skipped = check_no_gap(source, PROCEDURE, part)
     for name in CHANNELS:
-        check_no_outlier(source, PROCEDURE, name, part)
         for plateau in plateaus(part[name]):
             # Later plateaus may be the resolution of the sensor, as the pressure hardly falls any more.
             if plateau.first < EDGE and stands_out(part[name], plateau):

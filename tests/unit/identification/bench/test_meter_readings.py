@@ -96,7 +96,7 @@ def test_a_wrong_pressure_is_told_in_the_unit_of_the_file_and_not_of_the_set(
 ) -> None:
     base = unit.removesuffix("_g")
     columns = f"time [s],pressure_1 [{base}_a],pressure_2 [{unit if unit != base else base + '_a'}]"
-    rows = [f"{n},{scale * (3.0e5 - 1000.0 * n)},{scale * (-2.1e7 if n == 7 else 1.5e5)}" for n in range(40)]
+    rows = [f"{n},{scale * (3.0e5 - 1000.0 * n)},{scale * (-2.1e7 if n in (7, 30) else 1.5e5)}" for n in range(60)]
     (tmp_path / "fall.csv").write_text("\n".join([columns, *rows]) + "\n")
     problem = tmp_path / "fall.toml"
     problem.write_text(
@@ -104,5 +104,8 @@ def test_a_wrong_pressure_is_told_in_the_unit_of_the_file_and_not_of_the_set(
         'volume_1 = "2 L"\nvolume_2 = "2 L"\nrecordings = ["fall.csv"]\n'
     )
     shown = scale * (-2.1e7 + (101_325.0 if unit.endswith("_g") else 0.0))
-    with pytest.raises(IdentificationError, match=re.escape(f"'pressure_2' is {shown:.6g} {base} at sample 8")):
+    with pytest.raises(
+        IdentificationError,
+        match=re.escape(f"'pressure_2' is {shown:.6g} {base} at sample 8, where its neighbours are at "),
+    ):
         ppafo.identify(problem)
