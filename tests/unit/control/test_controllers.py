@@ -161,6 +161,17 @@ def test_anti_windup_brings_the_torque_down_in_time() -> None:
     assert errors[0] < 0.5 * errors[1]
 
 
+@pytest.mark.parametrize(
+    ("kind", "largest"), [("feedback_linearisation", 0.05), ("pid_feedforward", 0.05), ("damped_proportional", 0.3)]
+)
+def test_a_law_that_knows_the_dead_band_of_its_valve_opens_it_beyond(kind: str, largest: float) -> None:
+    changes = [f"controller.kind={kind}", "valve.dead_band=0.3", "reference.level=4 N m", "run.duration=1.5 s"]
+    run = ppafo.simulate("torque-task-slow-valve", [*changes, "reference.ramp_time=0.5 s"])
+    assert run.scenario.controller.dead_band == 0.3
+    assert run.metrics["final_error"].value < largest
+    assert run.tracking is None
+
+
 @pytest.mark.parametrize("kind", ["on_off_dead_zone", "on_off"])
 def test_on_off_laws_run_on_the_solenoid_pair(kind: str) -> None:
     run = ppafo.simulate("torque-task-solenoid", [f"controller.kind={kind}", "run.duration=0.5 s"])
@@ -182,6 +193,7 @@ def test_a_law_with_a_model_believes_the_device_that_it_runs_on(changes: list[st
     task = load_scenario("torque-task-proportional", ["controller.kind=feedback_linearisation", *changes])
     plant = plant_parameters(task.device)
     believed = {item.name: task.controller.settings[item.name] for item in NOMINAL_QUANTITIES}
+    assert believed.pop("dead_band") == task.device.valve.settings["dead_band"]
     assert believed.pop("critical_ratio") == pytest.approx(plant.valve_curve.critical_ratio)
     assert believed == pytest.approx({name: getattr(plant, name) for name in believed})
 

@@ -329,15 +329,16 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
         ("cylinder-servo", (), ("foot_plate.inertia", 12.0e-3)),
         ("pressure-loop", (), ("supply.pressure", 5.0e5)),
         ("torque-task-slow-valve", ("controller.kind=on_off_dead_zone",), ("supply.pressure", 5.0e5)),
+        ("torque-task-slow-valve", ("controller.kind=feedback_linearisation",), ("valve.dead_band", 0.2)),
     ],
-    ids=["cylinder-servo", "pressure-loop", "dead zone"],
+    ids=["cylinder-servo", "pressure-loop", "dead zone", "dead band"],
 )
 def test_a_library_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
     name: str, law: tuple[str, ...], change: tuple[str, float], tmp_path: Path
 ) -> None:
     path, number = change
-    unit = {"foot_plate.inertia": "kg m^2", "supply.pressure": "Pa_a"}[path]
-    overrides = (*law, "run.duration=0.2 s", f"{path}={number!r} {unit}")
+    unit = {"foot_plate.inertia": "kg m^2", "supply.pressure": "Pa_a", "valve.dead_band": ""}[path]
+    overrides = (*law, "run.duration=0.2 s", f"{path}={number!r} {unit}".rstrip())
     library = Loaded(name, tmp_path, law)
     recording = simulate(name, overrides).recording
     columns = [recording.time, *(recording[channel] for channel in library.exported.program.outputs)]

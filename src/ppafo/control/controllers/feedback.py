@@ -5,8 +5,14 @@ Units are those of a torque; of what else is controlled, its unit stands in the 
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import ControllerKind
-from ppafo.control.torque_loop import BOUNDARY, INTEGRAL_GAIN, INTEGRAL_RATE, PROPORTIONAL_GAIN
+from ppafo.control.kind import NOMINAL, ControllerKind
+from ppafo.control.torque_loop import (
+    BOUNDARY,
+    INTEGRAL_GAIN,
+    INTEGRAL_RATE,
+    PROPORTIONAL_GAIN,
+    beyond_dead_band,
+)
 from ppafo.model.controlled import ANYTHING, seen_error, seen_value, steered
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
@@ -155,13 +161,17 @@ KNOTS = 31
 
 
 class DampedProportionalParameters(NamedTuple):
-    """Gain [1/(N m)], damping [s/(N m)], its filter [s], time between knots [s]; learnt commands [-] at the knots."""
+    """Gain [1/(N m)], damping [s/(N m)], its filter [s], time between knots [s]; learnt commands [-] at the knots.
+
+    ``dead_band`` is the believed smallest command [-] that opens the valve.
+    """
 
     proportional_gain: float
     damping: float
     damping_filter: float
     knot_spacing: float
     knots: Annotated[tuple[float, ...], KNOTS]
+    dead_band: float
 
 
 class DampedGains(NamedTuple):
@@ -223,12 +233,12 @@ def damped_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, DampedProportionalState]:
-    """Command from -1 to 1 by ``damped_command``, on top of the learnt command of the table."""
+    """Command from -1 to 1 by ``damped_command``, on top of the table's learnt command, beyond the dead band."""
     gains = DampedGains(parameters.proportional_gain, parameters.damping, parameters.damping_filter)
     ahead = learnt_command(parameters, state.elapsed)
     wanted, value = steered(reference), steered(seen_value(measurement))
-    command, course = damped_command(gains, state.course, wanted, value, ahead, period)
-    return command, DampedProportionalState(state.elapsed + period, course)
+    opening, course = damped_command(gains, state.course, wanted, value, ahead, period)
+    return beyond_dead_band(opening, parameters.dead_band), DampedProportionalState(state.elapsed + period, course)
 
 
 GAIN_QUANTITIES = quantities_of(DampedGains)
@@ -244,6 +254,15 @@ DAMPED_PROPORTIONAL = ControllerKind(
         *(
             Quantity(f"knot_{number}", "", f"learnt command at knot {number}", 0.0, -1.0, 1.0)
             for number in range(KNOTS)
+        ),
+        Quantity(
+            "dead_band",
+            "",
+            "believed smallest command that opens the valve",
+            None,
+            0.0,
+            0.99,
+            follows=(NOMINAL["dead_band"],),
         ),
     ),
     parameters=DampedProportionalParameters,

@@ -9,7 +9,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
 from ppafo.control.kind import NOMINAL, ControllerKind
-from ppafo.control.torque_loop import CONVERGENCE
+from ppafo.control.torque_loop import CONVERGENCE, beyond_dead_band
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
 from ppafo.model.sensors import Measurement
@@ -24,7 +24,10 @@ def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -
 
 
 class NominalChambers(NamedTuple):
-    """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg]."""
+    """The believed device, SI units; conductances are Cd A C1 [kg/(s Pa)], ``gas_product`` is R T / M [J/kg].
+
+    The valve opens beyond commands of ``dead_band`` [-].
+    """
 
     torque_constant: Annotated[float, _believed("torque_constant", "m^3", "K_actuator", 1.0e-9, 1.0)]
     displacement_per_radian: Annotated[float, _believed("displacement_per_radian", "m^3/rad", "B_vane", 1.0e-9, 1.0)]
@@ -43,6 +46,7 @@ class NominalChambers(NamedTuple):
         float, _believed("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e3, 1.0e8)
     ]
     atmospheric_pressure: Annotated[float, _believed("atmospheric_pressure", "Pa_a", "atmosphere", 1.0e3, 1.0e8)]
+    dead_band: Annotated[float, _believed("dead_band", "", "smallest command that opens the valve", 0.0, 0.99)]
 
 
 class TorqueRates(NamedTuple):
@@ -151,7 +155,8 @@ def feedforward_update(
     rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
     error = reference - measurement.torque
-    command, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
+    opening, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
+    command = beyond_dead_band(opening, parameters.nominal.dead_band)
     return command, PidFeedforwardState(feedback, reference)
 
 
@@ -212,7 +217,8 @@ def linearising_update(
         parameters.nominal, measurement.angle, velocity, measurement.pressure_1, measurement.pressure_2
     )
     requested = reference_rate + parameters.convergence_rate * (reference - measurement.torque)
-    return opening_for_rate(rates, requested), FeedbackLinearisationState(
+    command = beyond_dead_band(opening_for_rate(rates, requested), parameters.nominal.dead_band)
+    return command, FeedbackLinearisationState(
         reference=reference, angle=measurement.angle, angular_velocity=velocity, started=1.0
     )
 
