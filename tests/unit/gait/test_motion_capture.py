@@ -204,3 +204,11 @@ def test_a_table_whose_tabs_a_spreadsheet_saved_as_commas_is_read(form: str, tmp
     read = read_table(path)
     assert read.units == right.units
     assert all(np.array_equal(read.columns[name], values) for name, values in right.columns.items())
+
+
+def test_a_joint_centre_without_a_number_is_no_marker_of_the_leg(tmp_path: Path) -> None:
+    empty = {name: np.full((3, TIME.size), np.nan) for name in ("RKNEE", "RANKLE")}
+    renamed = {{"RKNE": "RKneeStudy", "RANK": "RAnkleStudy"}.get(name, name): point for name, point in POINTS.items()}
+    right = import_gait([trc(tmp_path / "walk.trc", TIME, renamed)], ImportSettings(MASS)).gait
+    found = import_gait([trc(tmp_path / "walk.trc", TIME, renamed | empty)], ImportSettings(MASS)).gait
+    assert found.shank_angle == right.shank_angle

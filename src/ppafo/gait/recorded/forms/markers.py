@@ -59,7 +59,7 @@ _MOST_OBLIQUE = 25.0
 def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
     """Return the map of markers and outputs of Plug-in Gait, with the axes of the laboratory found in the markers."""
     foot = side[0]
-    labels = list(dict.fromkeys(name.rpartition(".")[0] for name in table.columns if "." in name))
+    labels = _recorded_labels(table)
     knee, ankle = _pair(labels, foot)
     forward, vertical, remarks = _axes(table, knee, ankle, foot, labels)
     backwards = "-" if forward.startswith("-") else ""
@@ -84,11 +84,11 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
     table = next((table for table in tables if f"{shank.knee}.x" in table.columns), None)
     if table is None or shank.knee is None or shank.ankle is None:
         return Convention(columns, (), tuple(unsaid_axes(columns)))
-    labels = list(dict.fromkeys(name.rpartition(".")[0] for name in table.columns if "." in name))
+    labels = _recorded_labels(table)
     mapped: dict[str, ShankMap | AngleMap] = {"shank_angle": shank, "ankle_angle": columns.ankle_angle}
     unsaid = [name for name, each in mapped.items() if each.terms is None and not each.model_fields_set >= _AXIS_KEYS]
     remarks: tuple[str, ...] = ()
-    if unsaid and _point(table, shank.knee) is not None:
+    if unsaid and {shank.knee, shank.ankle} <= set(labels):
         forward, vertical, remarks = _axes(table, shank.knee, shank.ankle, side[0], labels)
         found = {"forward": forward, "vertical": vertical}
         changed = {
@@ -104,6 +104,12 @@ def convention_of_map(columns: GaitMap, tables: Sequence[MotionTable], side: Sid
     is_free = columns.vertical_force is None
     plates = tuple(name for name in table.columns if is_free and name.startswith(PLATE) and name.endswith(vertical))
     return Convention(columns, plates, remarks)
+
+
+def _recorded_labels(table: MotionTable) -> list[str]:
+    """Return the labels of points with a number in some frame: a model may leave a joint centre without any."""
+    names = [name for name in table.columns if "." in name and _is_measured(table, name)]
+    return list(dict.fromkeys(name.rpartition(".")[0] for name in names))
 
 
 def _pair(labels: Sequence[str], foot: str) -> tuple[str, str]:
