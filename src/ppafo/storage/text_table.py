@@ -16,8 +16,15 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 def text_lines(path: str | Path) -> list[str]:
-    """Return the lines of a text file, with any line ends; DataError where it is none."""
-    return text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    """Return the lines of a text file, with any line ends; DataError where it is none.
+
+    A table whose tabs a spreadsheet has saved as commas, and every line as wide as the widest, has its tabs again.
+    """
+    lines = text_of(read_bytes(path)).replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    last = next((line.strip() for line in reversed(lines) if line.strip()), "")
+    if "," not in last or any(" " in last or "\t" in line for line in lines):
+        return lines
+    return [line.replace(",", "\t").rstrip("\t") for line in lines]
 
 
 def number_in(cell: str, line: int, label: str, gaps: Sequence[str] = ()) -> float:

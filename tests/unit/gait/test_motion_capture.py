@@ -10,7 +10,7 @@ from ppafo.gait.recorded import ImportSettings, import_gait
 from ppafo.gait.recorded.mapping import load_map
 from ppafo.gait.recorded.source import form_of, read_table
 from ppafo.signals.recording import Floats
-from tests.unit.gait.laboratory import MASS, STRIDE, markers, trc
+from tests.unit.gait.laboratory import MASS, STRIDE, angles, markers, opensim, trc
 
 TIME = np.arange(0.0, 5.2, 0.01)
 POINTS = {name: point[:, : TIME.size] for name, point in markers(TIME).items()}
@@ -188,3 +188,19 @@ def test_columns_that_neither_angle_has_are_listed_once_and_not_at_any_length(tm
         import_gait([path], ImportSettings(MASS))
     assert str(refused.value).count("number 0,") == 1
     assert len(str(refused.value)) < 500 + len(str(path))
+
+
+@pytest.mark.parametrize("form", ["trc", "mot"])
+def test_a_table_whose_tabs_a_spreadsheet_saved_as_commas_is_read(form: str, tmp_path: Path) -> None:
+    path = tmp_path / f"walk.{form}"
+    if form == "trc":
+        trc(path, TIME, POINTS)
+    else:
+        opensim(path, TIME, angles(TIME), "inDegrees=yes")
+    right, lines = read_table(path), path.read_text().splitlines()
+    width = max(line.count("\t") for line in lines)
+    # The spreadsheet makes all lines as wide as the widest.
+    path.write_text("\n".join(line.replace("\t", ",") + "," * (width - line.count("\t")) for line in lines) + "\n")
+    read = read_table(path)
+    assert read.units == right.units
+    assert all(np.array_equal(read.columns[name], values) for name, values in right.columns.items())
