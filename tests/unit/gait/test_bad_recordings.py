@@ -411,6 +411,18 @@ def test_a_record_of_one_heel_strike_has_the_right_column(
     assert "--minimum-strides" not in str(refused.value)
 
 
+def test_a_record_of_two_cycles_is_not_called_one_that_wraps_around(
+    csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording
+) -> None:
+    part = {name: values[60:500] for name, values in columns.items() if name != FORCE}
+    path = csv_of(part, walk.time[60:500])
+    with pytest.raises(DataError, match=r"has 1 whole stride .* or accept fewer with --minimum-strides"):
+        import_gait([path], ImportSettings(62.0))
+    found = import_gait([path], ImportSettings(62.0, least_strides=1))
+    assert found.gait.stride_time == pytest.approx(6.2304 / 6.0, rel=0.02)
+    assert not any("wraps around" in remark for remark in found.remarks)
+
+
 def test_radians_called_degrees_are_a_unit_and_no_sign_without_a_force_too(
     csv_of: Callable[..., Path], columns: dict[str, Floats]
 ) -> None:

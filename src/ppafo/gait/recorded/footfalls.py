@@ -312,6 +312,8 @@ def lost_in(signal: Signal, stride: Stride) -> int:
     return int(np.count_nonzero(signal.lost & (signal.time >= stride.start) & (signal.time <= stride.end)))
 
 
+_LEAST_OF_CYCLE = 0.75
+"""Of a cycle, that the stride in it lasts at least."""
 LEAST_STRIDES = 2
 """Least number of strides by default; a walk past a plate and one cycle have one."""
 
@@ -349,7 +351,8 @@ def find_footfalls(
     # Three cycles in a row have one whole stride in the middle, wherever the record begins.
     again = _of_walk(cycle.walk, (), side, 1)
     whole = usable_strides(cycle.walk, again.strides)
-    if not whole:
+    # A record of two strides wraps around too, as one cycle that is twice as long.
+    if not whole or whole[0].time < _LEAST_OF_CYCLE * cycle.period:
         return footfalls
     span = walk[SHANK].time[-1] - walk[SHANK].time[0]
     said = (
