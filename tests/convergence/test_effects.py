@@ -52,9 +52,9 @@ def test_effects_in_the_lanes_are_those_of_the_reference_solver(name: str, texts
     assert agreement.worst_pressure < 1e-3
 
 
-def test_every_effect_is_among_the_cases_but_those_of_stops_and_sensors_which_have_tests_of_their_own() -> None:
+def test_every_effect_is_among_the_cases_but_those_of_stops_loads_and_sensors_which_have_tests_of_their_own() -> None:
     told = " ".join(text for _, texts in CASES for text in texts)
-    assert [name for name in EFFECTS if f"effects.{name}." not in told] == ["restitution", "bandwidth"]
+    assert [name for name in EFFECTS if f"effects.{name}." not in told] == ["restitution", "joint_load", "bandwidth"]
 
 
 COILS = (*SLOW, WARM[1], "run.duration=0.6 s")
