@@ -93,7 +93,10 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
     # A law that requests openings between shut and open should not reverse.
     if law is None or not scenario.motion.motion_kind.asks_gradually(law):
         return math.inf
-    return duration * (MOST_PER_STRIDE / stride_time if stride_time > 0.0 else MOST_PER_SECOND)
+    if stride_time > 0.0:
+        return duration * MOST_PER_STRIDE / stride_time
+    # A run of tenths of a second is a transient: a few reversals are its rate, and no oscillation.
+    return max(duration, 1.0) * MOST_PER_SECOND
 
 
 def settled_walk(recording: Recording) -> SettledPart | None:
