@@ -14,7 +14,7 @@ SERVO, SHORT = "cylinder-servo", ["run.duration=0.5 s"]
 @pytest.mark.parametrize(
     ("scenario", "vary", "such_that", "low", "high"),
     [
-        ("swing-foot-angle", "supply.pressure=20..60 psi_g", "rms_angle_error <= 2 deg", 30.0, 55.0),
+        ("swing-foot-angle", "supply.pressure=20..60 psi_g", "rms_angle_error <= 0.9 deg", 20.5, 55.0),
         ("pressure-loop", "supply.pressure=35..70 psi_g", "final_pressure_1_error <= 0.5 psi_d", 35.0, 50.0),
     ],
 )

@@ -31,6 +31,8 @@ def test_the_commands_of_the_page_write_libraries(
         "LICENSE",
         "Makefile",
         "README.md",
+        "check.c",
+        "expected.csv",
         "main.c",
         "torque_task_proportional.c",
         "torque_task_proportional.h",
@@ -60,6 +62,7 @@ def test_a_name_that_ends_in_fmu_is_the_unit_itself(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("ppafo.exports.fmu.unit.build", lambda *given: str(given[0]).encode())
+    monkeypatch.setattr("ppafo.exports.fmu.unit.check_unit", lambda *_given: None)
     file = tmp_path / "out" / "a.fmu"
     assert main(["export", "fmu", "step-response", "--out", str(file)]) == 0
     assert f"written: {file}; next: fmpy simulate {file}" in capsys.readouterr().out

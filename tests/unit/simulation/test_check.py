@@ -67,7 +67,7 @@ def chaotic() -> Check:
     return simulate("torque-task-proportional", CHAOTIC).check()
 
 
-BEGIN_IN_A_TIE = {"torque-task-solenoid", "cylinder-servo"}
+BEGIN_IN_A_TIE = {"torque-task-solenoid"}
 """Scenarios whose first sample has exactly the torque or angle that is wanted: which side the valve opens is a tie."""
 
 

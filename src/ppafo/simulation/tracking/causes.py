@@ -22,7 +22,6 @@ from ppafo.simulation.tracking.remedies import (
     change_text,
     dead_band,
     gain_of_device,
-    integrals,
     larger_gains,
     level_text,
     remedy,
@@ -135,9 +134,7 @@ def _load_beyond_reach(case: Case) -> Cause | None:
     if torque_asked(scenario, case.law, case.settled.error) is not None:
         for numbers in changes:
             against = abs(numbers.get("motion.external_torque", outside)) + float(device.friction.static_torque)
-            remedies += [remedy(scenario, {**numbers, **integral}) for integral in integrals(scenario)]
-            for integral in ({}, *integrals(scenario)[:1]):
-                remedies += stiffer_laws(scenario, against, case.settled, {**numbers, **integral})
+            remedies += stiffer_laws(scenario, against, case.settled, numbers)
     return Cause(text, tuple(remedies))
 
 
@@ -216,7 +213,7 @@ def _static_friction(case: Case) -> Cause | None:
         f"static friction holds the joint with {level_text('N m', holding, scenario)}, and the law asks for "
         f"{metric_change(asked, 'N m')[0]:.3g} at this error, `angle_stiffness` times it"
     )
-    return Cause(text, tuple(stiffer_laws(scenario, holding, settled)), "some `angle_integral` moves it")
+    return Cause(text, tuple(stiffer_laws(scenario, holding, settled)), "a larger `angle_stiffness` moves it")
 
 
 def _fully_open_valve(case: Case) -> Cause | None:

@@ -31,8 +31,6 @@ _SLOPES = ("derivative_gain", "damping")
 """Gains on the slope of the error, which the rules for a device leave at 0."""
 _STEP_OF_PAIR = 0.2
 """Change of a pair during its dead time over the wanted change, which a smaller orifice aims at [-]."""
-_INTEGRAL_RATES = (0.1, 0.3)
-"""Rate of an integral of the angle error over the bandwidth of the angle loop [-]."""
 _TORQUE_OVER_FRICTION = 1.5
 """Torque that a law should be able to request over the static friction that holds the joint [-]."""
 _KEPT_OF_ORIFICE = (".critical_ratio", ".discharge_coefficient")
@@ -174,16 +172,6 @@ def stiffer_laws(
             larger = (times * needed for times in (1.0, 2.0) if times * needed > gain)
             found += [{**numbers, "controller.torque_gain": number} for number in larger]
     return [remedy(scenario, numbers) for numbers in found]
-
-
-def integrals(scenario: Scenario) -> list[dict[str, float]]:
-    """Integral gains [N m/(rad s)] that take up a constant load within some periods of the angle loop."""
-    settings = scenario.controller.settings
-    if settings.get("angle_integral", math.nan) != 0.0 or settings.get("angle_damping", 0.0) <= 0.0:
-        return []
-    stiffness = float(settings["angle_stiffness"])
-    bandwidth = 2.0 * stiffness / float(settings["angle_damping"])
-    return [{"controller.angle_integral": rate * stiffness * bandwidth} for rate in _INTEGRAL_RATES]
 
 
 def dead_band(scenario: Scenario) -> float:
