@@ -32,10 +32,10 @@ def test_the_commands_of_the_page_write_libraries(
         "Makefile",
         "README.md",
         "check.c",
-        "expected.csv",
         "main.c",
         "torque_task_proportional.c",
         "torque_task_proportional.h",
+        "expected.csv",
     ]
     assert all((tmp_path / "out" / "c" / file).stat().st_size > 0 for file in files)
     assert '{"valve_area", 1.26e-05,' in (tmp_path / "out" / "wide" / "step_response.c").read_text()

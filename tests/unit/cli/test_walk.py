@@ -4,6 +4,7 @@ import contextlib
 import io
 import json
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -229,7 +230,7 @@ def bursting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Walks with a supply far from any real one."""
     load = loading.load_walk
     # No file can say it: the check of a scenario's parts would refuse it.
-    monkeypatch.setattr("ppafo.walking.walk.check_parts", lambda _scenario: None)
+    monkeypatch.setattr(import_module("ppafo.walking.walk"), "check_parts", lambda _scenario: None)
 
     def changed(*given: Any, **named: Any) -> Any:
         configuration = load(*given, **named)

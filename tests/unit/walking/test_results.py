@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from functools import lru_cache
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -126,7 +127,7 @@ def diverging() -> WalkResult:
     supply = replace(configuration.device.supply, pressure=1.0e18)
     with pytest.MonkeyPatch.context() as patch:
         # No file can say it: the check of a scenario's parts would refuse it.
-        patch.setattr("ppafo.walking.walk.check_parts", lambda _scenario: None)
+        patch.setattr(import_module("ppafo.walking.walk"), "check_parts", lambda _scenario: None)
         return walk(replace(configuration, device=replace(configuration.device, supply=supply)), minutes=MINUTES)
 
 

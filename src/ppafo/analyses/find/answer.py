@@ -120,11 +120,18 @@ def _verdict(outcome: Outcome) -> str:
             f"no {path} from {_range(outcome)} meets {condition.text}; the nearest is "
             f"{of_condition.text(outcome.metrics[row])} at {kind.text(outcome.values[row])}"
         )
-    lead = f"{path} = {kind.text(outcome.value)} is the {wanted} value that meets {condition.text}"
+    # Beyond it the condition may be met by a loop that does not follow its reference.
+    follows = " and follows its reference" if _not_followed(outcome) else ""
+    lead = f"{path} = {kind.text(outcome.value)} is the {wanted} value that meets {condition.text}{follows}"
     there = f"{condition.metric} is {of_condition.text(metric)} there"
     if outcome.beyond is None:
         return f"{lead}, and the end of the range: {there}; a wider range may have a {further} one"
     return f"{lead}: {there} (bracketed to {kind.change(abs(outcome.value - outcome.beyond), '.1g')})"
+
+
+def _not_followed(outcome: Outcome) -> int:
+    """Number of values at which the condition is met, but the reference is not followed."""
+    return int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.metrics)))
 
 
 def _remarks(outcome: Outcome) -> Iterator[str]:
@@ -164,7 +171,7 @@ def _remarks(outcome: Outcome) -> Iterator[str]:
         )
     if outcome.oscillating:
         yield f"in {outcome.oscillating} of {outcome.runs} runs the loop oscillates: they count as not met"
-    missed = int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.metrics)))
+    missed = _not_followed(outcome)
     if missed:
         yield f"at {missed} values the condition is met, but the reference is not followed: they count as not met"
     if outcome.failed:
