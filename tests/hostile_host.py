@@ -25,6 +25,8 @@ def turn_hostile() -> None:
     np.set_printoptions(precision=2, threshold=3)
     xarray.set_options(keep_attrs=False, display_max_rows=1)
     warnings.simplefilter("error")
+    # A study without a folder keeps its runs in one that goes with the last reference to its results, as Python says.
+    warnings.filterwarnings("ignore", message="Implicitly cleaning up", category=ResourceWarning)
     for name in _LOCALES:
         with contextlib.suppress(locale.Error):
             locale.setlocale(locale.LC_ALL, name)
