@@ -297,22 +297,35 @@ def taken_document(value: Any) -> dict[str, Any]:
     """
     if not isinstance(value, Mapping):
         raise ValueError
-    return {taken_text(name): _plain(each, str(name), 1) for name, each in value.items()}
+    copies: dict[int, tuple[Any, Any]] = {}
+    return {taken_text(name): _plain(each, str(name), 1, copies) for name, each in value.items()}
 
 
-def _plain(value: Any, path: str, level: int) -> Any:
+def _plain(value: Any, path: str, level: int, copies: dict[int, tuple[Any, Any]]) -> Any:
+    # What stands in many places, or in itself, is copied once: one that holds itself twice has no end of places. The
+    # value is kept beside its copy, so that no other gets its identity.
+    if id(value) in copies:
+        return copies[id(value)][1]
     given = _single(value)
     if given is None:
         raise ArgumentError(f"{path} = {one_line(repr(value))}: is no value; leave out the key of what is not given")
     # What is nested deeper than any file is refused by whoever takes it as one.
     if isinstance(given, bytes) or level > _MAXIMUM_LEVELS:
         return given
-    if isinstance(given, Mapping):
-        return {taken_text(name): _plain(each, f"{path}.{name}", level + 1) for name, each in given.items()}
     if isinstance(given, str):
         return str.__str__(given)
+    if isinstance(given, Mapping):
+        table: dict[str, Any] = {}
+        copies[id(value)] = value, table
+        table.update(
+            (taken_text(name), _plain(each, f"{path}.{name}", level + 1, copies)) for name, each in given.items()
+        )
+        return table
     if isinstance(given, Iterable) and not hasattr(given, "keys"):
-        return [_plain(each, f"{path}[{index}]", level + 1) for index, each in enumerate(given)]
+        row: list[Any] = []
+        copies[id(value)] = value, row
+        row.extend(_plain(each, f"{path}[{index}]", level + 1, copies) for index, each in enumerate(given))
+        return row
     return given
 
 
