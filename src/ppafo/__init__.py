@@ -154,7 +154,7 @@ _HOMES = {
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
     "ppafo.walking.walk": ("walk",),
 }
-"""Where each public name is: the imports above once more, as they are not made before a name is used."""
+"""Defining module of each public name: repeats the imports above, which are deferred until a name is used."""
 
 _HOME_OF = dict(sorted((name, module) for module, names in _HOMES.items() for name in names))
 __all__ = list(_HOME_OF)

@@ -109,7 +109,7 @@ def _unless_oscillating(case: Case) -> Cause | None:
 
 
 def _load_beyond_reach(case: Case) -> Cause | None:
-    """What works on a free joint is more than the actuator gives where the joint is to be."""
+    """Load on a free joint beyond the torque of the actuator at the wanted angle."""
     scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
     if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
         return None
@@ -189,7 +189,7 @@ def oscillation(case: Case) -> Cause | None:
 
 
 def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> Cause:
-    """What a pair of on/off valves changes during its dead time, over what is wanted."""
+    """Change caused by a pair of on/off valves during its dead time, as a multiple of the wanted value."""
     scenario = case.scenario
     step, late = pair_step(scenario, law)
     step *= quicker
