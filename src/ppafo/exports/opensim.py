@@ -71,7 +71,7 @@ def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     if strikes:
         check_strikes(strikes)
         if "external_torque" not in result.averages:
-            raise ScenarioError(f"{result.scenario.name}: has no whole stride with help to lay on heel strikes")
+            raise ScenarioError(f"{result.scenario.name}: has no complete assisted stride to place on heel strikes")
         mean = result.averages["external_torque"].mean
         parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
         time = np.append(np.concatenate(parts), strikes[-1])
