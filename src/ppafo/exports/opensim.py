@@ -89,6 +89,6 @@ def check_strikes(strikes: Sequence[float]) -> None:
     for first, last in pairwise(strikes):
         if not SHORTEST_STRIDE <= last - first <= LONGEST_STRIDE:
             raise ScenarioError(
-                f"--strikes: from {first:g} to {last:g}s is not a stride: heel strikes of one foot are "
+                f"--strikes: from {first:g} to {last:g} s is not a stride: heel strikes of one foot are "
                 f"{SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in order"
             )

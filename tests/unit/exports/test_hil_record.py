@@ -279,7 +279,7 @@ def test_a_recording_whose_file_cannot_be_written_stays_aside(tmp_path: Path) ->
         _fail(keep)
     assert len(read_recording(tmp_path / "bench.recording.csv")) == 1
     with (
-        pytest.raises(DataError, match=r"bench\.recording\.csv: is there; .* rename it to keep it"),
+        pytest.raises(DataError, match=r"bench\.recording\.csv: exists, .* rename it to keep them"),
         kept_aside(target),
     ):
         pass
