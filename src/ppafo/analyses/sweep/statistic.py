@@ -94,8 +94,8 @@ def draw_until(
 ) -> Finding[Estimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
-    A narrow interval from few draws is not trusted: drawing continues. For a mean it continues until an event of one run
-    in a thousand would have been drawn, or no draws are left: draws without the event cannot bound its effect.
+    A narrow interval from few draws is not trusted: drawing continues. For a mean it continues until an event of one
+    run in a thousand would have been drawn, or no draws are left: draws without it cannot bound its effect.
 
     Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
     StudyError.
