@@ -1,8 +1,9 @@
 """Drawn joints of four kinds of actuator in the tasks of a bench, to count what a verdict on tracking says of them.
 
-Called by ``own_devices.py --joints N --seed S``, which keeps a record of each run. A run is judged here by a criterion of its own, written apart from the
-rule of the package: it looks at the last third of a run, at the mean error, the half range and how often the valve is
-thrown over. Runs near its limits are counted as between, since nobody can say whether they are good. All is synthetic.
+Called by ``own_devices.py --joints N --seed S``, which keeps a record of each run. A run is judged here by a criterion
+of its own, written apart from the rule of the package: it looks at the last third of a run, at the mean error, the half
+range and how often the valve is thrown over. Runs near its limits are counted as between, since nobody can say whether
+they are good. All is synthetic.
 """
 
 import json
@@ -194,7 +195,9 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         pressure = {"of": "pressure_1", "kind": "ramp_hold", "ramp_time": "0.3 s", "start_level": "0 Pa_g"}
         yield task(name, locked(middle), pid, {**pressure, "level": f"{share * gauge:.6g} Pa_g"})
     start, end = low + 0.3 * (high - low), low + draw.uniform(0.5, 0.7) * (high - low)
-    free = {"kind": "free", "angle": f"{start:.6f} rad"}
+    # A bladder pushes one way only: something has to pull it back.
+    back = 0.2 * torque_reach(device, end)[1] if abs(torque_reach(device, end)[0]) < 0.05 * reach else 0.0
+    free = {"kind": "free", "angle": f"{start:.6f} rad", "external_torque": f"{back:.6g} N m"}
     angle = {"of": "angle", "kind": "ramp_hold", "start_level": free["angle"], "level": f"{end:.6f} rad"}
     cascade, slow = {"kind": "cascade"}, {**angle, "ramp_time": "0.5 s"}
     yield task("angle", free, cascade, slow)
@@ -206,10 +209,12 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         believed = {**cascade, "static_torque": f"{share * friction:.6g} N m"}
         yield task(f"angle, friction x {share:g}", free, believed, slow)
     yield task("angle, noise", free, cascade, slow)
+    if back:
+        yield task("angle, nothing pulls back", {**free, "external_torque": "0 N m"}, cascade, slow)
     swing = {"of": "angle", "kind": "sine", "level": f"{middle:.6f} rad", "amplitude": f"{0.15 * (high - low):.6f} rad"}
     yield task(
         "angle sine",
-        {"kind": "free", "angle": f"{middle:.6f} rad"},
+        {**free, "angle": f"{middle:.6f} rad"},
         cascade,
         {**swing, "frequency": f"{draw.uniform(0.2, 1.5):.3g} Hz"},
     )
@@ -370,7 +375,7 @@ def angle_text(records: Iterable[Mapping[str, Any]]) -> str:
     """
     tasks: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
-        if "error" in record and "beyond" not in record["task"]:
+        if "error" in record and not {"beyond", "nothing"}.intersection(record["task"].split()):
             tasks.setdefault(record["task"], []).append(record)
     lines = [f"{'angle loops':27}{'runs':>7}{'within':>8}{'swing':>7}{'neither':>9}{'unsaid':>8}   median, worst deg"]
     for task, runs in tasks.items():
