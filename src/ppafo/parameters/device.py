@@ -12,7 +12,7 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -197,7 +197,7 @@ class Device:
     valve_name: str
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
-    joint: Joint = ANKLE
+    joint: JointNames = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     @property

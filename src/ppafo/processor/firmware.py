@@ -23,7 +23,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.value_types import INT, Row
 from ppafo.translation.walk import walk_module
-from ppafo.translation.widths import Interval, Narrowed, Range, hull, narrowed
+from ppafo.translation.widths import IntegerRange, Narrowed, Range, hull, narrowed
 from ppafo.version import __version__
 
 PRELUDE = "prelude_whole.h"
@@ -43,15 +43,17 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     state = type(law.begins)
     parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, Readings))
     module = walk_module(collector.text(), {entry: parameters})
-    declared = (Interval(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities)
+    declared = (
+        IntegerRange(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities
+    )
     own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
     ranges: dict[str, Range] = {
         "numbers": _nested(law.numbers, declared),
-        "state": _nested(state, (Interval(*law.state_ranges[name]) for name in own_names)),
-        "readings": (Interval(0, LARGEST_READING),) * len(Readings._fields),
+        "state": _nested(state, (IntegerRange(*law.state_ranges[name]) for name in own_names)),
+        "readings": (IntegerRange(0, LARGEST_READING),) * len(Readings._fields),
     }
     proved = narrowed(module, ranges)
-    allowed: Range = (Interval(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
+    allowed: Range = (IntegerRange(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
     # Within it where the hull of both is no wider.
     if hull(proved.returned, allowed) != allowed:
         raise ProgramError(f"{law.kind.name}: command and state may leave their ranges: {proved.returned}")
@@ -141,7 +143,7 @@ def parameters_header(scenario: Scenario, fixed: "FixedPointController") -> str:
     return "\n".join([*lines, "", "#endif", ""])
 
 
-def _nested(row: type, ranges: Iterator[Interval]) -> Range:
+def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
     """The ranges of a NamedTuple, nested ones in their place."""
     return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
 

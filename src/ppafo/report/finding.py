@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.documents.json_text import json_text, plain
-from ppafo.report.kind import PLAIN, Interval, Kind
+from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
 from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.report.style import render_figure
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 T_co = TypeVar("T_co", covariant=True)
-Cell = str | float | Interval | None
+Cell = str | float | ConfidenceInterval | None
 """A number in SI, an estimate with its interval, a text, or None where there is nothing to say."""
 NOTHING = "-"
 """The text of a cell in which there is nothing to say."""
@@ -67,7 +67,7 @@ class Column:
                 text = value
             elif value is None or (isinstance(value, float) and math.isnan(value)):
                 text = NOTHING
-            elif isinstance(value, Interval):
+            elif isinstance(value, ConfidenceInterval):
                 text = kind.change_interval(value) if self.is_change else kind.interval(value)
             # A count; a whole number of some quantity is shown in its unit and form.
             elif isinstance(value, int) and not kind.quantity:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import DataError
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.display_units import display_difference, gauge_shift
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
@@ -100,7 +100,7 @@ def recording_figure(
     remark: str = "",
     atmosphere: float = STANDARD_ATMOSPHERE,
     valve: str = "",
-    joint: Joint = ANKLE,
+    joint: JointNames = ANKLE,
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
@@ -124,7 +124,7 @@ def recording_figure(
     return draw_panels(panels, 1, _SIZE, title, remark, recording.kind)
 
 
-def _panel(recording: Recording, quantity: _Quantity, atmosphere: float, valve: str, joint: Joint) -> Panel:
+def _panel(recording: Recording, quantity: _Quantity, atmosphere: float, valve: str, joint: JointNames) -> Panel:
     """Return the panel of a quantity of the recording; gauge pressure counts from ``atmosphere`` [Pa absolute]."""
     kind = quantity.kind
     lines = {channel: line for channel, line in quantity.lines.items() if channel in recording}

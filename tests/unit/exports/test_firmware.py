@@ -22,7 +22,7 @@ from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import add_files
-from ppafo.translation.widths import Interval
+from ppafo.translation.widths import IntegerRange
 
 SCENARIOS = {
     "pid": ("torque-task-proportional", "controller.kind=pid_fixed_point"),
@@ -64,7 +64,7 @@ def scenario_of(law: str, *overrides: str) -> Scenario:
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
 def test_no_number_of_a_law_can_overflow_and_no_state_leaves_its_range(law: FixedLaw) -> None:
     command, after = proof(law).returned
-    assert command == Interval(-1000, 1000)
+    assert command == IntegerRange(-1000, 1000)
     assert after
 
 

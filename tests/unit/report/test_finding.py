@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.report.finding import Column, Finding, Part
-from ppafo.report.kind import TIME, Interval, Kind, of_metric, of_path
+from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import SHAPES, Mark, Panel
 
 
@@ -22,14 +22,17 @@ def test_a_kind_says_a_level_a_difference_and_an_interval_in_the_unit_of_the_fie
     assert pressure.text(101325.0) == "0 psi_g"
     assert pressure.change(6894.757) == "1 psi"
     assert pressure.axis == "Supply pressure (psig)"
-    assert gas.interval(Interval(0.001, 0.0005, 0.002)) == "1 [0.5, 2]"
+    assert gas.interval(ConfidenceInterval(0.001, 0.0005, 0.002)) == "1 [0.5, 2]"
     assert Kind("Switchings").text(3.0) == "3"
 
 
 def finding() -> Finding[Numbers]:
     """A finding with a table of everything that a cell may be, and a panel."""
     gas = of_metric("gas_supplied")
-    columns = [Column("run", ["a", "b", "c"]), Column("gas", [0.001, Interval(0.002, 0.001, 0.003), float("nan")], gas)]
+    columns = [
+        Column("run", ["a", "b", "c"]),
+        Column("gas", [0.001, ConfidenceInterval(0.002, 0.001, 0.003), float("nan")], gas),
+    ]
     panel = Panel(TIME, gas, [Mark("line", [0.0, 1.0], [0.001, 0.002], label="gas")])
     part = Part("Gas", columns, panels=[panel], name="gas", caption="Gas over time.")
     return Finding("trial", "Trial", "A trial", ["said"], [part], Numbers([0.001, float("nan")]))

@@ -11,7 +11,7 @@ from ppafo.analyses.walk.answer import comparison_table
 from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Part, text_of
 from ppafo.signals import Channel, Recording
-from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
+from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.events import acting_phase, failure_times
 from ppafo.walking.figures import whole_walk
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
@@ -28,7 +28,7 @@ CONFIGURATIONS = ("solenoid", "proportional")
 
 
 @lru_cache(maxsize=4)
-def compared(name: str) -> Comparison:
+def compared(name: str) -> WalkComparison:
     return compare_walks(load_walk(name), minutes=0.15)
 
 

@@ -24,7 +24,7 @@ from ppafo.report.display_units import gauge_shift
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
-from ppafo.report.residuals import Course, course_panels
+from ppafo.report.residuals import FittedCurve, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
@@ -107,7 +107,7 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
     for name in (name for name in _CHANNELS if name in measurement):
         kind, look = _CHANNELS[name]
         is_angle = name == "angle"
-        course = Course(
+        course = FittedCurve(
             time=TIME,
             level=kind,
             change=Kind("Residual (measured - model)", quantity="angle" if is_angle else "pressure change"),

@@ -35,7 +35,7 @@ _LARGEST_COMMAND = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Steps:
+class StepResponses:
     """Torque [N m] after steps of the command, less the steady one: (steps, times) on the runs and linear.
 
     ``amplitudes`` (steps,) of the command [-], ``times`` [s] after the step.
@@ -69,7 +69,7 @@ def can_step(model: LinearModel) -> bool:
     return 0.0 < abs(_value_at_point(model, "command")) < _LARGEST_COMMAND
 
 
-def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
+def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResponses:
     """Torque after steps of the command by shares of its steady value [-]; the model is one that ``can_step``."""
     command = _value_at_point(model, "command")
     times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
@@ -81,7 +81,7 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
     row = [variable.name for variable in model.outputs].index("torque")
     system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
     linear = amplitudes[:, None] * step(system, T=times)[1]
-    return Steps(amplitudes, times, np.array(runs) - still, linear)
+    return StepResponses(amplitudes, times, np.array(runs) - still, linear)
 
 
 def _value_at_point(model: LinearModel, name: str) -> float:

@@ -28,12 +28,12 @@ from ppafo.analyses.reproduce.claim import (
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH, InterpretationOfU
-from ppafo.analyses.reproduce.publication import ALL, SEED, Study
-from ppafo.analyses.reproduce.step_response import Levels, StepEvents
+from ppafo.analyses.reproduce.publication import ALL, SEED, PublicationClaims
+from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import Finding as AuditFinding
+from ppafo.parameters.audit import AuditFinding
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.display_units import metric_level
 from ppafo.report.finding import Cell, Finding, Part, columns_of
@@ -91,7 +91,7 @@ class Reproduction:
 class Studies:
     """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
 
-    studies: tuple[Study, ...]
+    studies: tuple[PublicationClaims, ...]
     reproduction: Reproduction | None = None
 
     @property
@@ -397,7 +397,7 @@ def _page_bytes(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes
 def _figures(reproduction: Reproduction) -> list[Part]:
     """Return the figures of the page, each drawn where it is wanted."""
     supply = reproduction.step.scenario.device.supply
-    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, synthetic = None, None, reproduction.synthetic

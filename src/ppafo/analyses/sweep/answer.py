@@ -29,13 +29,13 @@ def _fraction(text: str) -> str:
     return text
 
 
-class _Table(BaseModel):
+class _OpenTable(BaseModel):
     """A table of which more may be written than is read."""
 
     model_config = ConfigDict(strict=True)
 
 
-class _Described(_Table):
+class _Described(_OpenTable):
     """A metric over the runs of a configuration: ``count`` of them have it."""
 
     count: _Count
@@ -50,7 +50,7 @@ class _Described(_Table):
         return self
 
 
-class _Failure(_Table):
+class _Failure(_OpenTable):
     """A run without metrics, and why."""
 
     run: _Count
@@ -58,7 +58,7 @@ class _Failure(_Table):
     reason: str
 
 
-class _Summary(_Table):
+class _Summary(_OpenTable):
     """Guaranteed fields of a study summary."""
 
     completed: _Count

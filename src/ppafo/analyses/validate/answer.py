@@ -13,7 +13,7 @@ from ppafo.report.display_units import display_value, gauge_shift
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
-from ppafo.report.residuals import Course, course_panels
+from ppafo.report.residuals import FittedCurve, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units.shown import in_units
@@ -58,7 +58,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
     time, scale = (Kind("Time", "ms"), MILLISECONDS) if is_short else (TIME, 1.0)
     shown, limit = COMPARED[name], channel.limit * channel.full_range
     is_first = channel is agreement.channels[0]
-    course = Course(
+    course = FittedCurve(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
         change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),

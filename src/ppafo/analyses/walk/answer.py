@@ -41,7 +41,7 @@ from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 # What is said of a walk's safety: what is fitted, pressures far above the supply, less help over time.
 
@@ -113,7 +113,7 @@ class WalkPair:
     ``tracking`` is the verdict where the torque does not follow what the controller requests, with tried remedies.
     """
 
-    comparison: Comparison
+    comparison: WalkComparison
     tracking: Tracking | None
 
     def json_document(self) -> dict[str, Any]:
@@ -189,7 +189,7 @@ _LIMITS = (
 
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
-def finding_of(comparison: Comparison) -> Finding[WalkPair]:
+def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
     """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
     configuration, motion = worn.scenario, walk_of(worn.scenario)
@@ -242,7 +242,7 @@ def _set_up(configuration: Scenario) -> list[str]:
     return [sentence for sentence in sentences if sentence]
 
 
-def _remarks(comparison: Comparison) -> list[str]:
+def _remarks(comparison: WalkComparison) -> list[str]:
     """Return who walks, how long a bottle lasts, what was unsafe, how far to trust the walk, and what diverged."""
     worn, bare = comparison.with_device, comparison.without_device
     bottle = "" if worn.supply is None else bottle_remark(worn)
@@ -263,7 +263,7 @@ def _remarks(comparison: Comparison) -> list[str]:
     return [remark for remark in remarks if remark]
 
 
-def _pictures(comparison: Comparison) -> Sequence[Part]:
+def _pictures(comparison: WalkComparison) -> Sequence[Part]:
     """Return the figures of a task sequence, or of equal strides: over time, and the mean stride where there is one."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
@@ -287,7 +287,7 @@ def _pictures(comparison: Comparison) -> Sequence[Part]:
     )
 
 
-def comparison_table(comparison: Comparison) -> list[Column]:
+def comparison_table(comparison: WalkComparison) -> list[Column]:
     """Return a row for each number: with the device, without it, and of a healthy ankle.
 
     Strides with less help have a column of their own, where there are any.

@@ -17,7 +17,7 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import SegmentResult
 from ppafo.walking.task_sequence import TaskSequence
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 _NUMBERS = (
     ShownNumber(name="start", title="from", quantity="time", digits=1),
@@ -54,7 +54,7 @@ _MEAN_CAPTION = (
 )
 
 
-def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
+def task_sequence_parts(comparison: WalkComparison) -> tuple[Part, ...]:
     """Return the table of the segments, and how to read it; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
@@ -100,7 +100,7 @@ def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
     }
 
 
-def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
+def task_sequence_pictures(comparison: WalkComparison) -> tuple[Part, ...]:
     """Return the task sequence over time, and the mean of its even strides where there are any."""
     worn, bare = comparison.with_device, comparison.without_device
     mean = partial(walk_figure, {"with the device": worn, "without": bare})
@@ -117,7 +117,7 @@ def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
     return pictures if worn.averages and bare.averages else pictures[:1]
 
 
-def task_sequence_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
+def task_sequence_files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
     """Return the files of the segments with and without the device, by name; nothing without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
@@ -136,7 +136,7 @@ def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     return csv_of({head: [getattr(segment, name) for segment in segments] for name, head in heads.items()})
 
 
-def task_sequence_data(comparison: Comparison) -> dict[str, Any]:
+def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
     """Return the segments as data, in SI units; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     sequence = walk_of(worn.scenario).task_sequence

@@ -15,7 +15,7 @@ from ppafo.units.shown import in_units
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.motion import person_remarks
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Number, Population
+from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Population, WearerQuantity
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -108,7 +108,7 @@ def wearers_csv(population: Population) -> bytes:
     return csv_of(columns)
 
 
-def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
+def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, WearerQuantity]) -> dict[str, dict[str, object]]:
     """Return the quantiles of every number in SI units, with unit and meaning."""
     return {
         name: {

@@ -10,7 +10,7 @@ from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
-from ppafo.exports.c_library.files import Library, Setting, Surface, c_identifier, library_files
+from ppafo.exports.c_library.files import ExportParameter, Library, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
@@ -124,7 +124,7 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 
 @singledispatch
-def _drive_of(_motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
+def _drive_of(_motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive:
     """External drive of a plant with this motion, within the ranges of its settings by path: here a walk."""
     return Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
 
@@ -134,7 +134,7 @@ _FIRST_RAMP = 0.0078125
 
 
 @_drive_of.register
-def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> Drive:
+def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a joint whose angle and rate come from outside: a ramp, which the profile already is."""
     stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
     # So fast that the short ramp of the first angle still ends within what a level may be.
@@ -166,7 +166,7 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> D
 
 
 @_drive_of.register
-def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
+def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a free joint: T_ex on a vane alone, or T_2 on the ankle of a leg, which T_ex opposes."""
     if motion.leg is None:
         name, summary, start, load = (

@@ -16,7 +16,7 @@ from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import LaneResult, LaneTiming
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS
-from ppafo.exports.c_library.files import Relation, Setting, c_identifier
+from ppafo.exports.c_library.files import ExportParameter, Relation, c_identifier
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES, device_effects
 from ppafo.model.columns import larger, smaller
@@ -29,7 +29,7 @@ from ppafo.model.sensors import SensorParameters
 from ppafo.parameters.building import consistency
 from ppafo.parameters.declaration import members
 from ppafo.parameters.device import Device, SonicOrifice
-from ppafo.parameters.graph import Graph, Term
+from ppafo.parameters.graph import Graph, LinkFunction
 from ppafo.parameters.plant import SEEN_BY_EFFECTS, area_restriction, effects_of, plant_with, sonic_restriction
 from ppafo.simulation.clock import TIMES, step_unless_given, step_with_output, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE, SUPPLY_LINE, SUPPLY_LINES, THERMAL, gas_settings, value_at
@@ -50,7 +50,9 @@ FLAWS = ("angle_noise", "pressure_noise", "angle_resolution", "pressure_resoluti
 """Settings of noise and rounding, in the order of ``SensorParameters``."""
 
 
-def following_text(settings: Sequence[Setting], links: Graph, collector: SourceCollector, boundary: Boundary) -> str:
+def following_text(
+    settings: Sequence[ExportParameter], links: Graph, collector: SourceCollector, boundary: Boundary
+) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
     places = {setting.path: index for index, setting in enumerate(settings)}
 
@@ -76,7 +78,7 @@ def following_text(settings: Sequence[Setting], links: Graph, collector: SourceC
     return "\n".join([*rows, head, *indent(lines)])
 
 
-def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
+def _term(term: LinkFunction, rows: list[str], collector: SourceCollector) -> str:
     """A term of what is followed; structs that only it has are added to ``rows``."""
 
     def filled(row: type, numbers: Sequence[str]) -> str:
@@ -100,7 +102,7 @@ class Writing:
         self.needs = collector.needs
         self.rows: dict[str, list[str]] = {}
 
-    def text(self, settings: Iterable[Setting], lines: Iterable[str], boundary: Boundary) -> str:
+    def text(self, settings: Iterable[ExportParameter], lines: Iterable[str], boundary: Boundary) -> str:
         """The composed function ``prepare`` of some lines, and the rows that only it has.
 
         The lines must name every group of rows of the program, ``counts_of_steps``, delays and ``needs_parts``.
@@ -270,7 +272,7 @@ SAID = {
 """Meanings of some settings outside a file."""
 
 
-def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
+def settings_of(scenario: Scenario) -> tuple[ExportParameter, ...]:
     """Every number of a scenario in SI units, under the path that overrides know it by."""
     # The file's step, from which the engine makes one that divides a sample.
     texts = time_texts(scenario)
@@ -289,7 +291,7 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
         "controller.period": period,
     }
     return tuple(
-        Setting(
+        ExportParameter(
             c_identifier(path),
             path,
             replace(quantity, summary=SAID.get(path, quantity.summary)),

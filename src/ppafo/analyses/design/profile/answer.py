@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Margins:
+class SizingMargins:
     """Reserves of a sized valve to its limits, as fractions [-].
 
     ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
@@ -82,7 +82,7 @@ class SizedValve:
     gas_in_all: float
     bottle: Part | None
     mass: float | None
-    margins: Margins | None
+    margins: SizingMargins | None
     limit: Limit
     notes: Notes
     curve: tuple[Floats, Floats, Floats]
@@ -388,7 +388,7 @@ def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
     chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
         finding.Part("Valves", columns_of(_HEAD, rows), marked=chosen),
-        finding.Part("Margins" if margins else "", columns_of(head, margins), marked=marked),
+        finding.Part("SizingMargins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
 

@@ -10,7 +10,7 @@ from ppafo.analyses.design.wearer.wish import (
     TOES,
     TORQUE,
     WALKS,
-    Device,
+    SizedDevice,
     WearerSizing,
     Wish,
 )
@@ -78,7 +78,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     )
 
 
-def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
+def _sections(wish: Wish, device: SizedDevice) -> tuple[finding.Part, ...]:
     walked = device.walked
     share = device.torque / wish.torque
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
