@@ -14,7 +14,7 @@ from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.catalog import TARGETS, target_of
-from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
+from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts, converter_with
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.declaration import quantity_text
@@ -41,7 +41,7 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     state = type(law.begins)
-    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, Readings))
+    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, ConverterCounts))
     module = walk_module(collector.text(), {entry: parameters})
     declared = (
         IntegerRange(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities
@@ -50,7 +50,7 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     ranges: dict[str, Range] = {
         "numbers": _nested(law.numbers, declared),
         "state": _nested(state, (IntegerRange(*law.state_ranges[name]) for name in own_names)),
-        "readings": (IntegerRange(0, LARGEST_READING),) * len(Readings._fields),
+        "readings": (IntegerRange(0, LARGEST_READING),) * len(ConverterCounts._fields),
     }
     proved = narrowed(module, ranges)
     allowed: Range = (IntegerRange(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
@@ -68,9 +68,11 @@ def law_source(law: FixedLaw) -> str:
     title = f"The controller '{law.kind.name}' of ppafo {__version__} in fixed point. Not to be edited."
     text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
     text = _OF_NUMBERS.sub("PPAFO_CALLED", text)
-    numbers, state, readings = (collector.add(row_type) for row_type in (law.numbers, type(law.begins), Readings))
+    numbers, state, readings = (
+        collector.add(row_type) for row_type in (law.numbers, type(law.begins), ConverterCounts)
+    )
     numbers_in_c = rebuilt(law.numbers, [macro(quantity) for quantity in law.number_quantities])
-    parameters = ", ".join(f"int16_t {name}" for name in Readings._fields)
+    parameters = ", ".join(f"int16_t {name}" for name in ConverterCounts._fields)
     return f"""#include "controller.h"
 
 #include "parameters.h"
@@ -87,7 +89,7 @@ void controller_begin(void)
 int16_t controller_sample({parameters})
 {{
     static const {numbers} numbers = {_written(numbers_in_c)};
-    const {readings} readings = {{{", ".join(Readings._fields)}}};
+    const {readings} readings = {{{", ".join(ConverterCounts._fields)}}};
     const {entry}_result result = {entry}(numbers, state, readings);
     state = result.item_1;
     return result.item_0;

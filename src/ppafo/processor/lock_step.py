@@ -11,7 +11,7 @@ from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
-from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, Readings, read
+from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, ConverterCounts, read
 from ppafo.processor.images import Decision, Image, ImageSizes, ProcessorSimulator, Target, processor_simulator
 from ppafo.report.style import BLACK, REFERENCE, FigureMargins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.scenario import Scenario
@@ -42,7 +42,7 @@ class PythonProcessor:
         """Forget everything."""
         self.state = self.law.begins
 
-    def sample(self, readings: Readings) -> tuple[int, int]:
+    def sample(self, readings: ConverterCounts) -> tuple[int, int]:
         """Command in steps, and the status word that the processor reports with it."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
         return command, self.state.sound
@@ -132,7 +132,7 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     reference = PythonProcessor(fixed)
     wanted: list[tuple[int, int]] = []
-    asked: list[Readings] = []
+    asked: list[ConverterCounts] = []
     decisions: list[Decision] = []
     with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
         for number, readings in enumerate(drawn_readings(int(fixed.converter.top), samples, seed)):
@@ -154,7 +154,7 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
     return DecisionComparison(samples, len(differ), first, cost)
 
 
-def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
+def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCounts]:
     """Readings of a converter with some largest one: courses that wander, jump, rest at an edge, or break.
 
     Each episode has a manner of its own; in two of five a reading comes to an end of its range at some time.
@@ -163,7 +163,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
     edges = (1, 2, top // 2, top // 2 + 1, top - 2, top - 1)
     for start in range(0, samples, EPISODE):
         step = draw.choice((1, 3, 30, 300, top))
-        at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in Readings._fields]
+        at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in ConverterCounts._fields]
         breaks = draw.randrange(EPISODE) if draw.random() < 0.4 else EPISODE
         for sample in range(min(EPISODE, samples - start)):
             if draw.random() < 0.02:
@@ -173,7 +173,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
             shown = list(at)
             if sample == breaks:
                 shown[draw.randrange(3)] = draw.choice((0, top))
-            yield Readings(*shown)
+            yield ConverterCounts(*shown)
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:

@@ -92,7 +92,7 @@ def facts(rows: Iterable[Sequence[Cell]]) -> list[Column]:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Section:
     """A part of a finding, of which all may be left out: a heading, what is said, a table, a figure, a text to copy.
 
     The table: ``columns``, of which the first ``left`` are names and set to the left; without titles they are a list of
@@ -174,7 +174,7 @@ class Finding(Generic[T_co]):
     kicker: str
     title: str
     said: Sequence[str]
-    parts: Sequence[Part]
+    parts: Sequence[Section]
     found: T_co
     passed: bool = True
     files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
@@ -185,7 +185,7 @@ class Finding(Generic[T_co]):
     units: Mapping[str, str] = field(default_factory=units_in_force)
 
     @property
-    def figures(self) -> dict[str, Part]:
+    def figures(self) -> dict[str, Section]:
         """The parts that have a figure, by the stem of its files."""
         return {part.name: part for part in self.parts if part.name}
 
@@ -237,7 +237,7 @@ def text_of(finding: Finding[Any]) -> str:
     return "\n\n".join(block for block in blocks if block)
 
 
-def _table_lines(part: Part) -> list[str]:
+def _table_lines(part: Section) -> list[str]:
     """Return the table of a part as aligned lines, its head first, its marked rows after a mark; none without rows."""
     rows: list[tuple[str, ...]] = part.rows
     if not rows:
@@ -268,7 +268,7 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
     return render_page("finding.html.jinja", values).encode()
 
 
-def _head_of(part: Part) -> list[str]:
+def _head_of(part: Section) -> list[str]:
     """Return the titles of a table; a unit in brackets at the end of one is not broken over two lines."""
     if not part.has_head:
         return []

@@ -13,7 +13,7 @@ import ppafo.cli
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.processor.catalog import CATALOG
 from ppafo.processor.firmware import firmware, fixed_point_controller, proof
-from ppafo.processor.fixed_point import Readings
+from ppafo.processor.fixed_point import ConverterCounts
 from ppafo.processor.images import Target, make_firmware, missing_tools, processor_simulator, read_image, sizes
 from ppafo.processor.lock_step import PythonProcessor, compare_drawn, drawn_readings, run_on_processor
 from ppafo.processor.qemu import QemuSimulator
@@ -150,7 +150,7 @@ def test_the_torque_task_with_the_processor_in_charge_has_the_bits_of_the_lanes(
 @on_cortex
 def test_instructions_are_as_many_as_single_steps(target: Target) -> None:
     scenario = scenario_of("pid")
-    readings = Readings(2000, 1500, 1502)
+    readings = ConverterCounts(2000, 1500, 1502)
     with processor_simulator(firmware(scenario, target.name), target) as (simulator, image):
         assert isinstance(simulator, QemuSimulator)
         counted = simulator.samples([readings, readings])[1].work

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import SHAPES, Mark, Panel
 
@@ -34,7 +34,7 @@ def finding() -> Finding[Numbers]:
         Column("gas", [0.001, ConfidenceInterval(0.002, 0.001, 0.003), float("nan")], gas),
     ]
     panel = Panel(TIME, gas, [Mark("line", [0.0, 1.0], [0.001, 0.002], label="gas")])
-    part = Part("Gas", columns, panels=[panel], name="gas", caption="Gas over time.")
+    part = Section("Gas", columns, panels=[panel], name="gas", caption="Gas over time.")
     return Finding("trial", "Trial", "A trial", ["said"], [part], Numbers([0.001, float("nan")]))
 
 
@@ -70,7 +70,7 @@ def test_every_shape_can_be_drawn() -> None:
     assert set(given) == set(SHAPES)
     panels = [Panel(Kind("x"), Kind("y"), [mark], scale=Kind("z")) for mark in (given["map"], given["points"])]
     panels += [Panel(Kind("x"), Kind("y"), [given[name]]) for name in SHAPES if name not in ("map", "points")]
-    part = Part("Shapes", panels=panels, name="shapes", across=4)
+    part = Section("Shapes", panels=panels, name="shapes", across=4)
     figure = Finding("trial", "", "", [], [part], Numbers([])).plot()
     bars = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
     assert [bar.get_ylabel() for bar in bars] == ["z"], "two panels of one scale share its bar"

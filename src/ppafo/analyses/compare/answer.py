@@ -12,7 +12,7 @@ from ppafo.analyses.compare.pairs import Paired, pareto_front
 from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.report.display_units import display_difference
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
@@ -144,14 +144,14 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
         lead += f"{comparison.draws:,} draws of {values}{beside}, the same for all; each "
         lead += f"interval with {100.0 * comparison.confidence:g} % confidence"
     pareto, change = (
-        Part(
+        Section(
             "Error against gas",
             panels=partial(_pareto_panels, comparison),
             name="pareto",
             caption=_PARETO,
             is_detail=True,
         ),
-        Part(
+        Section(
             "Spread of the change",
             panels=partial(_change_panels, comparison),
             name="change",
@@ -170,8 +170,8 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
             *(part for task in comparison.tasks for part in _parts(comparison, task)),
             *([pareto] if has_errors else []),
             *([change] if has_errors and comparison.draws else []),
-            Part(remarks=comparison.remarks),
-            Part("How to read it" if said else "", said=said, is_detail=True),
+            Section(remarks=comparison.remarks),
+            Section("How to read it" if said else "", said=said, is_detail=True),
         ),
         found=comparison,
         passed=all(case.status.is_completed for task in comparison.tasks for case in task.cases),
@@ -179,7 +179,7 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
     )
 
 
-def _parts(comparison: ComparisonResult, task: OnTask) -> list[Part]:
+def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
     """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
@@ -189,7 +189,7 @@ def _parts(comparison: ComparisonResult, task: OnTask) -> list[Part]:
         if len(comparison.configurations) > 2 and task.best.get(metric)
     }
     return [
-        Part(
+        Section(
             f"Task: {task.task}",
             [
                 Column("configuration", [case.configuration for case in task.cases]),
@@ -198,11 +198,11 @@ def _parts(comparison: ComparisonResult, task: OnTask) -> list[Part]:
             ],
         ),
         *(
-            Part(f"{name} against {comparison.baseline}{where}", _paired(comparison, task, name))
+            Section(f"{name} against {comparison.baseline}{where}", _paired(comparison, task, name))
             for name, pairs in task.pairs.items()
             if pairs
         ),
-        *([Part(remarks=[f"best: {metric}: {text}" for metric, text in best.items()])] if best else []),
+        *([Section(remarks=[f"best: {metric}: {text}" for metric, text in best.items()])] if best else []),
     ]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ppafo.analyses.find.solve import FindResult
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import of_metric, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, VERMILION
@@ -64,8 +64,8 @@ def finding_of(outcome: FindResult) -> Finding[Threshold]:
         title=f"The {wanted} {outcome.path.path} such that {outcome.condition.text}",
         said=(_verdict(outcome), *remarks),
         parts=(
-            Part("Met in the range that was tried", columns),
-            Part(
+            Section("Met in the range that was tried", columns),
+            Section(
                 "Metric over the value",
                 panels=(_panel(outcome),),
                 name="find",

@@ -9,7 +9,7 @@ from ppafo.errors import ParameterError, count_of, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.audit import AuditFinding, audit, changed_paths
 from ppafo.parameters.audit.changes import changes
-from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 
 _WIDTH = 100
 _INDENT = "    "
@@ -74,25 +74,25 @@ def _counts(findings: list[AuditFinding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
-def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Part:
+def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Section:
     """Return what a set changes of its parent."""
     rows = [(change["path"], change["before"] or None, change["after"] or None, change["origin"]) for change in changed]
     changes = count_of(len(rows), "value") if rows else "nothing"
     said = f"{name} changes {changes} of its parent {parent}"
-    return Part(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
+    return Section(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
 
 
-def _table(sets: list[ParameterSet], findings: list[list[AuditFinding]]) -> Part:
+def _table(sets: list[ParameterSet], findings: list[list[AuditFinding]]) -> Section:
     """Return a row for each finding and a column for each set, with how serious it is there."""
     verdicts = [
         {finding.id: "accepted" if finding.accepted else finding.severity for finding in of_set} for of_set in findings
     ]
     head = ["finding", *(parameter_set.name for parameter_set in sets)]
     ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
-    return Part(columns=columns_of(head, ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)))
+    return Section(columns=columns_of(head, ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)))
 
 
-def _parts(parameter_set: ParameterSet, findings: list[AuditFinding], changed: frozenset[str] | None) -> list[Part]:
+def _parts(parameter_set: ParameterSet, findings: list[AuditFinding], changed: frozenset[str] | None) -> list[Section]:
     """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
     shown = [
         finding
@@ -107,7 +107,7 @@ def _parts(parameter_set: ParameterSet, findings: list[AuditFinding], changed: f
     if left:
         concern = "concerns" if left == 1 else "concern"
         summary += f"; {left} of them {concern} no changed value: --all"
-    return [*(Part(said=_lines(finding)) for finding in shown), Part(said=[f"{parameter_set.name}: {summary}"])]
+    return [*(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{parameter_set.name}: {summary}"])]
 
 
 def _lines(finding: AuditFinding) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic
 from ppafo.analyses.sweep.stopping import InterimEstimate, StatisticEstimate, StoppingRule
-from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
@@ -84,7 +84,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
         (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
         for name, mean in estimated.also.items()
     ]
-    also = Part(
+    also = Section(
         "Further metrics",
         columns_of(("mean over the same draws", "with a value", *_ENDS), further),
         said=[f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."],
@@ -98,7 +98,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
         said=(verdict, *estimated.remarks),
         parts=(
             *([also] if further else []),
-            Part(
+            Section(
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],

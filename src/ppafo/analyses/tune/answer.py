@@ -14,7 +14,7 @@ from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
 from ppafo.report.display_units import quantity_of_unit
-from ppafo.report.finding import Column, Finding, Part, columns_of
+from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -140,7 +140,7 @@ def finding_of(
         said=(tuned.verdict, *([problem.description] if problem.description else [])),
         parts=(
             _gains_part(tuned),
-            Part(
+            Section(
                 "Before and after",
                 _metric_columns(problem, before, after),
                 panels=partial(task_panels, before, after),
@@ -148,7 +148,7 @@ def finding_of(
                 caption="The nominal device.",
                 size=(6.9, 2.1),
             ),
-            Part(
+            Section(
                 "The search",
                 remarks=tuned.remarks,
                 panels=partial(search_panels, problem, before, after, starts),
@@ -157,7 +157,7 @@ def finding_of(
                 across=2,
                 size=(4.4, max(2.6, 0.9 + 0.4 * len(problem.searched))),
             ),
-            Part("To use the gains", code=_command(tuned)),
+            Section("To use the gains", code=_command(tuned)),
         ),
         found=tuned,
         passed=after.is_feasible and not after.useless,
@@ -198,14 +198,14 @@ def _tuned(
     )
 
 
-def _gains_part(tuned: Tuned) -> Part:
+def _gains_part(tuned: Tuned) -> Section:
     """Return the gains with their bounds, as people write them."""
     rows = []
     for gain in tuned.problem.searched:
         numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
         end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
         rows.append((gain.path, *map(gain.place.quote, numbers), end))
-    return Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows))
+    return Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows))
 
 
 def _options(tuned: Tuned) -> str:

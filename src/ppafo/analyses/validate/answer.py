@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.analyses.validate.result import Validation, kind_of_channel, verdict
 from ppafo.errors import count_of
 from ppafo.report.display_units import display_value, gauge_shift
-from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
 from ppafo.report.residuals import FittedCurve, course_panels
@@ -104,9 +104,9 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
         said=said,
         parts=(
-            Part(said=[_method(validation)], is_detail=True),
+            Section(said=[_method(validation)], is_detail=True),
             *(_part(validation, name, agreement) for name, agreement in pairs),
-            Part("Files" if hashes else "", facts(hashes), is_detail=True),
+            Section("Files" if hashes else "", facts(hashes), is_detail=True),
         ),
         found=validation,
         passed=validation.passes,
@@ -136,7 +136,7 @@ def recording_names(files: Sequence[str]) -> list[str]:
     ]
 
 
-def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> Part:
+def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> Section:
     """Section with the errors of one recording in a table, and its panels; ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
     late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
@@ -145,7 +145,7 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
     )
     across = panels_across(agreement)
-    return Part(
+    return Section(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
         [replayed],

@@ -9,7 +9,7 @@ from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
 from ppafo.gait.gait import Gait, speed_range
 from ppafo.report.display_units import si_unit
-from ppafo.report.finding import Column, Part
+from ppafo.report.finding import Column, Section
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.task_sequence import task_sequence_figure
@@ -54,7 +54,7 @@ _MEAN_CAPTION = (
 )
 
 
-def task_sequence_parts(comparison: WalkComparison) -> tuple[Part, ...]:
+def task_sequence_parts(comparison: WalkComparison) -> tuple[Section, ...]:
     """Return the table of the segments, and how to read it; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
@@ -74,9 +74,9 @@ def task_sequence_parts(comparison: WalkComparison) -> tuple[Part, ...]:
         "level ground."
     )
     return (
-        Part(columns=table, marked=(len(rows) - 1,)),
-        Part("How to read the task sequence", said=_EXPLAINED, is_detail=True),
-        Part(said=(means,)),
+        Section(columns=table, marked=(len(rows) - 1,)),
+        Section("How to read the task sequence", said=_EXPLAINED, is_detail=True),
+        Section(said=(means,)),
     )
 
 
@@ -100,19 +100,19 @@ def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
     }
 
 
-def task_sequence_pictures(comparison: WalkComparison) -> tuple[Part, ...]:
+def task_sequence_pictures(comparison: WalkComparison) -> tuple[Section, ...]:
     """Return the task sequence over time, and the mean of its even strides where there are any."""
     worn, bare = comparison.with_device, comparison.without_device
     mean = partial(walk_figure, {"with the device": worn, "without": bare})
     pictures = (
-        Part(
+        Section(
             "The task sequence",
             name="task-sequence",
             caption=_CAPTION,
             draw=partial(task_sequence_figure, worn, bare),
             is_detail=True,
         ),
-        Part("The mean stride", name="mean-stride", caption=_MEAN_CAPTION, draw=mean, is_detail=True),
+        Section("The mean stride", name="mean-stride", caption=_MEAN_CAPTION, draw=mean, is_detail=True),
     )
     return pictures if worn.averages and bare.averages else pictures[:1]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, versions, walk_document
-from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS
 from ppafo.units.shown import in_units
@@ -84,14 +84,16 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
     if population.diverged:
         remarks.append(population.message)
     draw = partial(population_figure, population)
-    figure = Part("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
+    figure = Section("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
     return Finding(
         name="wearers",
         kicker="Walks of many wearers",
         title=f"{population.count} wearers with {configuration.name}",
         said=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
         parts=(
-            Part(columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks),
+            Section(
+                columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks
+            ),
             *([figure] if population.count else []),
         ),
         found=Wearers(population),

@@ -39,7 +39,7 @@ MAXIMUM_ERROR = 20.25
 """Errors over what is allowed at which the length of a part changes by the largest factors, 2 and 0.2."""
 
 
-class Pace(NamedTuple):
+class StepControl(NamedTuple):
     """Length [s] that the error of the last part allows the next one."""
 
     length: float
@@ -53,7 +53,7 @@ def until_jump(jump: float, remaining: float) -> float:
     return jump if jump < remaining - SAME_INSTANT else remaining
 
 
-def part_length(pace: Pace, remaining: float) -> float:
+def part_length(pace: StepControl, remaining: float) -> float:
     """Length [s] of a part: what the error allows, in equal parts where two of them reach the end."""
     # Two equal parts rather than a long one and a stub.
     halves = 0.5 * remaining if remaining < 2.0 * pace.length else pace.length
@@ -66,13 +66,13 @@ def is_refused(error: float, length: float) -> bool:
     return not error <= 1.0 and length > SHORTEST_PART
 
 
-def next_pace(pace: Pace, error: float, length: float, refused: bool, longest: float) -> Pace:
+def next_pace(pace: StepControl, error: float, length: float, refused: bool, longest: float) -> StepControl:
     """Length of the next part after one of ``length`` [s] with an error [-]; one that an event cut says little."""
     factor = math.sqrt(SAFETY / max(MINIMUM_ERROR, min(MAXIMUM_ERROR, error)))
     wanted = length * factor
     # A part that an event cut short had little error for that reason: the next may be as long as before.
     kept = max(pace.length, wanted) if factor >= 1.0 and not refused else wanted
-    return Pace(max(min(kept, longest), SHORTEST_PART))
+    return StepControl(max(min(kept, longest), SHORTEST_PART))
 
 
 ALLOWED_OF_ANGLE = 2.0e-6
@@ -86,7 +86,7 @@ LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
 
 
-class Friction(NamedTuple):
+class FrictionTorques(NamedTuple):
     """Sizes of the friction torque [N m]: the largest at rest, and in motion."""
 
     at_rest: float
@@ -142,7 +142,7 @@ class PartSlide(NamedTuple):
     """
 
     torque: float
-    friction: Friction
+    friction: FrictionTorques
     angular_velocity: float
     departs: float
 
@@ -189,16 +189,23 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
     return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
 
 
-def friction_now(plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float) -> Friction:
+def friction_now(
+    plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float
+) -> FrictionTorques:
     """Sizes of friction [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
-    return Friction(
+    return FrictionTorques(
         at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
         in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
     )
 
 
 def depart(
-    plant: PlantParameters, departure: Departure, torque: float, next_torque: float, friction: Friction, step: float
+    plant: PlantParameters,
+    departure: Departure,
+    torque: float,
+    next_torque: float,
+    friction: FrictionTorques,
+    step: float,
 ) -> tuple[float, float]:
     """Angle and angular velocity at the end of a step whose last part begins with ``departure``.
 

@@ -10,7 +10,7 @@ from ppafo.engine.entries import indent
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, row_expression
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
-from ppafo.engine.scheme.motion import Pace
+from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import LaneResult, LaneTiming
@@ -245,7 +245,7 @@ class Writing:
         """Lines that make the states at the start, once there are ``state`` and ``plant``."""
         program, add = self.program, self.add
         yield f"result = {add(LaneResult)}(0.0, {NEVER_FAILED!r}, 0.0)"
-        yield f"pace = {add(Pace)}(step)"
+        yield f"pace = {add(StepControl)}(step)"
         if program.gas.START is not None:
             yield f"masses = {add(program.gas.START)}(plant, state)"
         yield f"valve_state = {self.constant(program.valve.initial(), 'valve_state')}"
