@@ -94,9 +94,9 @@ def draw_until(
 ) -> Finding[Estimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
-    An interval that few draws determine is not trusted, however narrow it is: drawing continues. So does that of a mean
-    until what happens once in 3,300 runs would have come, and what is rarer cannot move the mean out of the wanted
-    width, if it lies within 100 standard deviations.
+    A narrow interval from few draws is not trusted: drawing continues. For a mean it continues until an event of one
+    run in 3,300 would have been drawn, and until rarer events within 100 standard deviations of the mean cannot move it
+    out of the wanted width.
 
     Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
     StudyError.
