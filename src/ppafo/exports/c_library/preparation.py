@@ -164,7 +164,7 @@ class Writing:
         constant = f"{add(specific_gas_constant)}({UNIVERSAL_GAS_CONSTANT!r}, gas_molar_mass)"
         fields["gas"] = fields["gas"] | {"specific_gas_constant": constant}
         # Lines have a check valve of their own, so that the valve may push gas back into them.
-        is_relieving = self.device.supply.relieving or self.lines is not None
+        is_relieving = self.device.supply.takes_back or self.lines is not None
         fields["supply"] = fields["supply"] | {"relieving": repr(float(is_relieving))}
         for section, inner in fields.items():
             yield f"{section} = {self.row(section.title().replace('_', ''), inner)}"

@@ -10,7 +10,7 @@ from ppafo.metrics.metric import Floats, followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
-from ppafo.parameters.reach import supply_for, torque_reach
+from ppafo.parameters.reach import supply_for, supply_that_moves, torque_reach
 from ppafo.report.display_units import metric_change
 from ppafo.signals import Recording
 from ppafo.simulation.numbers import number_at
@@ -90,7 +90,7 @@ def torque_beyond_reach(case: Case) -> Cause | None:
     lowest, highest = torque_reach(scenario.device, there)
     if lowest <= wanted <= highest:
         return None
-    reach, supply = (highest, "supply.pressure") if wanted > highest else (lowest, "supply.dorsiflexion_pressure")
+    reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
     text = (
         f"at {level_text('rad', there, scenario)} and {level_text('Pa', number_at(scenario, supply), scenario)} the "
         f"actuator gives {level_text('N m', reach, scenario)} at most"
@@ -119,7 +119,7 @@ def _load_beyond_reach(case: Case) -> Cause | None:
     load = outside + float(gravity_torque(wanted, device.foot_plate.gravity_torque))
     if lowest <= load <= highest:
         return None
-    reach, supply = (highest, "supply.pressure") if load > highest else (lowest, "supply.dorsiflexion_pressure")
+    reach, supply = highest if load > highest else lowest, supply_that_moves(device, load > highest)
     stop = _stop(scenario, angle)
     rests = f"the joint lies on its {stop} stop: " if stop else ""
     works, gives = (level_text("N m", abs(torque), scenario) for torque in (load, reach))
