@@ -47,8 +47,8 @@ def supply_that_moves(device: Device, upwards: bool) -> str:
 def supply_for(device: Device, angle: float, torque: float) -> float | None:
     """Supply pressure [Pa absolute] with which a device gives a static torque [N m] at an angle [rad].
 
-    Chamber 1 raises the torque above that of the vented actuator, chamber 2 lowers it; of a vacuum the other way round.
-    None where no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives it.
+    Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; of a vacuum the other way
+    round. None where no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives it.
     """
     own, vented = static_torque(device), float(device.supply.atmospheric_pressure)
     sign = 1.0 if torque > own(angle, vented, vented) else -1.0
