@@ -17,7 +17,7 @@ class Arrays:
     """Arrays of all numbers, one after another; ``array`` is the name of a parameter."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
-        """One number of many, by its place."""
+        """Element of an array, by its index."""
         return f"{array}[{place}]"
 
     def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
@@ -42,7 +42,7 @@ class Structs:
     """Structs of groups of numbers, or of numbers."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
-        """One number of many, by its name."""
+        """Field of a struct, by its name."""
         return f"{array}.{name}"
 
     def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:

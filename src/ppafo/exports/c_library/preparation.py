@@ -1,4 +1,4 @@
-"""From settings to the numbers of a run: how that function is written for any device, and what a scenario needs."""
+"""Preparation in C: numbers of a run from settings, composed for any device, and the needs of a scenario."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -131,7 +131,7 @@ class Writing:
 
     @property
     def stiffness(self) -> str:
-        """By how much faster the pressure of the gas follows than at one temperature."""
+        """Stiffness of the gas pressure relative to constant temperature, as an expression."""
         return "gas_heat_capacity_ratio" if self.program.is_thermal else "1.0"
 
     def section(self, section: str, names: Sequence[str]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""From the settings of a walk to the numbers of a run: one composed function that calls the planning.
+"""Preparation of a walk in C: one composed function that calls the planning on the settings.
 
 What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out.
 """
