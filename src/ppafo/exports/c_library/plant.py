@@ -258,7 +258,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
 
 
 def _as_clock(alone: PlantAlone) -> tuple[str, ...]:
-    """Names of the settings that are the step of the inputs too: commands come once in each, and nothing lies between."""
+    """Names of the other times that are this step: commands come once in each, and nothing lies between."""
     return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 
