@@ -1,4 +1,4 @@
-"""How far a run can be trusted: the error of its steps, and whether it comes again.
+"""Reliability of a run: the error of its steps, and its repeatability.
 
 The error of the time stepping falls with the allowed one, so nearly all of it is in what changes where a run has a
 sixteenth of it. A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure
@@ -25,14 +25,16 @@ from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 
 SHORTER = 4
-"""How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
+"""Ratio by which the steps of a finer run are shorter; its allowed error is smaller by the square."""
 MARGIN = 1.5
 """Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
 """Errors over the ranges of angle and pressures, and over the gas's temperature, that a run keeps to by default."""
+SMALLEST_TOLERANCE = 1.0e-6
+"""Smallest ``run.tolerance`` that a run may have [-]."""
 
 MOVE = 1.0e-7
-"""How far a start or a measurement is moved, as a fraction of its range."""
+"""Perturbation of a start or a measurement, as a fraction of its range."""
 ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
 
@@ -61,8 +63,9 @@ class ErrorEstimate:
 
     ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number; ``largest`` the
     name of the one whose error is largest over its value or the range of its quantity, empty without metrics, and
-    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other; ``units`` are
-    those in which a person is shown it.
+    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other. ``over_promise``
+    is the largest of angle, pressure and temperature over what a run keeps to by default [-], and ``tolerance`` a
+    ``run.tolerance`` that is small enough, 0 where none is needed; ``units`` are those in which a person is shown it.
     """
 
     angle: float
@@ -71,6 +74,8 @@ class ErrorEstimate:
     temperature: float | None = None
     largest: str = ""
     share: float = 0.0
+    over_promise: float = 0.0
+    tolerance: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -84,7 +89,11 @@ class ErrorEstimate:
         texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in shown]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
         of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
-        return f"Estimated error of the steps: at most {over_time} over time{of_metrics}."
+        beyond = ""
+        if self.over_promise > 1.0:
+            remedy = f": `run.tolerance = {self.tolerance:.1g}` makes it less" if self.tolerance else ""
+            beyond = f" That is {self.over_promise:.2g} times what a run promises{remedy}."
+        return f"Estimated error of the steps: at most {over_time} over time{of_metrics}.{beyond}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +128,7 @@ class NumberCheck:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check:
-    """What of a run is determined: its metrics, and its angle, pressures and temperatures over time.
+    """Repeatability of a run: of its metrics, and of its angle, pressures and temperatures over time.
 
     ``error`` is the estimated error of the run from its steps, of which the one with finer steps has a sixteenth.
     ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
@@ -142,7 +151,7 @@ class Check:
 
     @property
     def sentence(self) -> str:
-        """What the check found, in plain words."""
+        """Result of the check, in plain words."""
         if self.is_determined:
             return (
                 f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
@@ -202,7 +211,7 @@ class Ran(Protocol):
 
     @property
     def scenario(self) -> Scenario:
-        """What was run."""
+        """Scenario of the run."""
 
     @property
     def recording(self) -> Recording:
@@ -214,11 +223,11 @@ class Ran(Protocol):
 
     @property
     def status(self) -> Any:
-        """How it ended, a ``Status``."""
+        """End of the run, a ``Status``."""
 
 
 Again = Callable[[Sequence[Run]], Sequence[Ran]]
-"""What runs other plans of the same scenario."""
+"""Function that runs other plans of the same scenario."""
 
 
 def finer(run: Run) -> Run:
@@ -247,11 +256,27 @@ def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
     temperature = errors_at_end[2] if len(errors_at_end) > 2 else None
     shares = _shares(result, errors)
     worst = max(shares, key=lambda name: shares[name], default="")
-    return ErrorEstimate(angle, pressure, errors, temperature, worst, shares.get(worst, 0.0))
+    device, own = result.scenario.device, result.scenario.run.tolerance
+    promised = LARGEST_OF_PRESSURE * _pressure_range(result)
+    over = [angle / (LARGEST_OF_ANGLE * (device.actuator.angle_max - device.actuator.angle_min)), pressure / promised]
+    if temperature is not None:
+        over.append(temperature / (LARGEST_OF_TEMPERATURE * device.gas.temperature))
+    # The allowed error goes with the tolerance; with half of what is needed it is met.
+    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE)
+    return ErrorEstimate(
+        angle=angle,
+        pressure=pressure,
+        metrics=errors,
+        temperature=temperature,
+        largest=worst,
+        share=shares.get(worst, 0.0),
+        over_promise=max(over),
+        tolerance=less if max(over) > 1.0 and less < own else 0.0,
+    )
 
 
 def _courses_of(result: Ran) -> list[str]:
-    """What of a run is compared over time: temperatures where they are recorded."""
+    """Channels of a run that are compared over time: temperatures if recorded."""
     return [name for name, channels in _COURSES.items() if all(channel in result.recording for channel in channels)]
 
 

@@ -70,7 +70,7 @@ class Expressions:
         """The value of an expression."""
         handler: Callable[[Any], Term] | None = getattr(self, f"_of_{type(node).__name__.lower()}", None)
         if handler is None:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no expression of the subset")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
         return handler(node)
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
@@ -86,11 +86,11 @@ class Expressions:
         """The value of an expression that must be a whole number."""
         term = self.scalar(node, INT)
         if term.type != INT:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no whole number")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not an integer")
         return term
 
     def condition(self, node: ast.expr) -> Term:
-        """Whether an expression is true."""
+        """Translation of an expression as a condition."""
         if isinstance(node, ast.BoolOp):
             return _linked(node, [self.condition(value) for value in node.values])
         term = self.scalar(node)
@@ -408,7 +408,7 @@ def kind_of(kind: Type) -> str:
 
 
 def _without_field(owner: str, name: str, kind: Type) -> str:
-    """What to say of a value that has no such field, with those that it has."""
+    """Message about a value without such a field, with its fields."""
     if not isinstance(kind, Row):
         return f"{owner} is {kind_of(kind)} and has no '{name}'"
     fields = [field for field, _ in kind.fields]
@@ -422,7 +422,7 @@ _INSTEAD = {
     "log": ", whose last bits differ between computers: take logarithm(number) of ppafo.model.elementary",
     "pow": ", whose last bits differ between computers: take power(base, exponent) of ppafo.model.elementary",
 }
-"""What to write in the place of a function of a library, where the package has that."""
+"""Replacement for a function of a library, if the package has one."""
 
 
 def _literal(term: Term) -> int | None:
@@ -508,7 +508,7 @@ class _ModuleWalk:
 
 
 class _FunctionWalk:
-    """One function for one choice of types; gone through again where a name turns out to hold a wider type."""
+    """Translation of one function for one choice of types; repeated if a name turns out to have a wider type."""
 
     def __init__(self, module: _ModuleWalk, definition: ast.FunctionDef) -> None:
         self.module = module
@@ -568,7 +568,7 @@ class _FunctionWalk:
         return tuple(chain.from_iterable(map(self.statement, body)))
 
     def statement(self, node: ast.stmt) -> list[Statement]:
-        """What a statement of Python becomes."""
+        """Translation of a Python statement."""
         match node:
             case ast.Pass():
                 return []
@@ -585,7 +585,7 @@ class _FunctionWalk:
                 return self.loop(node, lambda: typed.While(test, self.block(node.body)))
         handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
         if handler is None:
-            raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the subset")
+            raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is not supported in compiled functions")
         return handler(node)
 
     def do_expr(self, node: ast.Expr) -> list[Statement]:
@@ -593,7 +593,7 @@ class _FunctionWalk:
             return [typed.Note(node.value.value)] if isinstance(node.value.value, str) else []
         name = self.values.name_called(node.value) if isinstance(node.value, ast.Call) else ""
         if not isinstance(node.value, ast.Call) or name not in self.module.definitions:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no statement of the subset")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
         function, arguments = self.values.called(name, node.value)
         if function.returns is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' throws away what it returns")

@@ -132,7 +132,7 @@ def without_condition(unit: str) -> str:
 
 
 def density(condition: Condition, molar_mass: float) -> float:
-    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; of air at ANR it is that of ISO 6358."""
+    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; for air at ANR, the density in ISO 6358."""
     if condition.is_humid and abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
         return STANDARD_REFERENCE_DENSITY_AIR
     return condition.pressure * molar_mass / (MOLAR_GAS_CONSTANT * condition.temperature)
@@ -145,7 +145,7 @@ _AS_AIR = 5.0e-3
 def condition_of(text: str, unit: str) -> Condition:
     """Return a condition by its name, or from a temperature and a pressure; UnitError, about a unit, for another text.
 
-    A pressure without a kind is absolute, as that of every reference condition.
+    A pressure without a kind is absolute, as in every reference condition.
     """
     name = re.sub(r"[\s_-]+", " ", text).upper()
     if name in CONDITIONS:
@@ -168,7 +168,7 @@ def condition_of(text: str, unit: str) -> Condition:
             return Condition(temperature, pressure)
     names = ", ".join(CONDITIONS)
     raise UnitError(
-        f"'{unit}': '{text}' is no reference condition{nearest_name(name, CONDITIONS)}; it is one of {names}, or a "
+        f"'{unit}': '{text}' is not a reference condition{nearest_name(name, CONDITIONS)}; it is one of {names}, or a "
         f"temperature and an absolute pressure, such as '{_EXAMPLE}'"
     )
 
@@ -189,5 +189,5 @@ def _molar_mass(word: str) -> float:
     match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
     parsed = None if match is None else parse_unit(match[2])[0]
     if match is None or parsed is None or parsed.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
-        raise UnitError(f"'{word}' is no molar mass, such as '0.044 kg/mol'")
+        raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
     return float(parsed.in_base(Decimal(match[1])))

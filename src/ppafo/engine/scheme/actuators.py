@@ -4,7 +4,10 @@ A program is linked: where its text calls the vane's ``chambers``, ``chamber_pre
 made of them, it calls its actuator's.
 """
 
+from functools import partial
 from typing import Any, TypeVar
+
+import numpy as np
 
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.scheme.pneumatics import (
@@ -86,7 +89,7 @@ def begin_shaped_gas(
 
 
 def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
-    """What a program with this actuator calls in place of the vane's functions; nothing for the vane."""
+    """Replacements of the vane's functions in a program with this actuator; empty for the vane."""
     if actuator is VANE:
         return {}
     return {
@@ -106,6 +109,8 @@ def _of_plant(actuator: ActuatorModel, function: PlainFunction, plant: Any, *giv
         return function(plant, *given)
     # A kind's function takes floats: where numbers are columns it is called for each combination.
     flat = leaves(plant)
+    if not any(isinstance(number, np.ndarray) for number in flat):
+        return over_runs(partial(function, plant), *given)
 
     def alone(*values: float) -> Any:
         return function(rebuilt(actuator.plant, values[: len(flat)]), *values[len(flat) :])
@@ -140,5 +145,5 @@ Seen = TypeVar("Seen", Measurement, GaitMeasurement)
 
 
 def measurement_of(actuator: ActuatorModel, plant: Any, seen: Seen) -> Seen:
-    """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
+    """Sensor readings with the torque of the actuator at the measured angle and pressures."""
     return seen._replace(torque=actuator.torque(plant, seen.angle, seen.pressure_1, seen.pressure_2))

@@ -16,7 +16,7 @@ class Arrays:
     """Arrays of all numbers, one after another; ``array`` is the name of a parameter."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
-        """One number of many, by its place."""
+        """Element of an array, by its index."""
         return f"{array}[{place}]"
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
@@ -37,7 +37,7 @@ class Structs:
     """Structs of groups of numbers, or of numbers."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
-        """One number of many, by its name."""
+        """Field of a struct, by its name."""
         return f"{array}.{name}"
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:  # noqa: ARG002

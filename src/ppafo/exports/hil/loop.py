@@ -74,7 +74,7 @@ class RealTime:
         return self.clock() - self._start
 
     def late(self, due: float) -> float:
-        """By how much a time [s] that was listened for has been missed [s]."""
+        """Delay [s] behind a time [s] that was waited for."""
         missed = max(0.0, self.now() - due)
         # Less than a period late is jitter, which the next sample makes up; more would be made up by a burst of
         # samples.
@@ -132,7 +132,7 @@ class LockStep:
 
 
 Pace = RealTime | LockStep
-"""How the plant's time goes on; ``is_real`` where times mean something."""
+"""Time stepping of the plant: real time or lock step; ``is_real`` if times are meaningful."""
 
 
 @contextmanager
@@ -186,7 +186,7 @@ _WHOLE = 1.0e-9
 
 SILENT, NOT_SOUND, STOPPED, BROKEN = (
     "no answer for 20 ms",
-    "the controller says that it is not sound",
+    "the controller reported a fault",
     "stopped",
     "the port broke",
 )
@@ -319,7 +319,7 @@ class Bench:
                 raise KeyboardInterrupt("interrupted before a controller answered; nothing is written")
             heard = wire.described_refusals(self.reader.refused, self.judge.ignored.items())
             failed = f"; {self.port.failure}" if self.port.failure else ""
-            raise ScenarioError(f"no controller answers within {patience:g} s; came in: {heard}{failed}")
+            raise ScenarioError(f"no controller answered within {patience:g} s; received: {heard}{failed}")
         self.pace.begin()
         self._answered_at = 0.0
         sent, late = 0.0, 0.0
