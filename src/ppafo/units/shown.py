@@ -1,4 +1,4 @@
-"""In which units a person is shown numbers: those in which the author of a parameter set wrote them.
+"""Display units of numbers: the units in which the author of a parameter set wrote them.
 
 What says or draws something does so inside ``shown_in``; outside of it, the package's own choices hold.
 """

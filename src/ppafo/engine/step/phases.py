@@ -55,7 +55,7 @@ def command_of(parts: Program, lane: Lane, now: Now) -> float:
 
 
 def hold_chambers(parts: Program, lane: Lane) -> None:
-    """What a step is handed by the one before, where there was none; for a locked vane it lasts for all steps."""
+    """Chamber factors (pressure per mass) before the first step; constant for a locked vane."""
     lane.held = pneumatics.held_chambers(lane.plant, lane.state.angle)
 
 
@@ -218,7 +218,7 @@ def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> floa
 
 
 def slide(parts: Program, lane: Lane, now: Now) -> None:
-    """Where the vane comes if it slides on or stays at rest."""
+    """End of the part if the vane slides on or stays at rest."""
     length = length_of(parts, lane)
     parts.gas.add(parts, lane)
     end = time_of(parts, lane, now) + length
@@ -229,7 +229,7 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def depart(parts: Program, lane: Lane) -> None:
-    """Where it comes if it turns or begins to move: few do."""
+    """End of the part if the vane reverses or starts to move: rare."""
     parts.gas.add(parts, lane)
     length = length_of(parts, lane)
     lane.moved = motion.depart_part(lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length)
@@ -343,7 +343,7 @@ def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
 
 
 def sense_end(parts: Program, lane: Lane, now: Now, length: float, taken: bool) -> None:
-    """What late sensors look at in a step or part, at its end, with the states that effects have then.
+    """Delayed sensor readings at the end of a step or part, with the states of the effects.
 
     A signal that is late by a fraction of a step is looked at by that much before its end.
     """

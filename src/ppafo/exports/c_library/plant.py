@@ -26,7 +26,7 @@ from ppafo.walking.preparation import FaultSettings
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """What a plant is given at each step: name, unit, meaning, first value and limits, None for none."""
+    """Input of a plant at each step: name, unit, meaning, initial value and limits, None for none."""
 
     name: str
     unit: str
@@ -59,7 +59,7 @@ class Assignment(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """How a plant is driven from outside: its command, its further inputs, and how its joint moves between two steps.
+    """External drive of a plant: its command, its other inputs, and the motion of its joint within a step.
 
     ``motion`` says the latter in words. ``settings`` of a run become what the first inputs are, ``parameters`` of the
     engine what they are in each step, from ``time`` on for a ``length`` of it [s].
@@ -86,12 +86,12 @@ class PlantAlone:
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """What it is given at each step, the command first."""
+        """Inputs at each step, the command first."""
         return (self.drive.command, *self.drive.inputs)
 
     @property
     def motion(self) -> str:
-        """How the joint moves between two steps, in words."""
+        """Motion of the joint within a step, in words."""
         return self.drive.motion
 
 
@@ -125,7 +125,7 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 @singledispatch
 def _drive_of(_motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
-    """Return how a plant that moves so is driven, within the ranges of its settings by path: here that of a walk."""
+    """External drive of a plant with this motion, within the ranges of its settings by path: here a walk."""
     return Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
 
 

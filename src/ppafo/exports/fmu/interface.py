@@ -1,4 +1,4 @@
-"""What a unit shows of a scenario: the closed loop without inputs, or the plant alone, whose inputs a tool gives."""
+"""Interface of a unit: the closed loop without inputs, or the plant alone, driven by the tool."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ _LOOP_TIME = (
     "The unit goes from sample to sample, <code>run.output_interval</code> apart, and shows the last one that is due. "
     "Any communication step is taken. The run ends at <code>run.duration</code>: a longer one is set before the start."
 )
-"""How the closed loop goes on, for the page of the unit."""
+"""Time stepping of the closed loop, for the page of the unit."""
 _LOOP_TUNING = (
     "The controller takes them at its next sample, the plant one step of the engine later. Of a reference that changes "
     "under way, metrics of ramp and hold keep the times of the first one."
@@ -22,7 +22,7 @@ _PLANT_TIME = (
     "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no end."
 )
-"""How the plant goes on, for the page of the unit; ``motion`` is what its vane does."""
+"""Time stepping of the plant, for the page of the unit; ``motion`` is the motion of its vane."""
 _PLANT_TUNING = "They are taken at the next communication step."
 """When the plant takes a changed parameter, for the page of the unit."""
 
@@ -34,7 +34,7 @@ class Interface:
     ``templates`` are the files of C that move it on, and ``words`` what is filled in there by name. ``hidden`` are the
     paths of settings that are no variables. ``time`` tells people how the unit goes on, ``tuning`` when it takes a
     changed parameter; both are HTML. ``step`` [s] is the usual communication step; where ``is_step_fixed``, others must
-    be multiples of it. ``duration`` [s] is that of the usual experiment. ``clock`` says when the clock of the
+    be multiples of it. ``duration`` [s] is the length of the default experiment. ``clock`` says when the clock of the
     controller ticks, None for a unit without one. ``run`` is a run of Python that it is compared with; a plant's is
     under the command ``EXAMPLE``.
     """
