@@ -86,7 +86,7 @@ LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
 
 
-class Friction(NamedTuple):
+class FrictionTorques(NamedTuple):
     """Sizes of the friction torque [N m]: the largest at rest, and in motion."""
 
     at_rest: float
@@ -142,7 +142,7 @@ class PartSlide(NamedTuple):
     """
 
     torque: float
-    friction: Friction
+    friction: FrictionTorques
     angular_velocity: float
     departs: float
 
@@ -189,16 +189,23 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
     return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
 
 
-def friction_now(plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float) -> Friction:
+def friction_now(
+    plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float
+) -> FrictionTorques:
     """Sizes of friction [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
-    return Friction(
+    return FrictionTorques(
         at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
         in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
     )
 
 
 def depart(
-    plant: PlantParameters, departure: Departure, torque: float, next_torque: float, friction: Friction, step: float
+    plant: PlantParameters,
+    departure: Departure,
+    torque: float,
+    next_torque: float,
+    friction: FrictionTorques,
+    step: float,
 ) -> tuple[float, float]:
     """Angle and angular velocity at the end of a step whose last part begins with ``departure``.
 
