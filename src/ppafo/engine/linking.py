@@ -1,4 +1,4 @@
-"""What a program calls in the place of functions of the model."""
+"""Replacement of model functions in a program by those of its actuator, effects and components."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,10 +13,10 @@ from ppafo.model.valves.kind import valve_problem
 
 
 class Linked(Protocol):
-    """What functions of the model that are called stand for."""
+    """Collector of the functions that replace model functions."""
 
     links: dict[Any, Any]
-    """What stands for others: under a pair of functions for its second inside its first alone.
+    """Replacement of each function; a pair of functions as key replaces the second only inside the first.
 
     Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
     """
@@ -40,11 +40,11 @@ def link_program(program: Program, collector: Linked) -> None:
         of_walk = program.leg.links(program)
         collector.links.update(of_walk)
         collector.effects.update({function: program.leg.ASKED[function] for function in of_walk.values()})
+    followed = CONTROLLED[program.controlled]
     if program.controlled != TORQUE:
-        followed = CONTROLLED[program.controlled]
         collector.links[controlled] = followed.value
-        if followed.sign < 0.0:
-            collector.links[steered] = turned_round
+    if (followed.sign < 0.0) != program.has_vacuum:
+        collector.links[steered] = turned_round
     if not program.effects:
         return
     # Names of rows without any effect: two effects that share a name are refused by the catalogue.

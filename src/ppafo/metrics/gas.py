@@ -14,7 +14,7 @@ from ppafo.signals.meter import NO_ENERGY, NO_GAS, Course, EnergySample, GasSamp
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
-    """What a total, a channel, grows by from the first sample to the last, in its unit, or a function of several."""
+    """Increase of a cumulative channel from the first to the last sample, or a function of several."""
     # A total counts from the start of the run, and a recording may be a part of one.
     gains = [float(recording[channel][-1] - recording[channel][0]) for channel in channels]
     return gains[0] if function is None else float(function(*gains))
@@ -24,6 +24,11 @@ def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: N
     """Supplied less vented less stored gas [kg]; what a simulation loses or invents, near 0 for a sound one."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
     return supplied - vented - (mass_1 + mass_2)
+
+
+def gas_taken(supplied: Numeric) -> Numeric:
+    """Gas [kg] that a source moves: out of a supply, or into one that is a vacuum."""
+    return abs(supplied)
 
 
 def energy_imbalance(supplied: Numeric, vented: Numeric, heat: Numeric, work: Numeric, stored: Numeric) -> Numeric:
@@ -51,7 +56,7 @@ def mechanical_work(recording: Recording) -> float:
 
 def work_per_gas(recording: Recording) -> float | None:
     """Mechanical work per gas taken from the supply [J/kg]; None where none was taken."""
-    gas = gained(recording, ("supplied_mass",))
+    gas = gained(recording, ("supplied_mass",), gas_taken)
     return mechanical_work(recording) / gas if gas > 0.0 else None
 
 
@@ -59,7 +64,7 @@ def gas_per_work(recording: Recording) -> float | None:
     """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
     # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
-    return gained(recording, ("supplied_mass",)) / work if work > 0.0 else None
+    return gained(recording, ("supplied_mass",), gas_taken) / work if work > 0.0 else None
 
 
 class GasGains(NamedTuple):
@@ -171,7 +176,7 @@ def start_work(course: Course, sample: Sample) -> Work:
 
 
 def update_work(state: Work, course: Course, sample: Sample) -> Work:
-    """One interval more, by the trapezoidal rule over the angle."""
+    """Add one interval by the trapezoidal rule over the angle."""
     piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
     return Work(sample.torque, sample.angle, state.work + piece)
 
@@ -181,10 +186,20 @@ WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
 
 
 def ratio(above: Floats, below: Floats) -> Floats:
-    """One over the other; nan where the other is not above 0."""
+    """Quotient; nan if the divisor is not positive."""
     # nan where a recording has None: a column has no other word for it.
     found: Floats = above / choose(below > 0.0, below, math.nan)
     return found
+
+
+def per_gas(work: Floats, supplied: Floats) -> Floats:
+    """Work [J] per gas [kg] that a source moves; nan where there is none."""
+    return ratio(work, gas_taken(supplied))
+
+
+def of_gas(supplied: Floats, work: Floats) -> Floats:
+    """Gas [kg] that a source moves per work [J]; nan where that is not above 0."""
+    return ratio(gas_taken(supplied), work)
 
 
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
@@ -202,15 +217,15 @@ def _of_gains(
     function: PlainFunction | None = None,
     meter: MeterKind = GAS,
 ) -> MetricKind:
-    """What a total has grown by, or a function of what several have."""
+    """Metric of the increase of a total, or of a function of several."""
     compute = partial(gained, channels=channels, function=function)
     places = tuple(f"meters.{meter.name}.gained.{channel}" for channel in channels)
     return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,))
 
 
 METRICS = (
-    _of_gains("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",)),
-    _of_gains("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",)),
+    _of_gains("gas_supplied", "kg", "gas taken from the supply, or by a vacuum", ("supplied_mass",), gas_taken),
+    _of_gains("gas_vented", "kg", "gas let out to the atmosphere, below 0 let in", ("vented_mass",)),
     _of_gains("gas_leaked", "kg", "gas leaked from chamber to chamber, in either direction", ("leaked_mass",)),
     _of_gains("gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance),
     _of_gains(
@@ -254,7 +269,7 @@ METRICS = (
         "work per supplied gas",
         _EFFORT,
         work_per_gas,
-        ReadAt(("meters.work.work", "meters.gas.gained.supplied_mass"), ratio),
+        ReadAt(("meters.work.work", "meters.gas.gained.supplied_mass"), per_gas),
         (WORK, GAS),
     ),
     MetricKind(
@@ -263,7 +278,7 @@ METRICS = (
         "supplied gas per work",
         _EFFORT,
         gas_per_work,
-        ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), ratio),
+        ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), of_gas),
         (WORK, GAS),
     ),
 )

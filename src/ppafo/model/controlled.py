@@ -1,4 +1,4 @@
-"""What a law controls: the torque of the actuator, the angle, the pressure in a chamber or the difference of both.
+"""Controlled quantity of a law: torque of the actuator, angle, pressure in a chamber, or pressure difference.
 
 ``controlled`` and ``steered`` are ports: a program whose reference is no torque has the functions of its entry in the
 table in their place. To add one: a function and a line of ``CONTROLLED``.
@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from ppafo.model.columns import larger, smaller
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 from ppafo.signals.meter import Sample
@@ -52,7 +53,7 @@ def turned_round(error: float) -> float:
 
 
 def seen_value(measurement: Measurement) -> float:
-    """What the sensors show of what is controlled, in the unit of the reference."""
+    """Controlled quantity as measured, in the unit of the reference."""
     return controlled(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
 
 
@@ -62,7 +63,7 @@ def seen_error(reference: float, measurement: Measurement) -> float:
 
 
 def value_in(sample: Sample) -> float:
-    """What is controlled, at a sample, in the unit of the reference."""
+    """Controlled quantity at a sample, in the unit of the reference."""
     return controlled(sample.angle, sample.pressure_1, sample.pressure_2, sample.torque)
 
 
@@ -83,18 +84,23 @@ def stops(ends: Ends) -> tuple[Any, Any]:
 
 def reach_of_pressure_1(ends: Ends) -> tuple[Any, Any]:
     """Between which pressures [Pa] a valve brings chamber 1: it is fed, or vented."""
-    return ends.atmospheric_pressure, ends.supply_pressure
+    return _in_order(ends.atmospheric_pressure, ends.supply_pressure)
 
 
 def reach_of_pressure_2(ends: Ends) -> tuple[Any, Any]:
     """Between which pressures [Pa] a valve brings chamber 2."""
-    return ends.atmospheric_pressure, ends.dorsiflexion_pressure
+    return _in_order(ends.atmospheric_pressure, ends.dorsiflexion_pressure)
 
 
 def reach_of_difference(ends: Ends) -> tuple[Any, Any]:
     """Between which differences of pressure [Pa] a valve brings both: one is full while the other one is vented."""
     room = ends.atmospheric_pressure
-    return room - ends.dorsiflexion_pressure, ends.supply_pressure - room
+    return _in_order(room - ends.dorsiflexion_pressure, ends.supply_pressure - room)
+
+
+def _in_order(one: Any, other: Any) -> tuple[Any, Any]:
+    """Return the lower and the higher end of a range; a vacuum is below the atmosphere."""
+    return smaller(one, other), larger(one, other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +110,8 @@ class Controlled:
     ``words`` name it in a sentence, ``level`` declares a value of it, ``difference`` is the unit of a difference of two
     values. ``value(angle, pressure_1, pressure_2, torque)`` gives it of what sensors show. ``size`` is about as much of
     it as 1 N m is of a torque: the ranges of gains are scaled by it. A command above 0 raises it, or lowers it where
-    ``sign`` is -1. ``reach`` says between what it can be, called ``limits`` in a sentence; None of a torque, which
-    depends on what moves the joint.
+    ``sign`` is -1; the other way round where the supplies are below the atmosphere. ``reach`` says between
+    what it can be, called ``limits`` in a sentence; None of a torque, which depends on what moves the joint.
     """
 
     name: str
@@ -120,7 +126,7 @@ class Controlled:
 
     @property
     def channel(self) -> str:
-        """Its channel in a recording; the one of a difference of pressures is recorded where it is controlled."""
+        """Channel of the quantity in a recording; a pressure difference is recorded only if it is controlled."""
         return self.name
 
     @property
@@ -204,7 +210,7 @@ CONTROLLED: dict[str, Controlled] = {
         ),
     )
 }
-"""What a reference can be of, by the word that a file has in ``reference.of``."""
+"""Controlled quantities, by the word that a file has in ``reference.of``."""
 
 ANYTHING = tuple(CONTROLLED)
-"""What a law can follow that acts on the error alone."""
+"""Controlled quantities of a law that acts on the error alone: all."""

@@ -1,4 +1,4 @@
-"""What a device is, in SI units: plain frozen values that the rest of the package computes with."""
+"""Device in SI units: plain frozen values with which the rest of the package computes."""
 
 import math
 from collections.abc import Mapping
@@ -122,7 +122,7 @@ class Friction:
 
 @dataclass(frozen=True, slots=True)
 class FootPlate:
-    """What the vane moves: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
+    """Foot plate: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
 
     inertia: Annotated[
         float, Number("kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False)
@@ -136,7 +136,8 @@ class FootPlate:
 class Supply:
     """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere.
 
-    ``relieving`` is True where the regulators take gas back from a chamber above their pressure.
+    ``relieving`` is True where the regulators take gas back from a chamber above their pressure. A supply below the
+    atmosphere is a vacuum, into which the gas of a chamber goes.
     """
 
     pressure: Annotated[float, Number("Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8)]
@@ -148,9 +149,19 @@ class Supply:
 
     @property
     def has_one_pressure(self) -> bool:
-        """Whether both regulators are set to one pressure, so that a change of the first is one of both."""
+        """Tell whether both regulators are set to one pressure, so that they are changed together."""
         # Two texts of one pressure in two units differ in the last bits.
         return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
+
+    @property
+    def is_vacuum(self) -> bool:
+        """True where a supply is below the atmosphere; of an ensemble the first run says it for all."""
+        return min(first(self.pressure), first(self.dorsiflexion_pressure)) < first(self.atmospheric_pressure)
+
+    @property
+    def takes_back(self) -> bool:
+        """True where gas may flow from a chamber into its supply."""
+        return self.relieving or self.is_vacuum
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +183,7 @@ class Valve:
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """How flow is computed: the pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
+    """Computation of flow: pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
 
     linear_ratio: Annotated[
         float, Number("", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999)
@@ -211,6 +222,15 @@ class Device:
     def has_torque_constant(self) -> bool:
         """True where the torque is a constant times the difference of both pressures."""
         return ACTUATORS[self.actuator.kind].model.has_torque_constant
+
+    def check_pressurised(self, what: str, remedy: str = "") -> None:
+        """Raise ParameterError, with a remedy, where ``what`` needs supplies that are not below the atmosphere."""
+        if self.supply.is_vacuum:
+            raise ParameterError(
+                f"{what} needs a supply above the atmosphere; '{self.name}' has a vacuum: supply.pressure = "
+                f"{first(self.supply.pressure) / 1e3:.4g} kPa_a, supply.dorsiflexion_pressure = "
+                f"{first(self.supply.dorsiflexion_pressure) / 1e3:.4g} kPa_a{remedy}"
+            )
 
     def check_torque_constant(self, what: str) -> None:
         """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""

@@ -1,4 +1,4 @@
-"""From a device to the numbers that the plant and its effects compute with."""
+"""Numbers of the plant and its effects, computed from a device."""
 
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -80,6 +80,7 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
     ratio = device.flow.linear_ratio
     valve = restriction(device.valve.orifice, device.gas, ratio)
     plant = plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
+    plant = plant._replace(relieving=float(device.supply.takes_back))
     if ACTUATORS[device.actuator.kind].model.shape is None:
         return plant
     return cast(
@@ -135,7 +136,7 @@ def plant_with(device: Device, valve: Restriction, leak: Restriction, external_t
 
 
 SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
-"""What ``prepare`` of an effect sees of a device; an exported library has these sections in C."""
+"""Sections of a device that ``prepare`` of an effect may read; an exported library has them in C."""
 
 
 Sections = Mapping[str, Any]

@@ -1,4 +1,4 @@
-"""In which unit a person is shown a quantity or a metric: the only table of it. Files and data stay in SI.
+"""Display units of quantities and metrics: the only table of them. Files and data stay in SI.
 
 Where a parameter set writes pressures, torques, angles or flows in other units, those of the set take the place of the
 table's (``units/shown.py``).
@@ -79,7 +79,7 @@ _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
 """Units that an axis writes in a form of their own."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
-"""What an axis writes for the end of a unit of pressure."""
+"""Words on an axis for the ending of a pressure unit."""
 _METRIC = ".4g"
 """Digits of a metric."""
 

@@ -1,4 +1,4 @@
-"""What a number is: its words, its unit in SI, how people are shown it. Declared once for text, tables and axes."""
+"""Kind of a number: its words, SI unit and display form, declared once for text, tables and axes."""
 
 from dataclasses import dataclass
 
@@ -39,9 +39,9 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a number is: its words, unit in SI, quantity (``display_units.QUANTITIES``; else shown in SI), and form.
+    """Kind of a number: words, SI unit, quantity (``display_units.QUANTITIES``; else shown in SI), and form.
 
-    ``zero`` [Pa absolute] is from where a gauge pressure counts, None for the atmosphere of the device.
+    ``zero`` [Pa absolute] is the pressure from which gauge ones count, None for the atmosphere of the device.
     """
 
     words: str = ""

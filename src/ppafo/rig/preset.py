@@ -205,7 +205,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One experiment to be done: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
+    """Experiment to be run: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
 
     preset: Preset
     seed: int
@@ -231,7 +231,9 @@ def real_device(device: Device, preset: Preset) -> Device:
     """Return the device as it stands on the rig: the valve with its dynamics, the leak of its seals.
 
     ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
+    So for one on a vacuum: its supplies are regulators.
     """
+    device.check_pressurised("the simulated bench", "; take the recording of a simulated run")
     for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
         zeros = {quantity.name: f"0 {quantity.unit}".strip() for quantity in effect.quantities}
         off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)
@@ -345,7 +347,7 @@ _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """One sensor at work: offset that was drawn, step of quantisation, and the noise of every sample to come."""
+    """Sensor of a run: its offset, its quantisation step, and the noise of every sample to come."""
 
     offset: float
     resolution: float

@@ -21,7 +21,7 @@ TIME_UNIT = "s"
 PLAIN_NUMBER = "-"
 
 Between = Literal["hold", "linear"]
-"""What a channel does between two samples: it keeps the earlier value, or runs straight from one to the other."""
+"""Interpolation of a channel between two samples: previous value, or linear."""
 BETWEEN: tuple[Between, ...] = get_args(Between)
 
 
@@ -51,7 +51,7 @@ CHANNELS: dict[str, ChannelKind] = {
         "Pa_d", "pressure in chamber 1 minus that in chamber 2, as requested of the controller"
     ),
     "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1; 2 vents both chambers", is_held=True),
-    "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
+    "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start, below 0 into a vacuum"),
     "vented_mass": ChannelKind("kg", "gas vented to the atmosphere since the start"),
     "leaked_mass": ChannelKind(
         "kg", "gas from chamber to chamber, leaked or through a valve, either way, since the start"
@@ -118,13 +118,13 @@ CHANNELS: dict[str, ChannelKind] = {
     "direction": ChannelKind(PLAIN_NUMBER, "1 while the pressure rises, -1 while it falls", is_held=True),
     "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),
 }
-"""To add one: one line here. A recording may also have channels that are not listed."""
+"""Known channels. To add one: one line here. A recording may also have channels that are not listed."""
 
 
 Floats = NDArray[np.float64]
 
 RecordingKind = Literal["measured", "simulated", "synthetic"]
-"""Where a recording comes from: sensors, a model's own output, or the simulated bench that stands in for sensors."""
+"""Origin of a recording: sensors, the output of a model, or the simulated test bench."""
 
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)

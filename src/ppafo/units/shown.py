@@ -1,4 +1,4 @@
-"""In which units a person is shown numbers: those in which the author of a parameter set wrote them.
+"""Display units of numbers: the units in which the author of a parameter set wrote them.
 
 Gauge pressures count from the atmosphere of the device of which they are. It stands beside the units, so that text,
 tables and axes have one zero, and so do saved results, which keep both as ``shown``. Outside of ``shown_in`` the

@@ -1,4 +1,4 @@
-"""What single cause would explain recordings of which a model leaves more than noise.
+"""Single cause that would explain recordings with more than noise left by the model.
 
 A cause is a model of a sensor, y = h(model; a) + e, or another number of the set. Causes are tried in stages, from what
 the samples themselves show to what a device may have and the model has not; the first stage that explains all
@@ -34,7 +34,7 @@ _TIMES = {
 """Rate of a clock whose times were read in a wrong unit, and the right one."""
 
 _LESS = 0.5
-"""What is left of an error beyond its limit at most, where times in another unit explain it."""
+"""Largest fraction of an error beyond its limit that may remain if times in another unit explain it [-]."""
 
 _SHORT_INTERVAL = 2.0e-5
 """Interval of samples [s] up to which times may be seconds read as milliseconds: from fifty samples a second on."""
@@ -48,7 +48,7 @@ _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One cause: its name, what it seems to be in words, and by how much G [-] it explains more than none.
+    """Cause: its name, its description in words, and its gain G [-] in explained error.
 
     ``left`` is the largest error over noise [-] of any channel with it. ``numbers`` are the numbers of the set that it
     changes, by path, each with its SI unit. ``same`` are those that the recordings cannot tell from it, ``is_usual``
@@ -108,7 +108,7 @@ def causes_of(
         # That no change explains the recordings would say too much.
         return _explained(search, none, tried, explaining, []) if explaining else Causes()
     names = set.intersection(*(set(measured.recording.names) for measured in read))
-    moving = _moving(agreements, device)
+    units = _units_of_moving(read, agreements, device)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
     sized = [*sizes(device, names), *numbers(read[0], device, settings)]
     first = [_samples(records), _motions(records, settings)]
@@ -123,7 +123,7 @@ def causes_of(
             return Causes(errors, None, len(tried) + len(of_bench))
 
         def stages() -> Iterator[list[Tried]]:
-            yield search.compared(list(exchanges(device, names, moving)), none)
+            yield search.compared(list(exchanges(device, names, units)), none)
             yield of_bench + search.compared([candidate for candidate in sized if not candidate.usual], none)
             yield search.compared(list(effects(device)), none)
 
@@ -140,16 +140,23 @@ def causes_of(
     return Causes() if nearest is None else Causes(None, _cause_of([nearest], search.penalty), len(tried))
 
 
-def _moving(agreements: Sequence[RecordingAgreement], device: Device) -> set[str]:
-    """Return the channels that part from the atmosphere, measured or in the model, by more than a usual zero."""
+def _units_of_moving(
+    read: Sequence[Measured], agreements: Sequence[RecordingAgreement], device: Device
+) -> dict[str, set[str]]:
+    """Return the units that files declare of channels, empty for none, by channel.
+
+    Only of those that part from the atmosphere, measured or in the model, by more than a usual zero.
+    """
     atmosphere = device.supply.atmospheric_pressure
-    return {
+    moving = {
         name
         for agreement in agreements
         for recording in (agreement.measured, agreement.model)
         for name in recording.names
         if float(np.abs(recording[name] - atmosphere).max()) > usual_errors(name).zero
     }
+    recordings = [measured.recording for measured in read]
+    return {name: {one.channels[name].stated for one in recordings if name in one} for name in moving}
 
 
 def _tried_in_turn(stages: Iterable[Sequence[Tried]]) -> tuple[list[Tried], list[Tried]]:

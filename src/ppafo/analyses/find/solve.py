@@ -35,7 +35,7 @@ _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
 class Search:
-    """What was tried so far: values, the metric of each and its standard deviation over the noise, in that order."""
+    """Values tried so far, the metric of each, and its standard deviation over the noise, in order of trial."""
 
     def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
         self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
@@ -158,7 +158,7 @@ class Outcome:
 
     @property
     def changes(self) -> int:
-        """How often the condition begins or ceases to be met along the values."""
+        """Number of times that the condition starts or ceases to be met along the values."""
         return int(np.count_nonzero(np.diff(self.is_met)))
 
     @property

@@ -35,7 +35,7 @@ from ppafo.study.runs import FAILED, Runs, oscillating, settled
 _ANGLES = 9
 """Angles between the stops at which the torque of a joint that moves is looked for."""
 UNUSABLE = 1.0e12
-"""Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
+"""Lowest cost of a candidate with a failed run; the fraction of failed runs is added."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Judgement:
 
     @property
     def cost(self) -> Floats:
-        """One number by which candidates are compared."""
+        """Cost by which candidates are ranked."""
         # Deb's rules in one number, since SciPy compares nothing else.
         usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
@@ -84,6 +84,8 @@ def shortfall(scenario: Scenario) -> Floats:
     angles = [first + fraction * travel for fraction in fractions]
     highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
     lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
+    if supply.is_vacuum:
+        highest, lowest = lowest, highest
     least, most = profile_bounds(scenario.reference)
     above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
     return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))

@@ -1,4 +1,4 @@
-"""One step of both chambers: two-stage L-stable Rosenbrock method on the two masses.
+"""Step of both chambers: two-stage L-stable Rosenbrock method on the two masses.
 
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
 the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
@@ -138,7 +138,7 @@ MINIMUM_PRESSURE = 0.02
 
 
 class GasChange(NamedTuple):
-    """What one step adds to both chambers, to the gas drawn from the source and to the vane leak (1 to 2) [kg]."""
+    """Change over one step of both chambers, of the gas drawn from the source and of the vane leak (1 to 2) [kg]."""
 
     mass_1: float
     mass_2: float
@@ -435,9 +435,10 @@ def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
 
 
 def supply_range(plant: PlantParameters) -> float:
-    """Pressure [Pa] of the higher supply over the atmosphere, not less than a fraction of the latter."""
-    supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
-    return max(supplied, MINIMUM_PRESSURE * plant.atmospheric_pressure)
+    """Pressure [Pa] between the atmosphere and the supply farther from it, not less than a fraction of the former."""
+    room = plant.atmospheric_pressure
+    supplied = max(abs(plant.supply_pressure - room), abs(plant.dorsiflexion_pressure - room))
+    return max(supplied, MINIMUM_PRESSURE * room)
 
 
 # Found by trying: with fewer steps for a filling the error of a plain step passes 1e-3 (docs/decisions/0002).
