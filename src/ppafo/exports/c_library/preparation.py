@@ -183,7 +183,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane["supply"] = parts.section("supply", "relieving")(
         *(getattr(settings, name) for name in parts.names("supply")),
         # Lines have a check valve of their own, so that the valve may push gas back into them.
-        float(parts.device.supply.relieving or parts.scenario.supply_lines is not None),
+        float(parts.device.supply.takes_back or parts.scenario.supply_lines is not None),
     )
     lane.device = parts.row("Device", SEEN_BY_EFFECTS)(*(lane[section] for section in SEEN_BY_EFFECTS))
     for section, orifice in (("valve", "valve"), ("leak", "actuator.leak")):
