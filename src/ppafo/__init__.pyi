@@ -1,4 +1,5 @@
 # Written by scripts/public_api.py
+
 from ppafo.analyses.compare.question import compare as compare
 from ppafo.analyses.design.loading import load_design as load_design
 from ppafo.analyses.design.profile.answer import Sizing as Sizing

@@ -10,7 +10,7 @@ from typing import Any
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
 from ppafo.engine.program import Program
-from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, uses_of_group
+from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
 from ppafo.engine.source_text import (
     Composer,
     RewrittenNames,
@@ -131,6 +131,21 @@ class StepText:
                 f"'{name}': handed(CLASS) among its groups, with CLASS float or a NamedTuple"
             )
         return refusal(function.__code__.co_filename, node, problem)
+
+    def joined(self, functions: Sequence[PlainFunction], parts: Any, takes: Sequence[str]) -> list[ast.stmt]:
+        """Statements of functions one after another, as one function of the parameters ``takes`` has them.
+
+        Their groups are names in it. The ``parts`` that they know are not those of the step.
+        """
+        plain = [function for function in functions if isinstance(function, FunctionType)]
+        reduced = [(function, Reduction(self, function, {"parts": parts}).reduced()) for function in plain]
+        local = {name.id for _, tree in reduced for name in names_in(tree) if isinstance(name.ctx, ast.Store)}
+        found: list[ast.stmt] = []
+        for function, tree in reduced:
+            check_grammar(tree, function.__code__.co_filename)
+            composer = self.composer(function, RewrittenNames(frozenset([*local, *takes]), self.kept, {}))
+            found += [composer.visit(statement) for statement in tree.body]
+        return found
 
     def composer(self, function: FunctionType, names: RewrittenNames) -> Composer:
         """Composer of a reduced function of the step: replaces names that are defined outside it."""

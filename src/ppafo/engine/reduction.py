@@ -19,7 +19,7 @@ from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
 from ppafo.engine.plain_python import parse_module, refusal
-from ppafo.engine.rows import is_number, is_row, members
+from ppafo.engine.rows import is_number, is_row, members, rebuilt
 from ppafo.engine.source_text import is_step_function
 from ppafo.errors import ProgramError
 
@@ -362,6 +362,8 @@ class Reduction:
         if called is getattr:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
+        if called is rebuilt:
+            return self.row_of(self.outside(node.args[0]), self.arguments(ast.Starred(node.args[1])))
         if is_step_function(called):
             name, arguments = self.called(called, node)
             if self.collector.effects_of(name).results:
@@ -562,29 +564,38 @@ class Reduction:
 
     def number_by_number(self, row: Any, choice: ast.IfExp) -> ast.expr:
         """A choice between two rows as the row of the choices between their numbers: no branch, by any compiler."""
+        pairs = zip(self.numbers_of(row, choice.body), self.numbers_of(row, choice.orelse), strict=True)
+        return self.row_of(row, (ast.IfExp(choice.test, yes, other) for yes, other in pairs))
 
-        def chosen(kind: Any, yes: ast.expr, other: ast.expr) -> ast.expr:
-            if is_number(kind):
-                return ast.IfExp(choice.test, yes, other)
-            inner = [chosen(inside, part_of(yes, way), part_of(other, way)) for way, inside in members(kind)]
-            if not is_row(kind) or not inner:
-                return ast.Tuple([*inner], ast.Load())
-            return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
+    def row_of(self, kind: Any, numbers: Iterator[ast.expr]) -> ast.expr:
+        """A row, nested or not, of the next of some numbers, as ``rebuilt`` makes it."""
+        if is_number(kind):
+            return next(numbers)
+        inner = [self.row_of(inside, numbers) for _, inside in members(kind)]
+        if not is_row(kind) or not inner:
+            return ast.Tuple([*inner], ast.Load())
+        return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
 
-        def part_of(owner: ast.expr, way: str) -> ast.expr:
-            key = int(way[1:-1]) if way[0] == "[" else way[1:]
-            if isinstance(owner, ast.Name):
-                try:
-                    value = self.collector.value_kept(owner.id)
-                except KeyError:
-                    pass
-                else:
-                    return self.written(value[key] if isinstance(key, int) else getattr(value, key))
-            if isinstance(key, int):
-                return ast.Subscript(owner, ast.Constant(key), ast.Load())
-            return ast.Attribute(owner, key, ast.Load())
+    def numbers_of(self, kind: Any, row: ast.expr) -> Iterator[ast.expr]:
+        """Expressions of the numbers of a row, nested or not, in their order."""
+        if is_number(kind):
+            yield row
+        for way, inside in members(kind):
+            yield from self.numbers_of(inside, self.part_of(row, way))
 
-        return chosen(row, choice.body, choice.orelse)
+    def part_of(self, owner: ast.expr, way: str) -> ast.expr:
+        """A field or an item of a row; of one that is known it is known."""
+        key = int(way[1:-1]) if way[0] == "[" else way[1:]
+        if isinstance(owner, ast.Name):
+            try:
+                value = self.collector.value_kept(owner.id)
+            except KeyError:
+                pass
+            else:
+                return self.written(value[key] if isinstance(key, int) else getattr(value, key))
+        if isinstance(key, int):
+            return ast.Subscript(owner, ast.Constant(key), ast.Load())
+        return ast.Attribute(owner, key, ast.Load())
 
     def call_that_sets(self, node: ast.Call) -> list[ast.stmt]:
         """A call of a function that sets groups of its lane: these get what it returns."""

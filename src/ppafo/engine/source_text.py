@@ -352,7 +352,7 @@ class Composer(ast.NodeTransformer):
             return ast.UnaryOp(ast.USub(), ast.Constant(-value))
         if type(value) in (bool, int):
             return ast.Constant(value)
-        if type(value) is tuple:
+        if type(value) is tuple or value == ():  # a row without numbers is no struct
             return ast.Tuple([self.literal(inner, where, name) for inner in value], ast.Load())
         if is_row(type(value)):
             fields = [self.literal(inner, where, name) for inner in value]

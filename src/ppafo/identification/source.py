@@ -49,9 +49,12 @@ class RecordingSource:
         return self.reference or self.recording.label
 
 
-def source_of(path: Path, recording: Recording) -> RecordingSource:
-    """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone."""
-    return RecordingSource(recording, f"{path.name} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
+def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSource:
+    """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone.
+
+    ``trial`` stands behind the name where the file has several recordings.
+    """
+    return RecordingSource(recording, f"{path.name}{trial} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
 
 
 @dataclass(frozen=True, slots=True)

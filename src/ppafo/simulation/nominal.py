@@ -153,7 +153,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Link
             device, VALVE, LinkFunction(_GAS[1:2], critical_pressure_ratio), LinkFunction(SONIC_PATHS[VALVE][1:])
         ),
         # Not a number that varies: the source is there because a term needs one.
-        "relieving": LinkFunction(_ANY, yes if device.supply.relieving else no),
+        "relieving": LinkFunction(_ANY, yes if device.supply.takes_back else no),
         "pair": LinkFunction(_ANY, yes if is_pair else no),
         "delay": LinkFunction(("valve.delay",)) if valve.kind == _SPOOL else LinkFunction(_ANY, no),
         "lag": LinkFunction(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
