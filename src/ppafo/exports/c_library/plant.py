@@ -74,7 +74,7 @@ class Drive:
 class PlantAlone:
     """A plant that is driven from outside: its library, its drive, and the step [s] of the inputs.
 
-    ``clock`` is the path of the setting that is this step: the one of the engine, or where the plant has parts that go by
+    ``clock`` is the path of the setting that is this step: the engine step, or where the plant has parts that go by
     the samples of a controller, the time between these. ``hidden`` are the paths of the settings without effect,
     because inputs replace them.
     """
