@@ -9,6 +9,7 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.catalog import ACTUATORS
+from ppafo.model.columns import first
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
@@ -134,7 +135,8 @@ class FootPlate:
 class Supply:
     """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere.
 
-    ``relieving`` is True where the regulators take gas back from a chamber above their pressure.
+    ``relieving`` is True where the regulators take gas back from a chamber above their pressure. A supply below the
+    atmosphere is a vacuum, into which the gas of a chamber goes.
     """
 
     pressure: Annotated[float, Number("Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8)]
@@ -149,6 +151,16 @@ class Supply:
         """Tell whether both regulators are set to one pressure, so that they are changed together."""
         # Two texts of one pressure in two units differ in the last bits.
         return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
+
+    @property
+    def is_vacuum(self) -> bool:
+        """True where a supply is below the atmosphere; of an ensemble the first run says it for all."""
+        return min(first(self.pressure), first(self.dorsiflexion_pressure)) < first(self.atmospheric_pressure)
+
+    @property
+    def takes_back(self) -> bool:
+        """True where gas may flow from a chamber into its supply."""
+        return self.relieving or self.is_vacuum
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,6 +216,15 @@ class Device:
     def has_torque_constant(self) -> bool:
         """True where the torque is a constant times the difference of both pressures."""
         return ACTUATORS[self.actuator.kind].model.has_torque_constant
+
+    def check_pressurised(self, what: str, remedy: str = "") -> None:
+        """Raise ParameterError, with a remedy, where ``what`` needs supplies that are not below the atmosphere."""
+        if self.supply.is_vacuum:
+            raise ParameterError(
+                f"{what} needs a supply above the atmosphere; '{self.name}' has a vacuum: supply.pressure = "
+                f"{first(self.supply.pressure) / 1e3:.4g} kPa_a, supply.dorsiflexion_pressure = "
+                f"{first(self.supply.dorsiflexion_pressure) / 1e3:.4g} kPa_a{remedy}"
+            )
 
     def check_torque_constant(self, what: str) -> None:
         """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""

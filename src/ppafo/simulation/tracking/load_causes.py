@@ -5,7 +5,8 @@ import numpy as np
 from ppafo.metrics.metric import Floats, followed
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
-from ppafo.parameters.reach import static_torque, supply_for, torque_reach
+from ppafo.parameters.graph import PRESSURE_PATH
+from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, Cause
@@ -34,7 +35,7 @@ def torque_beyond_reach(case: Case) -> Cause | None:
     lowest, highest = torque_reach(scenario.device, there)
     if lowest <= wanted <= highest:
         return None
-    reach, supply = (highest, "supply.pressure") if wanted > highest else (lowest, "supply.dorsiflexion_pressure")
+    reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
     text = (
         f"at {level_text('rad', there, scenario)} and {level_text('Pa', number_at(scenario, supply), scenario)} the "
         f"actuator gives {level_text('N m', reach, scenario)} at most"
@@ -64,7 +65,7 @@ def load_beyond_reach(case: Case) -> Cause | None:
     needed_torque = load if not is_within else load + holding if is_high else load - holding
     if lowest <= needed_torque <= highest:
         return None
-    reach, supply = (highest, "supply.pressure") if is_high else (lowest, "supply.dorsiflexion_pressure")
+    reach, supply = highest if is_high else lowest, supply_that_moves(device, is_high)
     stop = stop_of(scenario, angle)
     rests = f"the joint lies on its {stop} stop: " if stop else ""
     works, gives = (level_text("N m", torque, scenario) for torque in (needed_torque, reach))
@@ -120,6 +121,7 @@ def flung_at_start(case: Case) -> Cause | None:
     )
     pressures = {"initial.pressure_1": room, "initial.pressure_2": room}
     if needed is not None:
-        pressures["initial.pressure_1" if load > own(start, room, room) else "initial.pressure_2"] = needed
+        is_first = supply_that_moves(device, load > own(start, room, room)) == PRESSURE_PATH
+        pressures["initial.pressure_1" if is_first else "initial.pressure_2"] = needed
     remedies = [] if needed is None else [remedy(scenario, pressures)]
     return Cause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")
