@@ -27,7 +27,7 @@ from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, c
 from ppafo.progress import Report, report_nothing
 from ppafo.storage.foreign import read_trials
 from ppafo.storage.result_folder import read_recording
-from ppafo.units.shown import shown_in
+from ppafo.units.shown import counted_from, shown_in
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
@@ -38,7 +38,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     """
     given = _Given(problem, folder, file)
     before = _base_set(problem, folder)
-    with shown_in(before.shown):
+    with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, problem.device.valve)
         tasks = _tasks(given, before)
         used = _uses(tasks, before, valve, file)

@@ -37,8 +37,8 @@ def torque_beyond_reach(case: Case) -> Cause | None:
         return None
     reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
     text = (
-        f"at {level_text('rad', there, scenario)} and {level_text('Pa', number_at(scenario, supply), scenario)} the "
-        f"actuator gives {level_text('N m', reach, scenario)} at most"
+        f"at {level_text('rad', there)} and {level_text('Pa', number_at(scenario, supply))} the "
+        f"actuator gives {level_text('N m', reach)} at most"
     )
     remedies = []
     needed = supply_for(scenario.device, there, 1.05 * wanted)
@@ -68,12 +68,9 @@ def load_beyond_reach(case: Case) -> Cause | None:
     reach, supply = highest if is_high else lowest, supply_that_moves(device, is_high)
     stop = stop_of(scenario, angle)
     rests = f"the joint lies on its {stop} stop: " if stop else ""
-    works, gives = (level_text("N m", torque, scenario) for torque in (needed_torque, reach))
-    against = "" if not is_within else f" to break its static friction of {level_text('N m', holding, scenario)}"
-    text = (
-        f"{rests}it needs {works} at {level_text('rad', wanted, scenario)}{against}, where the actuator gives {gives} "
-        "at most"
-    )
+    works, gives = (level_text("N m", torque) for torque in (needed_torque, reach))
+    against = "" if not is_within else f" to break its static friction of {level_text('N m', holding)}"
+    text = f"{rests}it needs {works} at {level_text('rad', wanted)}{against}, where the actuator gives {gives} at most"
     needed = supply_for(device, wanted, 1.3 * needed_torque)
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
     advice = ""
@@ -115,8 +112,8 @@ def flung_at_start(case: Case) -> Cause | None:
     room = float(device.supply.atmospheric_pressure)
     needed = supply_for(device, start, load)
     text = (
-        f"at the start its chambers give {level_text('N m', load - lacking, scenario)} for a load of "
-        f"{level_text('N m', load, scenario)}: the joint is flung {change_text(ANGLE, flung)} away before "
+        f"at the start its chambers give {level_text('N m', load - lacking)} for a load of "
+        f"{level_text('N m', load)}: the joint is flung {change_text(ANGLE, flung)} away before "
         "they are filled"
     )
     pressures = {"initial.pressure_1": room, "initial.pressure_2": room}
