@@ -117,7 +117,7 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons why the run is of little use, a sentence each: a coarse pair of valves, a loop that misses its target."""
+        """Reasons why the run is of little use, a sentence each: coarse valves, a loop that misses its reference."""
         from ppafo.simulation.tracking.pair_step import coarse_pair
 
         verdict = self.tracking
