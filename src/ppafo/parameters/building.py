@@ -86,7 +86,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
             for effect in sorted(named_effects)
         },
         links=links,
-        shown=parameter_set.shown,
+        units=parameter_set.shown,
     )
     is_beyond, line = beyond_pressures(device)
     if is_beyond:

@@ -13,7 +13,8 @@ from ppafo.model.columns import first
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
+from ppafo.units.shown import counted_from
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -195,7 +196,7 @@ class Device:
 
     ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
     ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
-    ``shown`` are the units, by unit in SI, in which a person is shown its numbers.
+    ``units`` are those, by unit in SI, in which the author of its parameter set writes.
     """
 
     name: str
@@ -209,8 +210,13 @@ class Device:
     valve_name: str
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
-    joint: Joint = ANKLE
-    shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    joint: JointNames = ANKLE
+    units: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """The units in which a person is shown its numbers, and the atmosphere from which gauge pressures count."""
+        return counted_from(self.units, first(self.supply.atmospheric_pressure))
 
     @property
     def has_torque_constant(self) -> bool:

@@ -11,23 +11,22 @@ from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import (
     PROCEDURES,
     ProblemFile,
+    ProcedureContext,
     ProcedureProblem,
-    Setting,
     run_procedure,
     window_of,
 )
-from ppafo.identification.source import Source, Use, double_use, source_of
+from ppafo.identification.source import RecordingSource, Use, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
-from ppafo.identification.trajectory.section import Setting as FitSetting
-from ppafo.identification.trajectory.section import solve_section
+from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
-from ppafo.storage.foreign import read_foreign
+from ppafo.storage.foreign import read_trials
 from ppafo.storage.result_folder import read_recording
-from ppafo.units.shown import shown_in
+from ppafo.units.shown import counted_from, shown_in
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
@@ -38,21 +37,23 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     """
     given = _Given(problem, folder, file)
     before = _base_set(problem, folder)
-    with shown_in(before.shown):
+    with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, problem.device.valve)
         tasks = _tasks(given, before)
         used = _uses(tasks, before, valve, file)
         tolerances = tolerances_of(problem.bench, file)
         current, results = before, list[BenchResult]()
         for task in tasks:
-            result = run_procedure(task.sources, task.procedure, Setting(current, valve, task.place, tolerances))
+            result = run_procedure(
+                task.sources, task.procedure, ProcedureContext(current, valve, task.place, tolerances)
+            )
             results.append(result)
             # The next procedure leans on what this one found; the new set is made of the old one at the end.
             current = with_estimates(current, result.estimates).parameter_set
         estimates = [estimate for result in results for estimate in result.estimates]
         fitted = None
         if problem.trajectory is not None:
-            setting = FitSetting(
+            setting = SectionContext(
                 read=lambda experiment: given.source(experiment.recording, experiment.columns, current),
                 folder=folder,
                 file=f"{file}: trajectory",
@@ -78,8 +79,17 @@ class _Given:
     folder: Path
     file: str
 
-    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> Source:
-        """Return the recording that the problem names, read through one of its column maps where it says one.
+    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> RecordingSource:
+        """Return the only recording in a file; IdentificationError where a map takes several trials of it."""
+        found = self.sources(name, columns, parameter_set)
+        if len(found) > 1:
+            raise IdentificationError(
+                f"{name}: columns.{columns}.trial: an experiment has one recording, not {len(found)}: name one trial"
+            )
+        return found[0]
+
+    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[RecordingSource, ...]:
+        """Return the recordings in a file that the problem names, read through one of its column maps if it says one.
 
         The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
         """
@@ -88,11 +98,12 @@ class _Given:
         if path.is_dir():
             raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
         if columns is None:
-            return source_of(path, read_recording(path, atmosphere=atmosphere))
+            return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
         molar_mass = number_in_si(parameter_set, "gas.molar_mass")
         gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
         column_map, map_name = self.problem.columns[columns], f"{self.file}:{columns}"
-        return source_of(path, read_foreign(path, column_map, None, atmosphere, map_name, gas))
+        recordings = read_trials(path, column_map, None, atmosphere, map_name, gas)
+        return tuple(source_of(path, one, one.label.removeprefix(path.stem)) for one in recordings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +111,7 @@ class _Task:
     """A procedure with its recordings, and what messages call it."""
 
     procedure: ProcedureProblem
-    sources: tuple[Source, ...]
+    sources: tuple[RecordingSource, ...]
     place: str
 
 
@@ -120,7 +131,7 @@ def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
     return [
         _Task(
             procedure,
-            tuple(given.source(name, procedure.columns, before) for name in procedure.recordings),
+            tuple(one for name in procedure.recordings for one in given.sources(name, procedure.columns, before)),
             f"{given.file}: procedure {number}, {procedure.kind}",
         )
         for number, procedure in sorted(numbered, key=lambda pair: PROCEDURES.index(pair[1].kind))
@@ -137,7 +148,7 @@ def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -
         of_kind: list[Use] = []
         for task in tasks:
             if task.procedure.kind == kind:
-                first, last = window_of(task.procedure, Setting(before, valve, task.place))
+                first, last = window_of(task.procedure, ProcedureContext(before, valve, task.place))
                 of_kind += [
                     Use(
                         by=f"recording {number} of procedure {kind}",
