@@ -55,7 +55,13 @@ def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> M
         date = columns.channels[TIME].date
         if date is not None:
             dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))
-        size = _common_length(numbers, clock)
+        lengths = {name: values.size for name, values in numbers.items()}
+        if clock:
+            lengths[TIME] = len(clock)
+        if len(set(lengths.values())) != 1:
+            listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
+            raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
+        size = next(iter(lengths.values()))
         for name, values in numbers.items():
             gaps = np.flatnonzero(~np.isfinite(values))
             if gaps.size:
@@ -81,17 +87,6 @@ def _variable(key: str, column: int | str, file: MatlabFile) -> str:
             f"{file.said_of_objects()}"
         )
     return name
-
-
-def _common_length(numbers: dict[str, Floats], clock: list[str] | None) -> int:
-    """Return the number of samples that all columns have; DataError where they have several, or there is no column."""
-    lengths = {name: values.size for name, values in numbers.items()}
-    if clock:
-        lengths[TIME] = len(clock)
-    if len(set(lengths.values())) != 1:
-        listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
-        raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
-    return next(iter(lengths.values()))
 
 
 # The direction of a movement, up or down, from how fast a recorded channel moves, as a column map asks for it.

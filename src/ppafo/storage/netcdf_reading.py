@@ -68,7 +68,14 @@ def _recording_in(content: bytes, label: str) -> Recording:
         for name, variable in variables.items():
             if variable.size != variables[TIME].size:
                 raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
-            _check_filters(name, variable)
+            # Only the common filters: gzip within gzip grows without limit.
+            properties = variable.id.get_create_plist()
+            filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+            behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
+            if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
+                raise DataError(
+                    f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
+                )
         _check_memory(variables, len(content))
         for name, variable in variables.items():
             _check_is_whole(name, variable)
@@ -97,15 +104,6 @@ def _own_variables(file: Any) -> dict[str, Any]:
         if variable.is_virtual or variable.external:
             raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
     return variables
-
-
-def _check_filters(name: str, variable: Any) -> None:
-    """Refuse numbers that are stored neither plain nor by the common filters: gzip within gzip grows without limit."""
-    properties = variable.id.get_create_plist()
-    filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
-    behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
-    if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
-        raise DataError(f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed")
 
 
 def _check_memory(variables: Mapping[str, Any], file_bytes: int) -> None:

@@ -108,7 +108,14 @@ def causes_of(
         # That no change explains the recordings would say too much.
         return _explained(search, none, tried, explaining, []) if explaining else Causes()
     names = set.intersection(*(set(measured.recording.names) for measured in read))
-    moving = _moving(agreements, device)
+    atmosphere = device.supply.atmospheric_pressure
+    moving = {
+        name
+        for agreement in agreements
+        for recording in (agreement.measured, agreement.model)
+        for name in recording.names
+        if float(np.abs(recording[name] - atmosphere).max()) > usual_errors(name).zero
+    }
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
     sized = [*sizes(device, names), *numbers(read[0], device, settings)]
     first = [_samples(records), _motions(records, settings)]
@@ -138,18 +145,6 @@ def causes_of(
         default=None,
     )
     return Causes() if nearest is None else Causes(None, _cause_of([nearest], search.penalty), len(tried))
-
-
-def _moving(agreements: Sequence[RecordingAgreement], device: Device) -> set[str]:
-    """Return the channels that part from the atmosphere, measured or in the model, by more than a usual zero."""
-    atmosphere = device.supply.atmospheric_pressure
-    return {
-        name
-        for agreement in agreements
-        for recording in (agreement.measured, agreement.model)
-        for name in recording.names
-        if float(np.abs(recording[name] - atmosphere).max()) > usual_errors(name).zero
-    }
 
 
 def _tried_in_turn(stages: Iterable[Sequence[Tried]]) -> tuple[list[Tried], list[Tried]]:

@@ -106,6 +106,10 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         ("summary", SUMMARY),
         ("study", f"study.json, sha256 {document['sha256'][:16]}"),
     )
+    rows = []
+    for number in document["study"].get("vary", ()):
+        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
+        rows.append((number["path"], number["kind"], ", ".join(keys)))
     return Finding(
         name="sweep",
         kicker="Study",
@@ -115,7 +119,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
             figure_of(results, [described] if described else [], failures),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Part("How to read it", said=[quantile], is_detail=True),
-            _varied(document["study"]),
+            Part("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
             Part(said=_sampling(document["study"]), is_detail=True),
             _assumed(document["scenarios"]),
             Part("Files", facts(files), is_detail=True),
@@ -143,15 +147,6 @@ def _useless_runs(results: StudyResults) -> list[str]:
         for name, count in summary.get(key, {}).items()
         if count
     ]
-
-
-def _varied(study: Mapping[str, Any]) -> Part:
-    """Return a row for each number that a study varies: its path, how, and the keys of that."""
-    rows = []
-    for number in study.get("vary", ()):
-        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
-        rows.append((number["path"], number["kind"], ", ".join(keys)))
-    return Part("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
 
 
 def _sampling(study: Mapping[str, Any]) -> list[str]:
