@@ -244,7 +244,16 @@ def without_wrong_samples(
         right = np.ones(len(recording), dtype=np.bool_)
         for name in (name for name in names if name in recording):
             values, most = recording[name][inside], max(1, int(_MOST_LEFT_OUT * inside.size))
-            wrong = np.flatnonzero(_far_off(values, most))
+            # Of samples that stand still the noise is 0, and what moves first among them is no error.
+            noise = max(noise_of(values), _GROSS_SAMPLE * usual_range(values))
+            is_out = outlying_samples(values, noise)
+            # One wrong sample among samples that stand still is no step of their converter.
+            step = resolution_of(values if np.count_nonzero(is_out) > most else values[~is_out])
+            if step <= _COARSEST * np.abs(values[~is_out]).max(initial=0.0):
+                is_out &= outlying_samples(values, math.hypot(noise, step / math.sqrt(12.0)))
+            # A decay is fast at its start, with no sample before: there only what no decay does is an error.
+            is_out[:2] &= np.abs(values - np.median(values[:5]))[:2] > _NO_DECAY * np.ptp(values)
+            wrong = np.flatnonzero(is_out)
             if not wrong.size:
                 continue
             first = int(wrong[0])
@@ -259,20 +268,6 @@ def without_wrong_samples(
         channels = {name: replace(one, values=one.values[right]) for name, one in recording.channels.items()}
         kept.append(replace(source, recording=replace(recording, time=recording.time[right], channels=channels)))
     return tuple(kept), tuple(said)
-
-
-def _far_off(values: Floats, most: int) -> NDArray[np.bool_]:
-    """Return which samples are far off those around them; where more than ``most`` are, a converter may step so."""
-    # Of samples that stand still the noise is 0, and what moves first among them is no error.
-    noise = max(noise_of(values), _GROSS_SAMPLE * usual_range(values))
-    is_out = outlying_samples(values, noise)
-    # One wrong sample among samples that stand still is no step of their converter.
-    step = resolution_of(values if np.count_nonzero(is_out) > most else values[~is_out])
-    if step <= _COARSEST * np.abs(values[~is_out]).max(initial=0.0):
-        is_out &= outlying_samples(values, math.hypot(noise, step / math.sqrt(12.0)))
-    # A decay is fast at its start, with no sample before: there only what no decay does is an error.
-    is_out[:2] &= np.abs(values - np.median(values[:5]))[:2] > _NO_DECAY * np.ptp(values)
-    return is_out
 
 
 def check_no_wrong_reading(

@@ -13,7 +13,7 @@ from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError
 from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
-from ppafo.storage.places import Place, place_at, read_document
+from ppafo.storage.places import place_at, read_document
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
 
@@ -70,25 +70,6 @@ class _Summary(_Table):
     failures: list[_Failure]
     quantile_definition: str
     configurations: dict[str, dict[str, _Described]]
-
-
-def read_summary(location: Place, document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the summary of the study with this ``study.json``; DataError where it is not finished, or damaged."""
-    try:
-        summary: dict[str, Any] = read_document(location, SUMMARY)
-    except (OSError, ValueError) as error:
-        raise DataError(
-            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
-        ) from error
-    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
-    described = validate(_Summary, summary, whose, DataError)
-    names = {configuration["name"] for configuration in document["study"]["configurations"]}
-    # A configuration or a metric in one of the two documents alone would be looked up in vain.
-    has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
-    metrics = document["metrics"].keys()
-    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
-        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
-    return summary
 
 
 @in_units(lambda results: results.document.get("shown", {}))
@@ -219,4 +200,18 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """
     location = place_at(folder)
     document = read_manifest(location)
-    return finding_of(StudyResults(location, document, read_summary(location, document)))
+    try:
+        summary: dict[str, Any] = read_document(location, SUMMARY)
+    except (OSError, ValueError) as error:
+        raise DataError(
+            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+        ) from error
+    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
+    described = validate(_Summary, summary, whose, DataError)
+    names = {configuration["name"] for configuration in document["study"]["configurations"]}
+    # A configuration or a metric in one of the two documents alone would be looked up in vain.
+    has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
+    metrics = document["metrics"].keys()
+    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
+        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
+    return finding_of(StudyResults(location, document, summary))
