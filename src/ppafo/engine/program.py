@@ -193,12 +193,14 @@ class Program:
     the ground and a gait lead it (``angle`` is None then; its sensors are its own); it walks stride after stride, or
     ``takes_task_sequence``: it stands, starts, changes its speed and stops. ``faults`` are those of the plant, with a
     shut-off valve, None where a walk has neither. ``is_adaptive`` True divides each
-    step as its error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
+    step as its error asks, ``rests_whole`` True but one in which a led joint stands still where a locked one takes it
+    whole, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
     at every sample that a recording would have, ``traced`` names channels, or paths of the state, that are kept at some
     of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
     that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
+    ``has_vacuum`` True where the supplies are below the atmosphere: a command above 0 then lowers what it raises else.
     """
 
     valve: ValveModel
@@ -215,6 +217,7 @@ class Program:
     faults: FaultPhases | None = None
     feed: FeedPhases | None = None
     is_adaptive: bool = False
+    rests_whole: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
@@ -224,6 +227,7 @@ class Program:
     shank: ProfileKind | None = None
     foot: FootPhases | None = None
     controlled: str = TORQUE
+    has_vacuum: bool = False
 
     @property
     def groups(self) -> Groups:

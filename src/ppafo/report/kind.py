@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ppafo.metrics import METRICS
+from ppafo.parameters.graph import fixed_zero
 from ppafo.report.display_units import (
     axis_unit,
     change_unit,
@@ -38,12 +39,16 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Kind of a number: words, SI unit, quantity (``display_units.QUANTITIES``; else shown in SI), and form."""
+    """Kind of a number: words, SI unit, quantity (``display_units.QUANTITIES``; else shown in SI), and form.
+
+    ``zero`` [Pa absolute] is the pressure from which gauge ones count, None for the atmosphere of the device.
+    """
 
     words: str = ""
     unit: str = ""
     quantity: str = ""
     form: str = ".4g"
+    zero: float | None = None
 
     @property
     def shown_unit(self) -> str:
@@ -73,11 +78,11 @@ class Kind:
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values in SI in the unit in which they are shown."""
-        return display_values(np.asarray(values, dtype=np.float64), self.quantity)
+        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.zero)
 
     def number(self, value: float, form: str = "") -> str:
         """Return a value in SI as text in the unit in which it is shown, without that unit."""
-        return without_exponent(display_value(value, self.quantity), form or self.form)
+        return without_exponent(display_value(value, self.quantity, self.zero), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
         """Return a value in SI as text with the unit in which it is shown."""
@@ -120,7 +125,7 @@ def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
 
 def of_path(path: str, unit: str, form: str = ".6g") -> Kind:
     """Return what the number at a path is, from its unit in SI."""
-    return Kind(label_of(path), unit, quantity_of_unit(unit), form)
+    return Kind(label_of(path), unit, quantity_of_unit(unit), form, fixed_zero(path))
 
 
 def of_channel(name: str, unit: str) -> Kind:

@@ -1,6 +1,8 @@
 """Display units of numbers: the units in which the author of a parameter set wrote them.
 
-What says or draws something does so inside ``shown_in``; outside of it, the package's own choices hold.
+Gauge pressures count from the atmosphere of the device of which they are. It stands beside the units, so that text,
+tables and axes have one zero, and so do saved results, which keep both as ``shown``. Outside of ``shown_in`` the
+package's own choices hold.
 """
 
 import contextlib
@@ -10,10 +12,14 @@ from contextvars import ContextVar
 from types import MappingProxyType
 from typing import ParamSpec, TypeVar
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.units.spelling import split_pressure_kind
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+GAUGE_ZERO = "gauge_zero"
+"""Key, beside units by their unit in SI, of the absolute pressure from which gauge pressures count."""
 
 _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingProxyType({}))
 
@@ -46,6 +52,17 @@ def pressure_units(level: str) -> dict[str, str]:
     """Return the units of levels and differences of pressure, by unit in SI, of who writes levels as ``bar_g``."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
+
+
+def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
+    """Return units by unit in SI with the atmosphere [Pa absolute] from which gauge pressures count."""
+    return {**units, GAUGE_ZERO: f"{atmosphere!r} Pa_a"}
+
+
+def gauge_zero() -> float:
+    """Return the absolute pressure [Pa] from which gauge pressures are counted where they are shown."""
+    stated = _chosen.get().get(GAUGE_ZERO)
+    return STANDARD_ATMOSPHERE if stated is None else float(stated.removesuffix(" Pa_a"))
 
 
 def units_in_force() -> dict[str, str]:

@@ -12,6 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.step import stated
 from ppafo.engine.step.lane import Lane, Now
+from ppafo.model.actuators.vane import chambers
 from ppafo.model.plant import PlantParameters, chamber_pressures
 from ppafo.model.ports import at_valve, shown_signals
 
@@ -251,7 +252,7 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
         stated.advance(parts, lane, command_of(parts, lane, now), length)
     taken, follows = True, True
     if parts.is_adaptive:
-        missed = error_of(parts, lane, now)
+        missed = 0.0 if parts.rests_whole and rests(parts, lane) else error_of(parts, lane, now)
         # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
         error = missed / lane.timing.tolerance if has_gas(parts, lane) else motion.MAXIMUM_ERROR
         # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
@@ -304,6 +305,17 @@ def error_of(parts: Program, lane: Lane, now: Now) -> float:
     if parts.stated_with_errors:
         missed = max(missed, stated.error(parts, lane, command_of(parts, lane, now), length_of(parts, lane)))
     return missed
+
+
+def rests(parts: Program, lane: Lane) -> bool:
+    """True where a joint that is led stands still in a step, and its chambers are slow enough for a whole one."""
+    room = lane.plant.atmospheric_pressure
+    still = chambers(lane.plant, lane.state.angle, room, room)
+    # A stricter tolerance counts as a longer step, as where a run is planned.
+    length = lane.timing.step / min(1.0, lane.timing.tolerance)
+    stiffness = lane.thermal.heat_capacity_ratio if parts.is_thermal else 1.0
+    is_slow = pneumatics.is_slow(lane.plant, length, still.volume_1, still.volume_2, stiffness)
+    return is_slow and lane.prescribed.next_angle == lane.state.angle and lane.state.angular_velocity == 0.0
 
 
 def has_gas(parts: Program, lane: Lane) -> bool:

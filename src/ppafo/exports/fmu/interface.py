@@ -19,7 +19,7 @@ _LOOP_TUNING = (
 )
 """When the closed loop takes a changed parameter, for the page of the unit."""
 _PLANT_TIME = (
-    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
+    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>{clock}</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no end."
 )
 """Time stepping of the plant, for the page of the unit; ``motion`` is the motion of its vane."""
@@ -80,9 +80,9 @@ def closed_loop(scenario: Scenario) -> Interface:
 
 
 def plant_alone(scenario: Scenario) -> Interface:
-    """Return the plant; a free joint takes a torque, one with a prescribed angle takes angle and rate.
+    """Return the plant; a free joint takes a torque, a locked one angle and rate, others the command alone.
 
-    For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
+    ``export c`` writes the same plant.
     """
     alone = surfaced(plant_of(scenario))
     library = alone.library
@@ -92,7 +92,7 @@ def plant_alone(scenario: Scenario) -> Interface:
         name=library.title,
         library=library,
         templates=("stepped.c", "plant_inputs.c", "plant.c"),
-        time=_PLANT_TIME.format(motion=alone.motion),
+        time=_PLANT_TIME.format(motion=alone.motion, clock=alone.clock),
         tuning=_PLANT_TUNING,
         step=alone.step,
         duration=scenario.run.duration,
@@ -105,6 +105,7 @@ def plant_alone(scenario: Scenario) -> Interface:
         words={
             "inputs": inputs,
             "follow": follow_lines(alone, "settings", numbers),
+            "clock": alone.clock,
             "checked": "the limits of the inputs, inertia, volumes and areas",
         },
         run=half_open(scenario),
