@@ -20,7 +20,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
-from ppafo.identification.residuals import Block, Free, Indices, Residuals, Work
+from ppafo.identification.residuals import FitRuns, Free, Indices, ResidualBlock, Residuals
 from ppafo.identification.whitened import Linear, cost_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
@@ -38,6 +38,8 @@ class Fit:
     of them that were left out because each stands out by itself. ``unidentified`` are combinations, as weights of
     numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number the
     tolerances that widen its interval, largest first, as fractions of the variance. ``jacobian`` is whitened [1/SI].
+    ``edge`` names the sought numbers that the recordings want where no run succeeds, each with 1 for above its value
+    and -1 for below; a search that ends there has not converged.
     """
 
     numbers: tuple[Free, ...]
@@ -57,6 +59,7 @@ class Fit:
     sensors: Mapping[str, Noise]
     jacobian: Floats
     confidence: float
+    edge: Mapping[str, int]
 
     @property
     def by_name(self) -> dict[str, float]:
@@ -96,7 +99,7 @@ _OTHER_STARTS = 32
 def fit(
     residuals: Residuals,
     numbers: Sequence[Free],
-    blocks: Sequence[Block],
+    blocks: Sequence[ResidualBlock],
     confidence: float = 0.95,
     report: Report = report_nothing,
     memory: int = HIGHEST_ORDER,
@@ -120,7 +123,7 @@ def fit(
                 f"{one.name}: bounds {one.low:g} to {one.high:g} with the start {one.start:g}: the lower must be below "
                 "the upper and the start between them"
             )
-    work = Work(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
+    work = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
     samples, sought = (
         sum(one.rows.stop - one.rows.start for one in blocks),
         sum(math.isinf(one.deviation) for one in numbers),
@@ -141,7 +144,7 @@ def fit(
     return replace(found, evaluations=work.evaluations)
 
 
-def _search(work: Work, start: Floats) -> Floats:
+def _search(work: FitRuns, start: Floats) -> Floats:
     """Return about the least squares, weights and squares in turn until both stay."""
     point = np.clip(start, work.low, work.high)
     left, work.outliers = work.one(point), work.outliers[:0]
@@ -187,7 +190,7 @@ def _search(work: Work, start: Floats) -> Floats:
     return point
 
 
-def _outliers(work: Work, left: Floats) -> Indices:
+def _outliers(work: FitRuns, left: Floats) -> Indices:
     """Return samples that no sensor made: residuals of the robust pass far off those around them, at most one in 100.
 
     One near a break-away would else decide a friction by itself. More are noise with heavy tails: the largest are left
@@ -205,7 +208,7 @@ def _outliers(work: Work, left: Floats) -> Indices:
 
 
 class _Settled(NamedTuple):
-    """End of a fit: scaled numbers, residuals of the samples, linearisation there, and gain of the last step.
+    """End of a fit: scaled numbers, residuals of the samples, linearisation there, last step tried, and its gain.
 
     ``gain`` is by how much the last step that was tried would lower the cost, at most 0 where it was not taken, and
     -inf where no run succeeds there.
@@ -214,10 +217,11 @@ class _Settled(NamedTuple):
     point: Floats
     residuals: Floats
     linear: Linear
+    step: Floats
     gain: float
 
 
-def _settled(work: Work, point: Floats) -> _Settled:
+def _settled(work: FitRuns, point: Floats) -> _Settled:
     """Return where Gauss-Newton steps on whitened samples end, from the least squares at a scaled ``point``.
 
     Samples that stand alone are left out, and in a fit of motion once more those on which the rest hangs.
@@ -248,12 +252,24 @@ def _settled(work: Work, point: Floats) -> _Settled:
             work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, left = reached, after
-    return _Settled(point=point, residuals=left, linear=linear, gain=gain)
+    return _Settled(point=point, residuals=left, linear=linear, step=step, gain=gain)
 
 
-def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
+def _edge(work: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
+    """Return the sought numbers with which no run succeeds a short step from a point, each with the sign of the step.
+
+    All of them where each alone may take it and only together they may not.
+    """
+    sought = np.flatnonzero((work.prior == 0.0) & (step != 0.0))
+    moved = point[:, None] + _SHARES[-1] * np.diag(step)[:, sought]
+    fails = ~np.isfinite(work.at(np.clip(moved, work.low[:, None], work.high[:, None]))).all(axis=0)
+    rows = sought[fails] if fails.any() else sought
+    return {work.numbers[row].name: int(np.sign(step[row])) for row in rows.tolist()}
+
+
+def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit after whitening, with its intervals and what speaks against it, from scaled least squares."""
-    point, left, linear, gain = _settled(work, start)
+    point, left, linear, step, gain = _settled(work, start)
     rows = linear.rows
     known, whitened, errors = linear.sensors, rows[:, 1:], rows[:, 0]
     covariance = linear.root @ linear.root.T
@@ -284,10 +300,11 @@ def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
         sensors=known,
         jacobian=whitened / work.scale,
         confidence=confidence,
+        edge={} if math.isfinite(gain) else _edge(work, point, step),
     )
 
 
-def _shares(work: Work, covariance: Floats, names: Sequence[str]) -> dict[str, tuple[tuple[str, float], ...]]:
+def _shares(work: FitRuns, covariance: Floats, names: Sequence[str]) -> dict[str, tuple[tuple[str, float], ...]]:
     """Return the shares [-] of the variance of each number that come from what is assumed of others, largest first."""
     fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
     return {
@@ -296,7 +313,7 @@ def _shares(work: Work, covariance: Floats, names: Sequence[str]) -> dict[str, t
     }
 
 
-def _likelihood(work: Work, found: Fit) -> float:
+def _likelihood(work: FitRuns, found: Fit) -> float:
     """Return the logarithm of the likelihood [-] of whitened residuals and priors, but for a constant."""
     size = 0.0
     for one in work.blocks:
@@ -305,7 +322,7 @@ def _likelihood(work: Work, found: Fit) -> float:
     return -size - 0.5 * float(np.square((found.values / work.scale - work.mean) * work.prior).sum())
 
 
-def _other_starts(work: Work, found: Fit) -> Iterator[Floats]:
+def _other_starts(work: FitRuns, found: Fit) -> Iterator[Floats]:
     """Return scaled starts for the numbers that are sought that explain more than a fit: at most two of a batch."""
     sought = ~(work.prior > 0.0)
     point = found.values / work.scale

@@ -11,6 +11,7 @@ from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.tolerances import Tolerances
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
+from ppafo.progress import Progress
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -369,6 +370,16 @@ def test_a_chamber_that_stands_still_is_within_its_limit_and_has_no_unit_misread
     found = causes_of([measured], [agreement], device, settings)
     assert found.found is None or found.found.is_usual
     assert found.nearest is None or "read as" not in found.nearest.name
+
+
+def test_a_search_for_causes_reports_how_many_changes_are_done_of_how_many(bench: Recording) -> None:
+    device, heard = load_device("ppafo2011", overrides=SUPPLY), list[Progress]()
+    measured, settings = check_recording(swapped(bench), device, "r.csv"), ReplaySettings()
+    causes_of([measured], [compare_recording(measured, device, settings)], device, settings, heard.append)
+    counted = [one for one in heard if one.activity == "searching for causes"]
+    assert counted
+    assert all(one.noun == "changes" and 0 <= one.done < one.total for one in counted)
+    assert any(one.done > 0 for one in counted)
 
 
 @pytest.mark.parametrize(("declared", "is_named"), [("psi_g", True), ("", True), ("Pa_a", True), ("bar_g", False)])
