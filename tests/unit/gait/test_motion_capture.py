@@ -147,6 +147,15 @@ def test_a_cell_of_words_is_named_by_line_and_marker_and_no_key_of_a_map(tmp_pat
     assert "channels." not in str(refused.value)
 
 
+def test_rows_of_a_motive_export_are_known_by_their_order_where_they_have_no_words(tmp_path: Path) -> None:
+    path = motive(tmp_path / "walk.csv")
+    whole, text = read_table(path), path.read_text()
+    path.write_text(text.replace(",Type,", ",,").replace(",Name,", ",,").replace(",ID,", ",,"))
+    table = read_table(path)
+    assert list(table.columns) == list(whole.columns)
+    assert np.array_equal(table.columns["RKNE.z"], whole.columns["RKNE.z"])
+
+
 @pytest.mark.parametrize(
     ("write", "old", "new", "said"),
     [

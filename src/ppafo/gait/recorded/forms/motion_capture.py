@@ -32,6 +32,8 @@ from ppafo.signals.recording import Floats
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
 """Blocks of a Nexus export: markers, angles and moments of models; force plates and other analog channels."""
 _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
+_MOTIVE_ROWS = 3
+"""Rows above the axes of a Motive export: types, names and quantities at least."""
 _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
 
@@ -203,6 +205,9 @@ def _read_motive(path: str | Path) -> MotionTable:
     at = next((n for n, line in enumerate(lines) if cells_of(line, ",")[:1] == ["Frame"]), -1)
     above = [cells_of(line, ",") for line in lines[1 : max(at, 1)] if line.strip(", \t")]
     rows = {cells[1]: cells for cells in above if len(cells) > 1 and cells[1]}
+    if not rows and len(above) >= _MOTIVE_ROWS:
+        # Some exports leave out what their rows are: types, names, and further ones above the quantities.
+        rows = {"Type": above[0], "Name": above[1]}
     if at < 0 or "Name" not in rows:
         raise DataError(f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the names of its markers")
     axes, quantities = cells_of(lines[at], ","), above[-1]
@@ -256,7 +261,7 @@ def _read_bts(path: str | Path) -> MotionTable:
     while not names[-1]:
         names.pop()
     is_decimal_comma = "," in lines[min(at + 1, len(lines) - 1)]
-    block = Block(lines, at + 1, "\t", decimal="," if is_decimal_comma else ".")
+    block = NumberBlock(lines, at + 1, "\t", decimal="," if is_decimal_comma else ".")
     cells = Cells(names, ["", "s", *[unit if unit in _LENGTHS.values() else ""] * (len(names) - 2)])
     return table_of(path, block, cells, "time", noun="markers")
 
