@@ -13,7 +13,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
 from ppafo.engine.source_text import (
     Composer,
-    Names,
+    RewrittenNames,
     SourceCollector,
     emitted_name,
     is_step_function,
@@ -143,11 +143,11 @@ class StepText:
         found: list[ast.stmt] = []
         for function, tree in reduced:
             check_grammar(tree, function.__code__.co_filename)
-            composer = self.composer(function, Names(frozenset([*local, *takes]), self.kept, {}))
+            composer = self.composer(function, RewrittenNames(frozenset([*local, *takes]), self.kept, {}))
             found += [composer.visit(statement) for statement in tree.body]
         return found
 
-    def composer(self, function: FunctionType, names: Names) -> Composer:
+    def composer(self, function: FunctionType, names: RewrittenNames) -> Composer:
         """Composer of a reduced function of the step: replaces names that are defined outside it."""
         return Composer(
             function,
@@ -218,7 +218,7 @@ class StepText:
         local |= {argument.arg for argument in tree.args.args}
         check_flow(tree, file, local)
         rows = {name: kind for name, kind in self.rows.items() if name in local}
-        composer = self.composer(function, Names(frozenset(local), self.kept, rows))
+        composer = self.composer(function, RewrittenNames(frozenset(local), self.kept, rows))
         tree.returns, tree.decorator_list = None, []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)

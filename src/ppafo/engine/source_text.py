@@ -56,7 +56,7 @@ def is_step_function(function: object) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class RewrittenNames:
     """Names of a function that was written anew: all that it has, values that some stand for, classes of rows."""
 
     local: frozenset[str]
@@ -80,7 +80,7 @@ class Composer(ast.NodeTransformer):
         note: Callable[[Mapping[str, Any], str, Any], None],
         rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
         stands_for: Callable[[Any], Any] = lambda row: row,
-        names: Names | None = None,
+        names: RewrittenNames | None = None,
     ) -> None:
         self.function = function
         self.add = add

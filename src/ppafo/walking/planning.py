@@ -31,7 +31,7 @@ from ppafo.model.sensors import GaitSensors
 from ppafo.model.shut_off import NOT_FITTED, ShutOff
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import plant_parameters, venting_valve
-from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
+from ppafo.simulation.plan import Components, TimeGrid, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
@@ -147,7 +147,7 @@ def unrecorded(run: Run, runs: int) -> Batch:
     return replace(batch, clock=replace(batch.clock, record_every=0))
 
 
-def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
+def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
     lowest, highest = (vented_chambers(scenario.device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
     lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
@@ -155,7 +155,7 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     counts = walk_step_counts(*times, plant, volume, scenario.stiffness)
-    return Steps(
+    return TimeGrid(
         step=counts.step,
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),
