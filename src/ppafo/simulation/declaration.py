@@ -342,7 +342,7 @@ def written_unit(si_unit: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class DocumentReader:
     """A document with what messages call it; ``overridden`` are the paths that an override has set."""
 
     file: str

@@ -13,10 +13,10 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import NEXT_LAW, GasAt, Law, Opening, Paths, orifice_shape, solve_flow
-from ppafo.identification.bench.law import Readings, recordings_of
-from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.law import PooledReadings, recordings_of
+from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.source import (
-    Source,
+    RecordingSource,
     check_moves,
     check_no_wrong_reading,
     check_not_clipped,
@@ -45,7 +45,7 @@ _SPAN, _SUBSONIC = 0.15, 0.6
 
 
 def open_valve_flow(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     gas: GasAt,
     law: Law = "orifice",
     area: float | None = None,
@@ -74,7 +74,7 @@ def open_valve_flow(
         )
     reported = [size]
     if is_standard:
-        reported.append(Reported(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
+        reported.append(ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
     paths = Paths(size.path, critical_ratio=reported[-1].path if is_standard else "")
     if law == "both":
         paths = Paths(size.path, beside=_BESIDE.path)
@@ -88,14 +88,14 @@ def open_valve_flow(
         opening,
         paths,
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
-        Readings(flow, levels, labels),
+        PooledReadings(flow, levels, labels),
         tolerances,
         confidence,
     )
     shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
     marks = readings_mark("measured", ratio, shown), curve_mark(law, ratio, fitted)
     axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
-    return result_of(
+    result = result_of(
         PROCEDURE,
         sources,
         found,
@@ -106,25 +106,48 @@ def open_valve_flow(
         f"{NEXT_LAW[law]}, or leave those readings out",
         remarks,
     )
+    return result if area is None else _doubted(result, size.path, area)
 
 
-_BESIDE = Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
+_MOST = 1.0
+"""Discharge coefficient [-] that no opening exceeds: the flow would exceed a loss-free nozzle."""
 
 
-def _size(opening: Opening, area: float | None, path: str) -> Reported:
+def _doubted(result: BenchResult, path: str, area: float) -> BenchResult:
+    """Return a result that tells of a discharge coefficient above 1, which has one of three causes."""
+    found = next((one for one in result.estimates if one.path == path and one.unit == ""), None)
+    if found is None or found.low <= _MOST:
+        return result
+    doubt = (
+        f"Cd = {found.value:.3g} is above 1, which no opening has: the unit of mass_flow or of a pressure is another "
+        f"one (a flow per minute is 60 times one per second), or the valve is larger than the set's {area * 1e6:.4g} "
+        f"mm^2; Cd A is {found.value * area * 1e6:.4g} mm^2"
+    )
+    estimates = tuple(
+        replace(one, verdict="holds for this model only") if one is found else one for one in result.estimates
+    )
+    return replace(result, estimates=estimates, remarks=(doubt, *result.remarks))
+
+
+_BESIDE = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
+
+
+def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
     """Return the number that is sought: where a set has it, its unit, and what it is."""
     if opening.law == "laminar":
-        return Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve")
+        return ReportedNumber(
+            "open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve"
+        )
     if opening.law == "iso6358" or opening.critical_ratio is not None:
-        return Reported(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
+        return ReportedNumber(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
     if area:
         text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A sets the flow"
-        return Reported(f"{path}.discharge_coefficient", "", text)
-    return Reported("open_valve_flow.effective_area", "m^2", "Effective area Cd A")
+        return ReportedNumber(f"{path}.discharge_coefficient", "", text)
+    return ReportedNumber("open_valve_flow.effective_area", "m^2", "Effective area Cd A")
 
 
 def open_readings(
-    sources: tuple[Source, ...], gas: GasAt, tolerances: Tolerances
+    sources: tuple[RecordingSource, ...], gas: GasAt, tolerances: Tolerances
 ) -> tuple[Floats, Floats, Floats, list[str], tuple[str, ...]]:
     """Absolute pressures [Pa], flow [kg/s] and recording of readings with an open valve; remarks on those left out.
 
@@ -145,7 +168,15 @@ def open_readings(
             f"{sources[0].name}: {PROCEDURE} needs {MINIMUM_SAMPLES} readings with the valve fully open, "
             f"command 1 or -1; there are {int(is_open.sum())}"
         )
-    upstream, downstream, flow = (pool(sources, name)[is_open] for name in CHANNELS)
+    upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
+    # A log that begins before the air is on says nothing there, and no column of it is wrong.
+    limit = tolerances.zero_of_flow * float(np.abs(flow[is_open]).max())
+    rests = is_open & (downstream >= upstream) & (np.abs(flow) <= limit)
+    told: tuple[str, ...] = ()
+    if rests.sum() > is_open.sum() // 10 and (is_open & ~rests).sum() >= MINIMUM_SAMPLES:
+        told = (f"left out: {rests.sum()} of {is_open.sum()} readings without flow and pressure difference",)
+        is_open = is_open & ~rests
+    upstream, downstream, flow = upstream[is_open], downstream[is_open], flow[is_open]
     wrong = np.flatnonzero(downstream >= upstream)
     # A few readings may cross by noise where both pressures are nearly equal.
     if wrong.size > flow.size // 10:
@@ -161,4 +192,4 @@ def open_readings(
     read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
     possible = read.possible[is_open]
     kept = [label for label, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
-    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, read.remarks
+    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, (*told, *read.remarks)
