@@ -143,6 +143,10 @@ class Composer(ast.NodeTransformer):
         owner = self.value_of(node.value)
         if owner is not _INSIDE and not isinstance(owner, tuple):
             raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
+        row = self.stands_for(self.row_of(node.value))
+        if row is not None and node.attr not in row._fields:
+            hint = nearest_name(node.attr, row._fields)
+            raise self.refuse(node, f"{ast.unparse(node.value)} has no '{node.attr}'{hint}")
         return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:

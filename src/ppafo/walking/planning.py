@@ -184,14 +184,18 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
         return damping, (at_angles[1] - at_angles[0]) / (2.0 * SMALL_TURN)
 
     damping, stiffness = of_each(growths, *run.effects, *states_at_start(run))
-    longest = smaller(2.0 * inertia / larger(damping, TINY), over_runs(math.sqrt, inertia / larger(stiffness, TINY)))
+    dragged, sprung = 2.0 * inertia / larger(damping, TINY), over_runs(math.sqrt, inertia / larger(stiffness, TINY))
+    longest = smaller(dragged, sprung)
     names = ", ".join(f"effects.{effect.name}" for effect in program.effects if load_torque in effect.laws)
 
     def line(number: int) -> str:
         step, most = at(run.step, number), at(longest, number)
+        cause = f"stiffness of {at(stiffness, number):.3g} N m/rad"
+        if at(dragged, number) < at(sprung, number):
+            cause = f"drag of {at(damping, number):.3g} N m s/rad at {FASTEST_FOOT:g} rad/s"
         return (
-            f"{names}: the load changes too much in a step of {step:.3g} s, of which a walk has equal ones: give "
-            f"run.step = {0.5e3 * most:.2g} ms or less, or a smaller load"
+            f"{names}: a {cause} needs steps of at most {1.0e3 * most:.2g} ms, and a walk has fixed steps of "
+            f"{1.0e3 * step:.3g} ms: set run.step = {0.5e3 * most:.2g} ms, or reduce the load"
         )
 
     return ((run.step > longest, line),)
