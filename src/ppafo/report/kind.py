@@ -15,11 +15,11 @@ from ppafo.report.display_units import (
     display_values,
     metric_quantity,
     metric_words,
-    quantity_of_unit,
 )
 from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
 from ppafo.units import without_exponent
+from ppafo.units.shown import quantity_of_unit
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,22 +38,28 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a number is: its words, unit in SI, quantity (``display_units.QUANTITIES``; else shown in SI), and form."""
+    """What a number is: its words, unit in SI, quantity (``QUANTITIES``; else shown in SI), and form.
+
+    ``given`` is the unit in which the user gave it, which goes before that of the set.
+    """
 
     words: str = ""
     unit: str = ""
     quantity: str = ""
     form: str = ".4g"
+    given: str = ""
 
     @property
     def shown_unit(self) -> str:
         """The unit in which it is shown; empty for a plain number."""
+        if self.given:
+            return self.given.removesuffix("_d")
         return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
 
     @property
     def shown_change_unit(self) -> str:
         """The unit in which a difference of two values is shown."""
-        return change_unit(self.quantity) if self.quantity else self.shown_unit
+        return change_unit(self.quantity, self.given) if self.quantity else self.shown_unit
 
     @property
     def title(self) -> str:
@@ -68,16 +74,16 @@ class Kind:
     @property
     def axis_unit(self) -> str:
         """The unit for an axis, empty for a plain number."""
-        unit = axis_unit(self.quantity) if self.quantity else self.shown_unit
+        unit = axis_unit(self.quantity, self.given) if self.quantity else self.shown_unit
         return "" if unit == "1" else unit
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values in SI in the unit in which they are shown."""
-        return display_values(np.asarray(values, dtype=np.float64), self.quantity)
+        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.given)
 
     def number(self, value: float, form: str = "") -> str:
         """Return a value in SI as text in the unit in which it is shown, without that unit."""
-        return without_exponent(display_value(value, self.quantity), form or self.form)
+        return without_exponent(display_value(value, self.quantity, unit=self.given), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
         """Return a value in SI as text with the unit in which it is shown."""
@@ -89,7 +95,7 @@ class Kind:
 
     def change_number(self, value: float, form: str = ".3g") -> str:
         """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
-        return without_exponent(display_difference(value, self.quantity), form)
+        return without_exponent(display_difference(value, self.quantity, self.given), form)
 
     def interval(self, interval: Interval, form: str = "") -> str:
         """Return an estimate and the ends of its interval as text without unit."""
@@ -118,9 +124,10 @@ def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
     return Kind(metric_words(name), unit, metric_quantity(unit), form)
 
 
-def of_path(path: str, unit: str, form: str = ".6g") -> Kind:
-    """Return what the number at a path is, from its unit in SI."""
-    return Kind(label_of(path), unit, quantity_of_unit(unit), form)
+def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
+    """Return what the number at a path is, from its unit in SI, and the one in which it was given."""
+    quantity = quantity_of_unit(unit)
+    return Kind(label_of(path), unit, quantity, form, given if quantity else "")
 
 
 def of_channel(name: str, unit: str) -> Kind:

@@ -16,8 +16,9 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings, venting_valve
-from ppafo.simulation.declaration import Reading, short_quantity_text, value_at
+from ppafo.simulation.declaration import Reading, value_at
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import shown_text
 from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
@@ -92,7 +93,7 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
             section, _, name = path.partition(".")
             number = getattr(walk_of(scenario).wearer if section == "wearer" else scenario.controller, name)
             # In six digits, as the number that it contradicts.
-            default = short_quantity_text(number, quantity.unit, scenario.device.supply.atmospheric_pressure)
+            default = shown_text(number, quantity.unit, atmosphere=scenario.device.supply.atmospheric_pressure)
             raise ScenarioError(
                 f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
                 f"give it in the file or with --set {path}=..."
@@ -261,4 +262,4 @@ def _of_pressures(scenario: Scenario) -> Iterator[Contradiction]:
 
 def _text(number: Any, run: int, unit: str) -> str:
     """Return the number of a run, one for all or (runs,), with its SI unit as a message shows it."""
-    return short_quantity_text(at(number, run), unit) if unit else f"{at(number, run):g}"
+    return shown_text(at(number, run), unit) if unit else f"{at(number, run):g}"

@@ -61,7 +61,7 @@ def test_the_printed_set_says_what_is_missing_and_where_it_is_completed() -> Non
     [
         ("valve.area=-1mm^2", "must be at least 0"),
         ("valve.discharge_coefficient=0", "must be more than 0 and at most 2"),
-        ("actuator.dead_volume_1=0cm^3", "must be at least 1e-18 m^3"),
+        ("actuator.dead_volume_1=0cm^3", "must be at least 1e-12 cm^3"),
         ("actuator.dead_volume_2=1e-300 m^3", "must be at least 1e-18 m^3"),
         ("actuator.restitution=1.5", "must be at least 0 and at most 1"),
         ("foot_plate.inertia=0 g m^2", "must be more than 0"),
