@@ -1,17 +1,19 @@
 """Drawn joints of four kinds of actuator in the tasks of a bench, to count what a verdict on tracking says of them.
 
-Called by ``own_devices.py --joints N --seed S``. A run is judged here by a criterion of its own, written apart from the
-rule of the package: it looks at the last third of a run, at the mean error, the half range and how often the valve is
-thrown over. Runs near its limits are counted as between, since nobody can say whether they are good. All is synthetic.
+Called by ``own_devices.py --joints N --seed S``, which keeps a record of each run. A run is judged here by a criterion
+of its own, written apart from the rule of the package: it looks at the last third of a run, at the mean error, the half
+range and how often the valve is thrown over. Runs near its limits are counted as between, since nobody can say whether
+they are good. All is synthetic.
 """
 
+import json
 import math
 import random
 import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -165,7 +167,10 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         name: str, motion: dict[str, Any], law: dict[str, Any], reference: dict[str, Any], valve: str = "prop"
     ) -> DrawnTask:
         duration = 4.0 if name.startswith("angle") else 2.5
-        return DrawnTask(name, _document(file, valve, motion, law, reference, duration, rate))
+        document = _document(file, valve, motion, law, reference, duration, rate)
+        if name.endswith("noise"):
+            document["sensors"] = {"angle_noise": "0.05 deg", "pressure_noise": "0.5 kPa_d", "seed": 1}
+        return DrawnTask(name, document)
 
     def hold(level: float) -> dict[str, Any]:
         return {"kind": "ramp_hold", "level": f"{level:.6g} N m", "ramp_time": "0.3 s"}
@@ -190,17 +195,26 @@ def draw_tasks(draw: random.Random, file: Path) -> Iterator[DrawnTask]:
         pressure = {"of": "pressure_1", "kind": "ramp_hold", "ramp_time": "0.3 s", "start_level": "0 Pa_g"}
         yield task(name, locked(middle), pid, {**pressure, "level": f"{share * gauge:.6g} Pa_g"})
     start, end = low + 0.3 * (high - low), low + draw.uniform(0.5, 0.7) * (high - low)
-    free = {"kind": "free", "angle": f"{start:.6f} rad"}
+    # A bladder pushes one way only: something has to pull it back.
+    back = 0.2 * torque_reach(device, end)[1] if abs(torque_reach(device, end)[0]) < 0.05 * reach else 0.0
+    free = {"kind": "free", "angle": f"{start:.6f} rad", "external_torque": f"{back:.6g} N m"}
     angle = {"of": "angle", "kind": "ramp_hold", "start_level": free["angle"], "level": f"{end:.6f} rad"}
     cascade, slow = {"kind": "cascade"}, {**angle, "ramp_time": "0.5 s"}
     yield task("angle", free, cascade, slow)
     there = torque_reach(device, end)[1]
     for name, share in (("angle, load", draw.uniform(0.3, 0.6)), ("angle, load beyond reach", 1.2)):
         yield task(name, {**free, "external_torque": f"{share * there:.6g} N m"}, cascade, slow)
+    friction = float(device.friction.static_torque)
+    for share in (0.5, 2.0):
+        believed = {**cascade, "static_torque": f"{share * friction:.6g} N m"}
+        yield task(f"angle, friction x {share:g}", free, believed, slow)
+    yield task("angle, noise", free, cascade, slow)
+    if back:
+        yield task("angle, nothing pulls back", {**free, "external_torque": "0 N m"}, cascade, slow)
     swing = {"of": "angle", "kind": "sine", "level": f"{middle:.6f} rad", "amplitude": f"{0.15 * (high - low):.6f} rad"}
     yield task(
         "angle sine",
-        {"kind": "free", "angle": f"{middle:.6f} rad"},
+        {**free, "angle": f"{middle:.6f} rad"},
         cascade,
         {**swing, "frequency": f"{draw.uniform(0.2, 1.5):.3g} Hz"},
     )
@@ -266,37 +280,60 @@ def printed_remedy(sentence: str) -> list[str]:
     return [] if found is None else [text.replace(" = ", "=", 1) for text in re.findall(r"`([^`]*)`", found[1])]
 
 
-def count_joints(seed: int, joints: int) -> dict[tuple[str, str], Counter[str]]:
-    """Run every task of drawn joints; counts by kind and task."""
-    draw = random.Random(seed)
-    counts: dict[tuple[str, str], Counter[str]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        for number in range(joints):
-            kind = KINDS[number % len(KINDS)]
+def run_joints(seed: int, joints: int, log: Path) -> list[dict[str, Any]]:
+    """Run every task of the joints that a log (a JSON object a line, one for each run) has not; all its records.
+
+    Each joint is drawn by itself, so that a count that was stopped goes on where it ended.
+    """
+    done = _records(log)
+    known = {record["joint"] for record in done if record["seed"] == seed}
+    with tempfile.TemporaryDirectory() as folder, log.open("a", encoding="utf-8") as lines:
+        for number in sorted(set(range(joints)) - known):
+            draw, kind = random.Random(f"{seed}, joint {number}"), KINDS[number % len(KINDS)]
             file = draw_joint(draw, kind, Path(folder), number)
-            for task in draw_tasks(draw, file):
-                row = counts.setdefault((kind, task.name), Counter())
-                row.update(_outcome(task))
-            print(f"{number + 1} of {joints} joints", file=sys.stderr, flush=True)
-    return counts
+            records = [
+                {"seed": seed, "joint": number, "kind": kind, "task": task.name, **_outcome(task)}
+                for task in draw_tasks(draw, file)
+            ]
+            # A joint is written whole or not at all.
+            lines.write("".join(f"{json.dumps(record)}\n" for record in records))
+            lines.flush()
+            done += records
+            print(f"joint {number + 1} of {joints}", file=sys.stderr, flush=True)
+    return [record for record in done if record["seed"] == seed and record["joint"] < joints]
 
 
-def _outcome(task: DrawnTask) -> list[str]:
+def _records(log: Path) -> list[dict[str, Any]]:
+    if not log.exists():
+        return []
+    return [json.loads(line) for line in log.read_text(encoding="utf-8").splitlines()]
+
+
+def _outcome(task: DrawnTask) -> dict[str, Any]:
     try:
         scenario = scenario_from_dict(task.document)
-    except PpafoError:
-        return ["refused"]
+    except PpafoError as refusal:
+        return {"judged": "refused", "sentence": str(refusal)}
     result = simulate(scenario)
     if not result.status.is_completed:
-        return ["diverged"]
-    judged, verdict = judge(result, task.only_switches), tried(scenario, result.tracking)
-    found = [judged]
-    if judged != BETWEEN:
-        found += [f"{judged} {'said' if verdict is not None else 'silent'}"]
-    remedy = [] if verdict is None else printed_remedy(verdict.sentence)
-    if remedy:
-        found += ["printed", *(["works"] if _mended(task, remedy) else [])]
-    return found
+        return {"judged": "diverged", "sentence": result.status.message}
+    verdict = tried(scenario, result.tracking)
+    found: dict[str, Any] = {"judged": judge(result, task.only_switches), **_angle_errors(result)}
+    if verdict is None:
+        return found
+    remedy = printed_remedy(verdict.sentence)
+    found |= {"said": True, "sentence": verdict.sentence, "printed": bool(remedy)}
+    return found | {"works": _mended(task, remedy)} if remedy else found
+
+
+def _angle_errors(result: Result) -> dict[str, float]:
+    """Largest error [deg] of the second half of the hold of an angle, its range [deg], and the way [deg]."""
+    if result.scenario.controlled != "angle":
+        return {}
+    reference, angle = result.recording["reference_angle"], result.recording["angle"]
+    error = np.degrees(angle - reference)[reference.size // 2 :]
+    way = math.degrees(float(np.ptp(reference)))
+    return {"error": float(np.max(np.abs(error))), "swing": float(np.ptp(error)), "way": way}
 
 
 def _mended(task: DrawnTask, overrides: list[str]) -> bool:
@@ -306,6 +343,17 @@ def _mended(task: DrawnTask, overrides: list[str]) -> bool:
     except PpafoError:
         return False
     return again.status.is_completed and judge(again, task.only_switches) != FAILS
+
+
+def counts_of(records: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], Counter[str]]:
+    """Counts of records by kind and task."""
+    counts: dict[tuple[str, str], Counter[str]] = {}
+    for record in records:
+        row = counts.setdefault((record["kind"], record["task"]), Counter())
+        judged = record["judged"]
+        row.update([judged, f"{judged} {'said' if record.get('said') else 'silent'}"])
+        row.update([key for key in ("printed", "works") if record.get(key)])
+    return counts
 
 
 def table_text(counts: Mapping[tuple[str, str], Counter[str]]) -> str:
@@ -318,3 +366,26 @@ def table_text(counts: Mapping[tuple[str, str], Counter[str]]) -> str:
         lines.append(f"{kind:10}{task:27}" + "".join(f"{row[key]:9}" for key in keys))
         total += row
     return "\n".join([*lines, f"{'all':37}" + "".join(f"{total[key]:9}" for key in keys)])
+
+
+def angle_text(records: Iterable[Mapping[str, Any]]) -> str:
+    """Table of the angle loops by default gains: errors of the second half of a run, and swings.
+
+    Within: at most 2 deg or 5 % of the way. Swinging: a range above 1 deg and 3 % of the way, of a reference at rest.
+    """
+    tasks: dict[str, list[Mapping[str, Any]]] = {}
+    for record in records:
+        if "error" in record and not {"beyond", "nothing"}.intersection(record["task"].split()):
+            tasks.setdefault(record["task"], []).append(record)
+    lines = [f"{'angle loops':27}{'runs':>7}{'within':>8}{'swing':>7}{'neither':>9}{'unsaid':>8}   median, worst deg"]
+    for task, runs in tasks.items():
+        is_within = [run["error"] <= max(2.0, 0.05 * run["way"]) for run in runs]
+        swings = ["sine" not in task and run["swing"] > max(1.0, 0.03 * run["way"]) for run in runs]
+        good = [near and not swinging for near, swinging in zip(is_within, swings, strict=True)]
+        unsaid = sum(not fine and not run.get("said") for fine, run in zip(good, runs, strict=True))
+        errors = [run["error"] for run in runs]
+        lines.append(
+            f"{task:27}{len(runs):7}{sum(is_within):8}{sum(swings):7}{sum(good):9}{unsaid:8}   "
+            f"{np.median(errors):.2f}, {max(errors):.2f}"
+        )
+    return "\n".join(lines)

@@ -1,10 +1,10 @@
 """Draws devices that are not the paper's and walks them with every torque law: what gains that follow the device cost.
 
     python scripts/own_devices.py --seed 1 --devices 12
-    python scripts/own_devices.py --seed 1 --joints 20
+    python scripts/own_devices.py --seed 1 --joints 20 --log joints.jsonl
 
 With ``--joints`` it runs joints of a bench in place of walks, and counts what the verdict on tracking says of them
-(``drawn_joints.py``).
+(``drawn_joints.py``). Joints that the log has are not run again: a count that was stopped goes on.
 
 Each law walks with the gains that it has where nobody gives any, and with these times 1/8 to 4. Tuned are, of
 these, the least gas among loops that do not oscillate and whose error is within a quarter of the least one, and that
@@ -16,6 +16,7 @@ import argparse
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -26,7 +27,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
-from scripts.drawn_joints import count_joints, table_text
+from scripts.drawn_joints import angle_text, counts_of, run_joints, table_text
 
 LAWS = (
     "event_on_off_dead_zone",
@@ -137,10 +138,12 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--joints", type=int, default=0, help="joints of a bench in place of walks: are verdicts right?"
     )
+    parser.add_argument("--log", type=Path, default=None, help="records of the joints that were run")
     given = parser.parse_args(words)
     if given.joints:
-        counts = count_joints(given.seed, given.joints)
-        print(table_text(counts))
+        records = run_joints(given.seed, given.joints, given.log or Path(f"joints-{given.seed}.jsonl"))
+        counts = counts_of(records)
+        print(table_text(counts), angle_text(records), sep="\n\n")
         return 1 if any(row["good said"] or row["fails silent"] for row in counts.values()) else 0
     draw = random.Random(given.seed)
     devices = [draw_device(draw) for _ in range(given.devices)]

@@ -1,13 +1,15 @@
-"""The public Python interface, which docs/stability.md is about, as text in ``tests/snapshots/public-api.txt``.
+"""The public Python interface, which docs/stability.md is about: a record of it, and the stub that type checkers read.
 
     python scripts/public_api.py
 
-A test compares the file with the package, so that a change of a name or a signature is read in review. Annotations and
-defaults stand as in the source, so that the text is the same under every version of Python and NumPy.
+The record is ``tests/snapshots/public-api.txt``, so that a change of a name or a signature is read in review;
+annotations and defaults stand as in the source, so that the text is the same under every version of Python and NumPy.
+The stub is ``src/ppafo/__init__.pyi``, made of the table of the package. A test compares both with the package.
 """
 
 import ast
 import inspect
+import json
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -17,6 +19,7 @@ import ppafo
 
 FILE = Path(__file__).parents[1] / "tests" / "snapshots" / "public-api.txt"
 WIDTH = 100
+STUB = Path(__file__).parents[1] / "src" / "ppafo" / "__init__.pyi"
 HEAD = "# The public Python interface of ppafo: classes, functions, errors; written by scripts/public_api.py"
 
 
@@ -85,5 +88,14 @@ def public_api() -> str:
     return "\n\n".join([HEAD, *blocks]) + "\n"
 
 
+def stub() -> str:
+    """The imports of all public names, which the package itself makes when a name is first used."""
+    pairs = sorted((home, name) for home, names in vars(ppafo)["_HOMES"].items() for name in names)
+    imports = [f"from {home} import {name} as {name}" for home, name in [*pairs, ("ppafo.version", "__version__")]]
+    names = [f"    {json.dumps(name)}," for name in ppafo.__all__]
+    return "\n".join(["# Written by scripts/public_api.py", *imports, "", "__all__ = [", *names, "]"]) + "\n"
+
+
 if __name__ == "__main__":
     FILE.write_text(public_api(), encoding="utf-8")
+    STUB.write_text(stub(), encoding="utf-8")

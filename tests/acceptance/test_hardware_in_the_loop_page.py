@@ -96,5 +96,5 @@ def test_the_recording_of_a_bench_is_taken_as_the_page_says(desk: Path, capsys: 
     with sending_bench(port):
         words = [word.replace("5002", str(port)) for word in command("record", "static.csv")[1:]]
         assert main(words) == 0
-    assert "ended    by the bench said that it is over" in capsys.readouterr().out
+    assert "ended    by the bench ended the recording" in capsys.readouterr().out
     assert read_recording(desk / "static.csv").kind == "measured"

@@ -1,6 +1,5 @@
 """``import ppafo``: small, quick, and everything in it works."""
 
-import ast
 import importlib
 import runpy
 import subprocess
@@ -21,18 +20,21 @@ def test_every_public_name_can_be_had_and_is_listed() -> None:
     assert sorted(ppafo.__all__) == ppafo.__all__
 
 
-def test_the_names_for_type_checkers_and_their_homes_at_run_time_are_the_same() -> None:
-    tree = ast.parse(Path(str(ppafo.__file__)).read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If))
-    imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
-    checked = {(alias.name, node.module) for node in imports for alias in node.names}
-    found = set(ppafo._HOME_OF.items())
-    paste = [f"    from {home} import {name} as {name}" for name, home in sorted(found - checked, key=str)]
-    paste += [f'    "{home}": ("{name}",),' for name, home in sorted(checked - found, key=str)]
-    assert paste == [], "paste into src/ppafo/__init__.py, imports below TYPE_CHECKING, the rest into _HOMES:\n" + (
-        "\n".join(paste)
-    )
-    assert all(alias.asname == alias.name for node in imports for alias in node.names), "a type checker needs 'as'"
+def test_the_stub_for_type_checkers_is_that_of_the_table() -> None:
+    written = runpy.run_path(str(ROOT / "scripts" / "public_api.py"))["stub"]()
+    stub = (ROOT / "src" / "ppafo" / "__init__.pyi").read_text(encoding="utf-8")
+    assert stub.splitlines() == written.splitlines(), "python scripts/public_api.py"
+
+
+@pytest.mark.long
+def test_a_type_checker_knows_the_types_of_public_names(tmp_path: Path) -> None:
+    pytest.importorskip("mypy")
+    code = "import ppafo\n\nresult: int = ppafo.simulate('step-response')\nppafo.simulated\n"
+    (tmp_path / "user.py").write_text(code, encoding="utf-8")
+    command = [sys.executable, "-m", "mypy", "--config-file=", "--cache-dir", str(tmp_path), "user.py"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert "user.py:3: error: Incompatible types in assignment" in done.stdout
+    assert 'user.py:4: error: Module has no attribute "simulated"' in done.stdout
 
 
 def test_a_name_that_does_not_exist_is_an_attribute_error() -> None:

@@ -1,97 +1,47 @@
 """Arguments: one signature makes the words of a command line and checks the calls in Python."""
 
-from ppafo.arguments.door import checked
-from ppafo.arguments.words import (
-    Address,
-    Angle,
-    Confidence,
-    Count,
-    Duration,
-    File,
-    FileOrName,
-    Flow,
-    Folder,
-    Fraction,
-    Frequency,
-    Gait,
-    Length,
-    Mass,
-    MaximumFailed,
-    Metrics,
-    Minutes,
-    Name,
-    Overrides,
-    Patience,
-    Point,
-    Port,
-    Pressure,
-    Scenario,
-    Seed,
-    SetName,
-    Side,
-    Speed,
-    Tasks,
-    Threads,
-    Time,
-    Torque,
-    Volume,
-    Whole,
-    Word,
-    counting_number,
-    fraction,
-    minutes,
-    number,
-    point,
-    quantity,
-    task,
-    times,
-    whole_number,
-)
-
-__all__ = [
-    "Address",
-    "Angle",
-    "Confidence",
-    "Count",
-    "Duration",
-    "File",
-    "FileOrName",
-    "Flow",
-    "Folder",
-    "Fraction",
-    "Frequency",
-    "Gait",
-    "Length",
-    "Mass",
-    "MaximumFailed",
-    "Metrics",
-    "Minutes",
-    "Name",
-    "Overrides",
-    "Patience",
-    "Point",
-    "Port",
-    "Pressure",
-    "Scenario",
-    "Seed",
-    "SetName",
-    "Side",
-    "Speed",
-    "Tasks",
-    "Threads",
-    "Time",
-    "Torque",
-    "Volume",
-    "Whole",
-    "Word",
-    "checked",
-    "counting_number",
-    "fraction",
-    "minutes",
-    "number",
-    "point",
-    "quantity",
-    "task",
-    "times",
-    "whole_number",
-]
+from ppafo.arguments.door import checked as checked
+from ppafo.arguments.words import Address as Address
+from ppafo.arguments.words import Angle as Angle
+from ppafo.arguments.words import Confidence as Confidence
+from ppafo.arguments.words import Count as Count
+from ppafo.arguments.words import Duration as Duration
+from ppafo.arguments.words import File as File
+from ppafo.arguments.words import FileOrName as FileOrName
+from ppafo.arguments.words import Flow as Flow
+from ppafo.arguments.words import Folder as Folder
+from ppafo.arguments.words import Fraction as Fraction
+from ppafo.arguments.words import Frequency as Frequency
+from ppafo.arguments.words import Gait as Gait
+from ppafo.arguments.words import Length as Length
+from ppafo.arguments.words import Mass as Mass
+from ppafo.arguments.words import MaximumFailed as MaximumFailed
+from ppafo.arguments.words import Metrics as Metrics
+from ppafo.arguments.words import Minutes as Minutes
+from ppafo.arguments.words import Name as Name
+from ppafo.arguments.words import Overrides as Overrides
+from ppafo.arguments.words import Patience as Patience
+from ppafo.arguments.words import Point as Point
+from ppafo.arguments.words import Port as Port
+from ppafo.arguments.words import Pressure as Pressure
+from ppafo.arguments.words import Scenario as Scenario
+from ppafo.arguments.words import Seed as Seed
+from ppafo.arguments.words import SetName as SetName
+from ppafo.arguments.words import Side as Side
+from ppafo.arguments.words import Speed as Speed
+from ppafo.arguments.words import Tasks as Tasks
+from ppafo.arguments.words import Threads as Threads
+from ppafo.arguments.words import Time as Time
+from ppafo.arguments.words import Torque as Torque
+from ppafo.arguments.words import Volume as Volume
+from ppafo.arguments.words import Whole as Whole
+from ppafo.arguments.words import Word as Word
+from ppafo.arguments.words import counting_number as counting_number
+from ppafo.arguments.words import fraction as fraction
+from ppafo.arguments.words import minutes as minutes
+from ppafo.arguments.words import number as number
+from ppafo.arguments.words import point as point
+from ppafo.arguments.words import quantity as quantity
+from ppafo.arguments.words import task as task
+from ppafo.arguments.words import times as times
+from ppafo.arguments.words import whole_number as whole_number

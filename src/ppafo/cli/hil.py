@@ -38,7 +38,7 @@ def hil(
     >>> hil("torque-task-solenoid", port="udp:127.0.0.1:49318", patience=0.2)  # no controller is there
     Traceback (most recent call last):
     ...
-    ppafo.errors.ScenarioError: no controller answers within 0.2 s; came in: nothing
+    ppafo.errors.ScenarioError: no controller answered within 0.2 s; received: nothing
     """
     from ppafo.exports.hil.loop import stop_by_interrupt
     from ppafo.exports.hil.plant import check_forces

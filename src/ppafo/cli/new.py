@@ -100,7 +100,9 @@ def new(
     if kind == EXAMPLE:
         if source is not None or (name is None and out is not None):
             raise DataError(
-                "--from: is not for an example" if source else "--out: needs the NAME of the example to write"
+                "--from: an example has no base file; remove it"
+                if source
+                else "--out: needs the NAME of the example to write"
             )
         from ppafo.cli.examples import list_examples, write_example
 

@@ -71,7 +71,7 @@ def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[fl
     if strikes:
         check_strikes(strikes)
         if "external_torque" not in result.averages:
-            raise ScenarioError(f"{result.scenario.name}: has no whole stride with help to lay on heel strikes")
+            raise ScenarioError(f"{result.scenario.name}: has no complete assisted stride to place on heel strikes")
         mean = result.averages["external_torque"].mean
         parts = [first + PHASES[:-1] * (last - first) for first, last in pairwise(strikes)]
         time = np.append(np.concatenate(parts), strikes[-1])
@@ -89,6 +89,6 @@ def check_strikes(strikes: Sequence[float]) -> None:
     for first, last in pairwise(strikes):
         if not SHORTEST_STRIDE <= last - first <= LONGEST_STRIDE:
             raise ScenarioError(
-                f"--strikes: from {first:g} to {last:g} s is no stride: heel strikes of one foot are "
+                f"--strikes: from {first:g} to {last:g} s is not a stride: heel strikes of one foot are "
                 f"{SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in order"
             )

@@ -64,7 +64,7 @@ def export_firmware(
     if samples is not None and samples > MOST_SAMPLES:
         raise ScenarioError(f"--samples {samples}: must be 1 to {MOST_SAMPLES}")
     if table and (scenarios or overrides):
-        raise ScenarioError("--table: takes no SCENARIO or --set; its scenarios are given")
+        raise ScenarioError("--table runs a fixed list of scenarios: remove SCENARIO and --set")
     if not table and not scenarios:
         raise ScenarioError("give a SCENARIO, or --table; see 'ppafo export firmware --help'")
     output.check_output(out, COMMAND)

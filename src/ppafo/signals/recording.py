@@ -315,7 +315,7 @@ def recording_kind(name: str) -> RecordingKind:
     for kind in _KINDS:
         if kind == name:
             return kind
-    raise DataError(f"{name!r} is no kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
+    raise DataError(f"{name!r} is not a kind of recording{nearest_name(name, _KINDS)}; available: {', '.join(_KINDS)}")
 
 
 def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:

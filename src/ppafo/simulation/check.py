@@ -30,6 +30,8 @@ MARGIN = 1.5
 """Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
 """Errors over the ranges of angle and pressures, and over the gas's temperature, that a run keeps to by default."""
+SMALLEST_TOLERANCE = 1.0e-6
+"""Smallest ``run.tolerance`` that a run may have [-]."""
 
 MOVE = 1.0e-7
 """How far a start or a measurement is moved, as a fraction of its range."""
@@ -61,8 +63,9 @@ class ErrorEstimate:
 
     ``metrics`` has the error of each metric in its SI unit, inf where the finer run has no such number; ``largest`` the
     name of the one whose error is largest over its value or the range of its quantity, empty without metrics, and
-    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other; ``units`` are
-    those in which a person is shown it.
+    ``share`` that ratio [-]. ``temperature`` [K] is of gas with an energy balance, None of any other. ``over_promise``
+    is the largest of angle, pressure and temperature over what a run keeps to by default [-], and ``tolerance`` a
+    ``run.tolerance`` that is small enough, 0 where none is needed; ``units`` are those in which a person is shown it.
     """
 
     angle: float
@@ -71,6 +74,8 @@ class ErrorEstimate:
     temperature: float | None = None
     largest: str = ""
     share: float = 0.0
+    over_promise: float = 0.0
+    tolerance: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -84,7 +89,11 @@ class ErrorEstimate:
         texts = [f"{without_exponent(value, '.1e')} {unit}" for value, unit in shown]
         over_time = f"{', '.join(texts[:-1])} and {texts[-1]}"
         of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
-        return f"Estimated error of the steps: at most {over_time} over time{of_metrics}."
+        beyond = ""
+        if self.over_promise > 1.0:
+            remedy = f": `run.tolerance = {self.tolerance:.1g}` makes it less" if self.tolerance else ""
+            beyond = f" That is {self.over_promise:.2g} times what a run promises{remedy}."
+        return f"Estimated error of the steps: at most {over_time} over time{of_metrics}.{beyond}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,7 +256,23 @@ def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
     temperature = errors_at_end[2] if len(errors_at_end) > 2 else None
     shares = _shares(result, errors)
     worst = max(shares, key=lambda name: shares[name], default="")
-    return ErrorEstimate(angle, pressure, errors, temperature, worst, shares.get(worst, 0.0))
+    device, own = result.scenario.device, result.scenario.run.tolerance
+    promised = LARGEST_OF_PRESSURE * _pressure_range(result)
+    over = [angle / (LARGEST_OF_ANGLE * (device.actuator.angle_max - device.actuator.angle_min)), pressure / promised]
+    if temperature is not None:
+        over.append(temperature / (LARGEST_OF_TEMPERATURE * device.gas.temperature))
+    # The allowed error goes with the tolerance; with half of what is needed it is met.
+    less = max(0.5 * own / max(over), SMALLEST_TOLERANCE)
+    return ErrorEstimate(
+        angle=angle,
+        pressure=pressure,
+        metrics=errors,
+        temperature=temperature,
+        largest=worst,
+        share=shares.get(worst, 0.0),
+        over_promise=max(over),
+        tolerance=less if max(over) > 1.0 and less < own else 0.0,
+    )
 
 
 def _courses_of(result: Ran) -> list[str]:

@@ -84,7 +84,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
     shown = repr(text[:_LONGEST_SHOWN])
     match = _TIME.search(text)
     if match is None:
-        raise DataError(f"{row}: {shown} is no time of day such as '08:00:10,5'")
+        raise DataError(f"{row}: {shown} is not a time of day such as '08:00:10,5'")
     first, second, third = int(match["first"]), int(match["second"]), match["third"]
     if third is not None:
         hour, minute, whole_seconds = first, second, int(third)
@@ -100,7 +100,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
     half_of_day = (match["half"] or "").lower()
     # A leap second is the 60th; a logger that writes minutes and seconds alone may count minutes beyond 59.
     if (third is not None and minute > 59) or whole_seconds > 60 or (half_of_day and not 1 <= hour <= 12):
-        raise DataError(f"{row}: {shown} is no time of day")
+        raise DataError(f"{row}: {shown} is not a time of day")
     if half_of_day:
         hour = hour % 12 + (12 if half_of_day == "p" else 0)
     fraction = float(f"0.{match['fraction']}") if match["fraction"] else 0.0
@@ -131,7 +131,9 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
             readings.append(np.array(days, dtype=np.float64))
     if not readings:
         shown = words[unread_row][:_LONGEST_SHOWN]
-        raise DataError(f"{rows[unread_row]}: {shown!r} is no date such as '2026-03-21', '21.03.2026' or '03/21/2026'")
+        raise DataError(
+            f"{rows[unread_row]}: {shown!r} is not a date such as '2026-03-21', '21.03.2026' or '03/21/2026'"
+        )
     # The days between two rows count, not the date; one that goes backwards is none.
     growing = [days for days in readings if (np.diff(_DAY * days + seconds) > 0.0).all()] or readings
     since_first = [days - days[0] for days in growing]

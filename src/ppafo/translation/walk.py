@@ -70,7 +70,7 @@ class Expressions:
         """The value of an expression."""
         handler: Callable[[Any], Term] | None = getattr(self, f"_of_{type(node).__name__.lower()}", None)
         if handler is None:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no expression of the subset")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
         return handler(node)
 
     def scalar(self, node: ast.expr, least: Scalar = BOOL) -> Term:
@@ -86,7 +86,7 @@ class Expressions:
         """The value of an expression that must be a whole number."""
         term = self.scalar(node, INT)
         if term.type != INT:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no whole number")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not an integer")
         return term
 
     def condition(self, node: ast.expr) -> Term:
@@ -585,7 +585,7 @@ class _FunctionWalk:
                 return self.loop(node, lambda: typed.While(test, self.block(node.body)))
         handler: Callable[[Any], list[Statement]] | None = getattr(self, f"do_{type(node).__name__.lower()}", None)
         if handler is None:
-            raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the subset")
+            raise self.refused(node, f"'{ast.unparse(node).splitlines()[0]}' is not supported in compiled functions")
         return handler(node)
 
     def do_expr(self, node: ast.Expr) -> list[Statement]:
@@ -593,7 +593,7 @@ class _FunctionWalk:
             return [typed.Note(node.value.value)] if isinstance(node.value.value, str) else []
         name = self.values.name_called(node.value) if isinstance(node.value, ast.Call) else ""
         if not isinstance(node.value, ast.Call) or name not in self.module.definitions:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no statement of the subset")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
         function, arguments = self.values.called(name, node.value)
         if function.returns is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' throws away what it returns")

@@ -168,7 +168,7 @@ def condition_of(text: str, unit: str) -> Condition:
             return Condition(temperature, pressure)
     names = ", ".join(CONDITIONS)
     raise UnitError(
-        f"'{unit}': '{text}' is no reference condition{nearest_name(name, CONDITIONS)}; it is one of {names}, or a "
+        f"'{unit}': '{text}' is not a reference condition{nearest_name(name, CONDITIONS)}; it is one of {names}, or a "
         f"temperature and an absolute pressure, such as '{_EXAMPLE}'"
     )
 
@@ -189,5 +189,5 @@ def _molar_mass(word: str) -> float:
     match = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:[eE][+-]?\d+)?)\s*(\S+)\s*", word)
     parsed = None if match is None else parse_unit(match[2])[0]
     if match is None or parsed is None or parsed.dimensions != _MOLAR_MASS or not float(match[1]) > 0.0:
-        raise UnitError(f"'{word}' is no molar mass, such as '0.044 kg/mol'")
+        raise UnitError(f"'{word}' is not a molar mass, such as '0.044 kg/mol'")
     return float(parsed.in_base(Decimal(match[1])))

@@ -118,7 +118,7 @@ def test_a_plant_at_the_rate_of_a_slow_line_asks_for_a_controller_of_that_rate(
             code = main([*words, *overrides, *out])
         vented = json.loads((tmp_path / rate / "link.json").read_text(encoding="utf-8"))["vented"]
         said[rate] = (code, vented, "controller.rate=200Hz" in capsys.readouterr().err)
-    assert said["1 kHz"] == (1, "the controller says that it is not sound", True)
+    assert said["1 kHz"] == (1, "the controller reported a fault", True)
     assert said["200 Hz"] == (0, None, False)
 
 

@@ -222,7 +222,7 @@ def as_version_2(end: End, answers: list[bytes]) -> bool:
 @pytest.mark.parametrize("kind", WIRES)
 def test_a_controller_of_another_version_is_told_in_one_line(kind: str) -> None:
     # A serial reader looks for the next packet in the rest of one that it does not know.
-    said = r"^no controller answers within 0.2 s; came in: .*\d+ version"
+    said = r"^no controller answered within 0.2 s; received: .*\d+ version"
     with (
         serving(kind, ProportionalPartner(), as_version_2) as address,
         pytest.raises(ScenarioError, match=said) as told,

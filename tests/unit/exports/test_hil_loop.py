@@ -247,7 +247,7 @@ def test_the_controller_is_called_until_it_answers_and_begins_anew_each_time() -
 
 def test_where_nobody_answers_one_line_says_what_came_in() -> None:
     wire = VirtualWire(lambda _: [b"hello"])
-    with pytest.raises(ScenarioError, match=r"^no controller answers within 0.05 s; came in: \d+ stray bytes$"):
+    with pytest.raises(ScenarioError, match=r"^no controller answered within 0.05 s; received: \d+ stray bytes$"):
         run_on(wire, patience=0.05)
 
 

@@ -241,7 +241,7 @@ def test_where_nobody_answers_nothing_is_written(tmp_path: Path, capsys: pytest.
     words = ["hil", TASK, "--port", f"udp:127.0.0.1:{free_port()}", "--patience", "0.05 s", "--set", SHORT]
     assert main([*words, "--out", str(tmp_path / "out")]) == 2
     last = capsys.readouterr().err.splitlines()[-1]
-    assert last == "ppafo: no controller answers within 0.05 s; came in: nothing"
+    assert last == "ppafo: no controller answered within 0.05 s; received: nothing"
     assert not list(tmp_path.iterdir())
 
 
@@ -345,7 +345,7 @@ def test_what_is_no_serial_port_is_said_in_words(place: str, tmp_path: Path, mon
     Path("folder").mkdir()
     Path("file").touch()
     os.mkfifo("pipe")
-    with pytest.raises(ScenarioError, match=rf"^--port serial:{place}: cannot be opened: it is no serial port$"):
+    with pytest.raises(ScenarioError, match=rf"^--port serial:{place}: cannot be opened: not a serial port$"):
         open_port(f"serial:{place}")
 
 

@@ -113,14 +113,14 @@ def test_a_duration_is_counted_past_half_of_what_a_time_stamp_holds() -> None:
 def test_a_bench_that_says_it_is_over_ends_the_recording() -> None:
     found = played([*(packet(number) for number in range(9)), packet(9, flags=OVER), packet(10)])
     assert len(found.recording) == 10
-    assert found.ended == "the bench said that it is over"
+    assert found.ended == "the bench ended the recording"
 
 
 @pytest.mark.parametrize(
     ("wrong", "why"),
     [
         (packet(5, run=8), "of another run"),
-        (packet(30, time=START), "of a clock that went back"),
+        (packet(30, time=START), "with a clock that ran backwards"),
         (sample_bytes(Sample(0, 7, WRAP - 15, START + 5000, {"angle": 1})), "with other channels"),
         (answer_bytes(Answer(0, 7, 5, 5, 5)), "no sample"),
     ],
@@ -137,7 +137,7 @@ def test_computed_samples_make_no_measurement() -> None:
 
 
 def test_where_no_sample_comes_one_line_says_what_came() -> None:
-    with pytest.raises(DataError, match=r"^no sample came within 1 s; what came in: 5 stray bytes$"):
+    with pytest.raises(DataError, match=r"^no sample received within 1 s; received: 5 stray bytes$"):
         played([b"hello"])
     with pytest.raises(DataError, match=r"1 without a channel$"):
         played([sample_bytes(Sample(0, 7, 0, 0, {}))])
@@ -273,13 +273,13 @@ def _fail(keep: Callable[[str], None]) -> None:
 def test_a_recording_whose_file_cannot_be_written_stays_aside(tmp_path: Path) -> None:
     target = tmp_path / "bench.csv"
     with (
-        pytest.raises(DataError, match=r"no room; what came is in .*bench\.recording\.csv$"),
+        pytest.raises(DataError, match=r"no room; received samples are in .*bench\.recording\.csv$"),
         kept_aside(target) as keep,
     ):
         _fail(keep)
     assert len(read_recording(tmp_path / "bench.recording.csv")) == 1
     with (
-        pytest.raises(DataError, match=r"bench\.recording\.csv: is there; .* rename it to keep it"),
+        pytest.raises(DataError, match=r"bench\.recording\.csv: exists, .* rename it to keep them"),
         kept_aside(target),
     ):
         pass

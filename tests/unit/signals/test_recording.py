@@ -31,7 +31,7 @@ def test_an_unknown_channel_is_refused_with_the_nearest_name() -> None:
 
 
 def test_an_unknown_kind_is_refused_with_the_nearest_name() -> None:
-    with pytest.raises(DataError, match="'simulatd' is no kind of recording, did you mean 'simulated'"):
+    with pytest.raises(DataError, match="'simulatd' is not a kind of recording, did you mean 'simulated'"):
         Recording("bench", np.array([0.0]), {}, "simulatd")  # type: ignore[arg-type]
 
 

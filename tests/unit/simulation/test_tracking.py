@@ -10,7 +10,7 @@ import pytest
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.parameters.reach import supply_for, torque_reach
-from ppafo.running import simulate, tried
+from ppafo.running import most_reversals, simulate, tried
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking.pair_step import coarse_pair
@@ -61,7 +61,7 @@ def test_a_pair_that_is_too_large_and_a_load_that_is_too_heavy_are_named() -> No
     assert "in the 95 ms that they are late" in pair.tracking.sentence
     pushed = simulate("cylinder-servo", ["motion.external_torque=14 N m"]).tracking
     assert pushed is not None
-    assert "the joint lies on its lower stop: 14 N m work against it" in pushed.sentence
+    assert "the joint lies on its lower stop: it needs 14 N m at" in pushed.sentence
 
 
 @pytest.mark.parametrize(
@@ -115,3 +115,84 @@ def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: 
     metered = run_ensemble(base, columns, with_companions([], base)).metrics
     alone = [simulate(with_numbers(base, {column: value})).tracking is None for value in values]
     assert (follows(metered, base, columns) == 1.0).tolist() == alone
+
+
+RAMP = [
+    "reference.kind=ramp_hold",
+    "reference.start_level=90 deg",
+    "reference.level=80 deg",
+    "reference.ramp_time=0.2 s",
+]
+"""A cylinder that is to turn by 10 deg; give it a load and it starts with chambers that do not carry that."""
+
+
+def test_a_joint_that_is_flung_at_the_start_is_told_so_with_pressures_that_carry_its_load() -> None:
+    changes = [*RAMP, "run.duration=1 s", "motion.external_torque=4 N m"]
+    scenario = load_scenario("cylinder-servo", changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert "at the start its chambers give 0 N m for a load of 4 N m: the joint is flung 19" in verdict.sentence
+    offered = re.search(
+        r"with `(initial.pressure_1 = [^`]*)` and `(initial.pressure_2 = [^`]*)` it does", verdict.sentence
+    )
+    assert offered is not None
+    again = simulate("cylinder-servo", [*changes, *(text.replace(" = ", "=") for text in offered.groups())])
+    assert again.tracking is None
+    assert again.metrics["peak_angle_error"].value < math.radians(5.0)
+
+
+def test_a_load_keeps_its_sign_beside_a_reach_of_the_same_sign() -> None:
+    verdict = simulate("cylinder-servo", ["motion.external_torque=-30 N m"]).tracking
+    assert verdict is not None
+    assert re.search(r"needs -30 N m at \S+ deg, where the actuator gives -\S+ N m at most", verdict.sentence)
+
+
+def test_an_error_that_is_less_than_that_of_the_table_says_from_when_it_counts() -> None:
+    changes = [*RAMP, "run.duration=1 s", "motion.external_torque=4 N m", "valve.sonic_conductance=0.05 L/(s bar)"]
+    result = simulate("cylinder-servo", changes)
+    assert result.tracking is not None
+    assert result.tracking.since == pytest.approx(0.6, abs=0.01)
+    assert "of 10 deg wanted from 0.6 s on" in result.tracking.sentence
+    late = result.recording.time >= result.tracking.since - 1e-9
+    error = (result["angle"] - result["reference_angle"])[late]
+    assert result.tracking.error == pytest.approx(float(np.sqrt(np.mean(error**2))))
+
+
+def test_static_friction_is_named_only_where_it_exceeds_what_the_law_asks_for() -> None:
+    weak = ["controller.kind=cascade", "controller.load_time=0 s", "controller.static_torque=0 N m"]
+    for stiffness in (0.2, 1.0, 3.0, 10.0):
+        changes = [*RAMP, *weak, f"controller.angle_stiffness={stiffness} N m/rad", "motion.external_torque=0 N m"]
+        verdict = simulate("cylinder-servo", changes).tracking
+        named = (
+            None
+            if verdict is None
+            else re.search(r"holds the joint with (\S+) N m.* asks for (\S+) N m", verdict.cause)
+        )
+        assert named is None or float(named[2]) <= float(named[1]), stiffness
+        assert stiffness > 5.0 or named is not None
+
+
+def test_a_bladder_that_nothing_pulls_back_is_said_to_push_one_way_only() -> None:
+    verdict = simulate(
+        "cylinder-servo", ["supply.dorsiflexion_pressure=0 bar_g", "motion.external_torque=-1 N m"]
+    ).tracking
+    assert verdict is not None
+    assert "where the actuator gives 0 N m at most: it pushes one way only" in verdict.sentence
+
+
+@pytest.mark.parametrize(("frequency", "most"), [("0.5 Hz", 20.0), ("6 Hz", 60.0)])
+def test_a_command_may_turn_with_a_reference_that_turns_itself(frequency: str, most: float) -> None:
+    changes = ["reference.kind=sine", "reference.amplitude=1 N m", "reference.level=2 N m", "run.duration=2 s"]
+    scenario = load_scenario("torque-task-slow-valve", [*changes, f"reference.frequency={frequency}"])
+    assert most_reversals(scenario) == pytest.approx(most, abs=8.0)
+
+
+def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_that_keeps_to_it() -> None:
+    exact = simulate("cylinder-servo", ["run.duration=0.3 s"]).error()
+    assert exact.over_promise < 1.0
+    assert "promises" not in exact.sentence
+    coarse = ["run.duration=0.3 s", "motion.external_torque=20 N m", "run.tolerance=0.1"]
+    told = simulate("cylinder-servo", coarse).error()
+    assert told.over_promise > 1.0
+    assert f"`run.tolerance = {told.tolerance:.1g}` makes it less" in told.sentence
+    assert simulate("cylinder-servo", [*coarse[:2], f"run.tolerance={told.tolerance:.1g}"]).error().over_promise < 1.0

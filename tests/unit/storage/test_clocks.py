@@ -84,10 +84,10 @@ def test_dates_of_either_order_are_asked_about_where_it_matters(order: Any, days
 @pytest.mark.parametrize(
     ("cells", "message"),
     [
-        (["25:61:00", "25:62:00"], "line 2: '25:61:00' is no time of day"),
-        (["08:00:00", "noon"], "line 3: 'noon' is no time of day such as"),
-        (["13:00:00 PM", "13:00:01 PM"], "is no time of day"),
-        (["2026-13-41 08:00:00", "2026-13-41 08:00:01"], "line 2: '2026-13-41' is no date such as"),
+        (["25:61:00", "25:62:00"], "line 2: '25:61:00' is not a time of day"),
+        (["08:00:00", "noon"], "line 3: 'noon' is not a time of day such as"),
+        (["13:00:00 PM", "13:00:01 PM"], "is not a time of day"),
+        (["2026-13-41 08:00:00", "2026-13-41 08:00:01"], "line 2: '2026-13-41' is not a date such as"),
         (["08:00:00 CEST", "07:30:00 CET"], "changes its time zone"),
     ],
 )

@@ -4,7 +4,10 @@ A program is linked: where its text calls the vane's ``chambers``, ``chamber_pre
 made of them, it calls its actuator's.
 """
 
+from functools import partial
 from typing import Any, TypeVar
+
+import numpy as np
 
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.engine.scheme.pneumatics import (
@@ -106,6 +109,8 @@ def _of_plant(actuator: ActuatorModel, function: PlainFunction, plant: Any, *giv
         return function(plant, *given)
     # A kind's function takes floats: where numbers are columns it is called for each combination.
     flat = leaves(plant)
+    if not any(isinstance(number, np.ndarray) for number in flat):
+        return over_runs(partial(function, plant), *given)
 
     def alone(*values: float) -> Any:
         return function(rebuilt(actuator.plant, values[: len(flat)]), *values[len(flat) :])

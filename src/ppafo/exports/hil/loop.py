@@ -186,7 +186,7 @@ _WHOLE = 1.0e-9
 
 SILENT, NOT_SOUND, STOPPED, BROKEN = (
     "no answer for 20 ms",
-    "the controller says that it is not sound",
+    "the controller reported a fault",
     "stopped",
     "the port broke",
 )
@@ -319,7 +319,7 @@ class Bench:
                 raise KeyboardInterrupt("interrupted before a controller answered; nothing is written")
             heard = wire.described_refusals(self.reader.refused, self.judge.ignored.items())
             failed = f"; {self.port.failure}" if self.port.failure else ""
-            raise ScenarioError(f"no controller answers within {patience:g} s; came in: {heard}{failed}")
+            raise ScenarioError(f"no controller answered within {patience:g} s; received: {heard}{failed}")
         self.pace.begin()
         self._answered_at = 0.0
         sent, late = 0.0, 0.0

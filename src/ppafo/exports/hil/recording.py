@@ -188,7 +188,7 @@ class Collector:
         for index in np.argsort(np.array(self._numbers), kind="stable").tolist():
             moment = self._stamps[index] if not times else times[-1] + _difference(self._stamps[index], times[-1])
             if times and moment <= times[-1]:
-                self.ignored["of a clock that went back"] += 1
+                self.ignored["with a clock that ran backwards"] += 1
                 continue
             times.append(moment)
             kept.append(index)
@@ -245,7 +245,7 @@ def _why_not(before: wire.Sample, packet: wire.Sample) -> str:
         return _DOUBLED
     if abs(steps) > _FURTHEST:
         return "of another sequence"
-    return "" if elapsed * steps > 0 else "of a clock that went back"
+    return "" if elapsed * steps > 0 else "with a clock that ran backwards"
 
 
 def _difference(later: int, earlier: int) -> int:
@@ -280,10 +280,10 @@ def record(
         ended = _why_ended(collector, port, duration, clock() - heard >= patience, is_stopped())
     if not collector:
         if is_stopped():
-            raise KeyboardInterrupt("interrupted before a sample came; nothing is written")
+            raise KeyboardInterrupt("interrupted before the first sample; nothing is written")
         others = [*collector.ignored.items(), ("of somebody else", port.strangers)]
         came = wire.described_refusals(reader.refused, others)
-        raise DataError(f"no sample came within {patience:g} s; what came in: {came}")
+        raise DataError(f"no sample received within {patience:g} s; received: {came}")
     recording, lost = collector.recording(label)
     return Recorded(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())
 
@@ -301,8 +301,8 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
         file = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     except FileExistsError:
         raise DataError(
-            f"{aside}: is there; it has what an earlier recording kept that was killed, or one that goes on: "
-            "rename it to keep it, or remove it"
+            f"{aside}: exists, with samples of an interrupted recording or of one still running: "
+            "rename it to keep them, or remove it"
         ) from None
     except OSError as error:
         raise DataError(f"{aside}: cannot be written: {reason(error)}") from error
@@ -323,7 +323,7 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
     except (DataError, KeyboardInterrupt) as error:
         # An empty file says nothing and goes away.
         if os.fstat(file).st_size:
-            left = f"; what came is in {aside}"
+            left = f"; received samples are in {aside}"
             raise type(error)(f"{str(error) or 'interrupted'}{left}") from error
         raise
     finally:
@@ -339,7 +339,7 @@ def _why_ended(collector: Collector, port: wire.Port, duration: float | None, is
     if duration is not None and collector and collector.duration >= duration:
         return "its duration"
     if collector.is_over:
-        return "the bench said that it is over"
+        return "the bench ended the recording"
     if port.failure:
         return port.failure
     if len(collector) >= MOST_SAMPLES:

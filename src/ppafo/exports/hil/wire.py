@@ -394,7 +394,7 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
             number = error.errno if isinstance(error, OSError) else None
             why = one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
             if address and Path(address).exists() and not _is_terminal(address):
-                why = "it is no serial port"
+                why = "not a serial port"
             raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {why}") from error
         return SerialPort(device)
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")

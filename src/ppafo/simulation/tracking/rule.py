@@ -20,7 +20,7 @@ from ppafo.metrics.tracking import SUSTAINED
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.parameters.reach import torque_reach
 from ppafo.signals import Recording
-from ppafo.simulation.profiles import limits_of
+from ppafo.simulation.profiles import limits_of, profile_bounds, profile_values
 from ppafo.simulation.scenario import Scenario
 
 LARGEST_SHARE = 0.05
@@ -39,6 +39,10 @@ LARGEST_PEAK_WALK = 1.5
 """Peak torque of a walk over the torque limit of its controller [-]."""
 MOST_PER_STRIDE, MOST_PER_SECOND = 12.0, 10.0
 """Reversals of the command above which a loop oscillates."""
+PER_TURN = 2.0
+"""Reversals of the command more for each one of the reference: there and back."""
+_TIMES_OF_REFERENCE = 4000
+"""Times at which a reference is looked at to count its reversals."""
 SMALLEST_MOVE = 0.01
 """Share of the wanted change below which the value does not move [-]."""
 SMALLEST_CHANGE = 0.05
@@ -64,7 +68,8 @@ class SettledPart(NamedTuple):
     of a walk the RMS of the request; ``error`` is the RMS error, ``missing`` its mean and ``swing`` its standard
     deviation; ``turns`` counts reversals of the error, 0 below ``SUSTAINED``. ``moved`` is the range of the value over
     the run, ``peak`` its largest change in the wanted direction, 0 where that says nothing. ``rests`` where reference
-    and joint stand still; ``ends_on_ramp`` where the run ends before a monotone reference rests.
+    and joint stand still; ``ends_on_ramp`` where the run ends before a monotone reference rests. ``start`` [s] is when
+    it begins, 0 for a walk.
     """
 
     samples: slice | NDArray[np.bool_]
@@ -78,6 +83,7 @@ class SettledPart(NamedTuple):
     peak: float
     rests: bool
     ends_on_ramp: bool = False
+    start: float = 0.0
 
     @property
     def share(self) -> float:
@@ -96,7 +102,17 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
     if stride_time > 0.0:
         return duration * MOST_PER_STRIDE / stride_time
     # A run of tenths of a second is a transient: a few reversals are its rate, and no oscillation.
-    return max(duration, 1.0) * MOST_PER_SECOND
+    return max(duration, 1.0) * MOST_PER_SECOND + PER_TURN * _turns_of_reference(scenario, duration)
+
+
+def _turns_of_reference(scenario: Scenario, duration: float) -> float:
+    """Reversals of the reference of a task in a time [s]; of a profile without numbers of one run 0."""
+    if not scenario.follows_reference or any(np.ndim(number) for number in scenario.reference.settings.values()):
+        return 0.0
+    lowest, highest = profile_bounds(scenario.reference)
+    times = np.linspace(0.0, duration, _TIMES_OF_REFERENCE)
+    values = np.asarray(profile_values(scenario.reference, times)[0], dtype=np.float64)
+    return float(reversals(values, OSCILLATION_THRESHOLD * (highest - lowest))) if highest > lowest else 0.0
 
 
 def settled_walk(recording: Recording) -> SettledPart | None:
@@ -147,6 +163,7 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
         peak=_peak(scenario, reference, value) if asked >= wanted else 0.0,
         rests=rests,
         ends_on_ramp=not rests and first is None and _is_monotone(reference),
+        start=float(time[samples][0]),
     )
 
 

@@ -11,7 +11,9 @@ from ppafo.metrics.metric import has_reference
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.causes import Case, cause_of_task, torque_beyond_reach
+from ppafo.simulation.tracking.case import Case
+from ppafo.simulation.tracking.causes import cause_of_task
+from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
     LARGEST_SHARE,
@@ -42,7 +44,8 @@ class Tracking:
     ``error`` and ``wanted`` are the RMS error of the settled part and the change wanted, ``missing`` the mean error,
     ``moved`` how far the value went, all in SI of what is ``controlled``. ``reversals`` are the command's ``per``
     stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``tried`` what
-    did; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one.
+    did; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one. The
+    settled part begins at ``since`` [s], 0 for a walk.
     """
 
     kind: Failure
@@ -59,6 +62,7 @@ class Tracking:
     accepted: str = ""
     tried: str = ""
     at_rest: bool = True
+    since: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -86,14 +90,19 @@ class Tracking:
             return f"the {words} loop does not move: {plain_moved} of {wanted} wanted"
         if self.kind == "oscillates":
             often = f"{self.reversals:.3g} reversals a {self.per}"
-            return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted"
+            return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{self.time_text}"
         if self.kind == "overshoots":
             return f"the {words} overshoots: {plain_moved} of {wanted} wanted at most"
         if self.rests and self.at_rest:
             missing = change_text(self.controlled, abs(self.missing))
             side = "below" if self.missing < 0.0 else "above"
             return f"the {words} stays {missing} {side} its reference, of {wanted} wanted"
-        return f"the {words} does not follow its reference: RMS {plain_error} of {wanted} wanted"
+        return f"the {words} does not follow its reference: RMS {plain_error} of {wanted} wanted{self.time_text}"
+
+    @property
+    def time_text(self) -> str:
+        """Settled part in words, in which the error is less than that of the whole run among the metrics."""
+        return f" from {self.since:.3g} s on" if self.since > 0.0 else ""
 
     @property
     def _help(self) -> str:
@@ -135,10 +144,11 @@ def tracking_of(
         failure = failure_of_task(settled, is_restless, law is not None and law.only_switches)
     else:
         failure = failure_of_walk(settled, is_restless, limit)
-    case = Case(scenario=scenario, law=law, recording=recording, settled=settled, oscillates=failure == "oscillates")
+    case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
     # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
     if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
         failure = "does not follow" if torque_beyond_reach(case) is not None else None
+        case = case._replace(failure=failure)
     if failure is None:
         return None
     cause = cause_of_task(case) if is_task else cause_of_walk(case)
@@ -156,6 +166,7 @@ def tracking_of(
         remedies=cause.remedies,
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
+        since=settled.start,
     )
 
 

@@ -7,7 +7,8 @@ import numpy as np
 from ppafo.metrics.metric import followed
 from ppafo.parameters.reach import static_torque, supply_for, torque_reach
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.tracking.causes import Case, Cause, gains_of_another_device, oscillation
+from ppafo.simulation.tracking.case import Case, Cause
+from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation
 from ppafo.simulation.tracking.remedies import level_text, remedy, sized_valves
 
 _OFTEN = 0.1

@@ -1,0 +1,50 @@
+"""Run that does not follow its reference, and a cause of that."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.control.kind import ControllerKind
+from ppafo.metrics.switching import SHUT
+from ppafo.signals import Recording
+from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.remedies import Remedy
+from ppafo.simulation.tracking.rule import Failure, SettledPart
+
+_FULLY_OPEN = 0.98
+"""Command above which a valve counts as fully open [-]."""
+
+
+class Case(NamedTuple):
+    """Run that does not follow: scenario, law (None for a Python controller), recording, settled part, failure."""
+
+    scenario: Scenario
+    law: ControllerKind | None
+    recording: Recording
+    settled: SettledPart
+    failure: Failure | None
+
+    @property
+    def oscillates(self) -> bool:
+        """True for a loop that swings or whose command reverses too often."""
+        return self.failure == "oscillates"
+
+    @property
+    def only_switches(self) -> bool:
+        """True for a law that opens the valve fully or not at all."""
+        return self.law is not None and self.law.only_switches
+
+    @property
+    def fully_open(self) -> float:
+        """Share of the settled part in which the valve is fully open [-]."""
+        command = np.abs(self.recording["command"][self.settled.samples])
+        return float(np.mean((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT)))
+
+
+class Cause(NamedTuple):
+    """Cause in words with numbers, remedies to try, advice where none helps, and whether it is a lack of torque."""
+
+    text: str
+    remedies: tuple[Remedy, ...] = ()
+    advice: str = ""
+    is_beyond_reach: bool = False

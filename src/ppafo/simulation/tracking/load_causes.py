@@ -1,0 +1,125 @@
+"""Causes beside the loop: a torque or a load beyond reach, and chambers that do not carry the load at the start."""
+
+import numpy as np
+
+from ppafo.metrics.metric import Floats, followed
+from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.model.plant import gravity_torque
+from ppafo.parameters.reach import static_torque, supply_for, torque_reach
+from ppafo.simulation.numbers import number_at
+from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.tracking.case import Case, Cause
+from ppafo.simulation.tracking.remedies import change_text, level_text, remedy, stiffer_laws, torque_asked
+
+_ON_STOP = 1.0e-3
+"""Distance from a stop up to which a joint lies on it [rad]."""
+_MOSTLY = 0.5
+"""Share of the settled part that is most of it [-]."""
+_ONE_WAY = 0.05
+"""Reach one way over the reach the other way, below which an actuator pushes one way only [-]."""
+_PULLED_BACK = 0.1
+"""Share of the reach of an actuator that pushes one way with which a load may pull its joint back [-]."""
+_FLUNG = 0.5
+"""Way from the reference over the wanted change by which a joint is flung at the start [-]."""
+
+
+def torque_beyond_reach(case: Case) -> Cause | None:
+    """A torque is wanted that the supplies of the device do not give at that angle."""
+    scenario, samples = case.scenario, case.settled.samples
+    if scenario.controlled != TORQUE:
+        return None
+    reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
+    place = int(np.argmax(np.abs(reference)))
+    wanted, there = float(reference[place]), float(angle[place])
+    lowest, highest = torque_reach(scenario.device, there)
+    if lowest <= wanted <= highest:
+        return None
+    reach, supply = (highest, "supply.pressure") if wanted > highest else (lowest, "supply.dorsiflexion_pressure")
+    text = (
+        f"at {level_text('rad', there, scenario)} and {level_text('Pa', number_at(scenario, supply), scenario)} the "
+        f"actuator gives {level_text('N m', reach, scenario)} at most"
+    )
+    remedies = []
+    needed = supply_for(scenario.device, there, 1.05 * wanted)
+    if needed is not None:
+        remedies.append(remedy(scenario, {supply: needed}))
+    if "level" in scenario.reference.settings and not scenario.reference.kind.startswith("sine"):
+        remedies.append(remedy(scenario, {"reference.level": 0.95 * reach}))
+    return Cause(text, tuple(remedies), is_beyond_reach=True)
+
+
+def load_beyond_reach(case: Case) -> Cause | None:
+    """What works on a free joint is more than the actuator gives where the joint is to be."""
+    scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
+    if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
+        return None
+    reference, angle = (series[case.settled.samples] for series in followed(case.recording))
+    wanted, outside = float(np.mean(reference)), float(motion.outside_torque)
+    lowest, highest = torque_reach(device, wanted)
+    load = outside + float(gravity_torque(wanted, device.foot_plate.gravity_torque))
+    # A joint that rests beside its reference needs what breaks its static friction, too.
+    holding = float(device.friction.static_torque) if case.settled.rests else 0.0
+    is_within = lowest <= load <= highest
+    is_high = load > highest if not is_within else case.settled.missing < 0.0
+    needed_torque = load if not is_within else load + holding if is_high else load - holding
+    if lowest <= needed_torque <= highest:
+        return None
+    reach, supply = (highest, "supply.pressure") if is_high else (lowest, "supply.dorsiflexion_pressure")
+    stop = stop_of(scenario, angle)
+    rests = f"the joint lies on its {stop} stop: " if stop else ""
+    works, gives = (level_text("N m", torque, scenario) for torque in (needed_torque, reach))
+    against = "" if not is_within else f" to break its static friction of {level_text('N m', holding, scenario)}"
+    text = (
+        f"{rests}it needs {works} at {level_text('rad', wanted, scenario)}{against}, where the actuator gives {gives} "
+        "at most"
+    )
+    needed = supply_for(device, wanted, 1.3 * needed_torque)
+    changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
+    advice = ""
+    if abs(reach) <= _ONE_WAY * max(abs(lowest), abs(highest)):
+        text, advice = f"{text}: it pushes one way only", "let a spring or a weight pull it back"
+        back = reach + (1.5 if not is_high else -1.5) * holding + _PULLED_BACK * (highest + lowest)
+        changes.append({"motion.external_torque": back - (load - outside)})
+    elif outside:
+        changes.append({"motion.external_torque": 0.7 * reach - (load - outside)})
+    remedies = [remedy(scenario, numbers) for numbers in changes]
+    # A law without an integral requests no torque where there is no error, and knows nothing of the load.
+    if torque_asked(scenario, case.law, case.settled.error) is not None:
+        for numbers in changes:
+            held = abs(numbers.get("motion.external_torque", outside)) + float(device.friction.static_torque)
+            remedies += stiffer_laws(scenario, held, case.settled, numbers)
+    return Cause(text, tuple(remedies), advice)
+
+
+def stop_of(scenario: Scenario, angle: Floats) -> str:
+    """Stop on which a joint lies for most of some samples, "" where it lies on none."""
+    ends = (("lower", scenario.device.actuator.angle_min), ("upper", scenario.device.actuator.angle_max))
+    return next((word for word, stop in ends if np.mean(np.abs(angle - stop) <= _ON_STOP) > _MOSTLY), "")
+
+
+def flung_at_start(case: Case) -> Cause | None:
+    """The pressures at the start do not carry the load, which flings the joint away before the loop holds it."""
+    scenario, motion, device, initial = case.scenario, case.scenario.motion, case.scenario.device, case.scenario.initial
+    if case.oscillates or scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
+        return None
+    reference, angle = followed(case.recording)
+    start = float(angle[0])
+    load = float(motion.outside_torque) + float(gravity_torque(start, device.foot_plate.gravity_torque))
+    own = static_torque(device)
+    lacking = load - own(start, float(initial.pressure_1), float(initial.pressure_2))
+    # A lack of torque turns the joint to smaller angles.
+    flung = float(np.max((reference - angle) * np.sign(lacking)))
+    if abs(lacking) <= float(device.friction.static_torque) or flung <= _FLUNG * case.settled.wanted:
+        return None
+    room = float(device.supply.atmospheric_pressure)
+    needed = supply_for(device, start, load)
+    text = (
+        f"at the start its chambers give {level_text('N m', load - lacking, scenario)} for a load of "
+        f"{level_text('N m', load, scenario)}: the joint is flung {change_text(ANGLE, flung)} away before "
+        "they are filled"
+    )
+    pressures = {"initial.pressure_1": room, "initial.pressure_2": room}
+    if needed is not None:
+        pressures["initial.pressure_1" if load > own(start, room, room) else "initial.pressure_2"] = needed
+    remedies = [] if needed is None else [remedy(scenario, pressures)]
+    return Cause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")
