@@ -90,10 +90,10 @@ def public_api() -> str:
 
 def stub() -> str:
     """The imports of all public names, which the package itself makes when a name is first used."""
-    pairs = sorted((home, name) for home, names in vars(ppafo)["_HOMES"].items() for name in names)
-    imports = [f"from {home} import {name} as {name}" for home, name in [*pairs, ("ppafo.version", "__version__")]]
+    table = {**vars(ppafo)["_HOMES"], "ppafo.version": ("__version__",)}
+    imports = [f"from {home} import {name} as {name}" for home in sorted(table) for name in sorted(table[home])]
     names = [f"    {json.dumps(name)}," for name in ppafo.__all__]
-    return "\n".join(["# Written by scripts/public_api.py", *imports, "", "__all__ = [", *names, "]"]) + "\n"
+    return "\n".join(["# Written by scripts/public_api.py", "", *imports, "", "__all__ = [", *names, "]"]) + "\n"
 
 
 if __name__ == "__main__":

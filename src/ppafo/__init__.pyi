@@ -1,4 +1,5 @@
 # Written by scripts/public_api.py
+
 from ppafo.analyses.compare.question import compare as compare
 from ppafo.analyses.design.loading import load_design as load_design
 from ppafo.analyses.design.profile.answer import Sizing as Sizing
@@ -68,12 +69,12 @@ from ppafo.storage import read_recording as read_recording
 from ppafo.storage import read_result as read_result
 from ppafo.studies.loading import list_studies as list_studies
 from ppafo.studies.loading import load_study as load_study
+from ppafo.version import __version__ as __version__
 from ppafo.walking import compare_walks as compare_walks
 from ppafo.walking import list_walks as list_walks
 from ppafo.walking import load_walk as load_walk
 from ppafo.walking import walk_population as walk_population
 from ppafo.walking.walk import walk as walk
-from ppafo.version import __version__ as __version__
 
 __all__ = [
     "ArgumentError",

@@ -1,4 +1,4 @@
-"""One way to end before the work is done: Ctrl-C, a request to end, a terminal that closes.
+"""Early end of the work: Ctrl-C, a request to end, or a terminal that closes, handled alike.
 
 Each raises KeyboardInterrupt where the main thread is, and is remembered: a finaliser drops the exception, so does
 compiled code that hands none on, and a library may catch it. Work that goes in blocks reads the memory between two of

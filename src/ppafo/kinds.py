@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 logger = logging.getLogger("ppafo")
 
 Kind = TypeVar("Kind")
-"""What a catalogue holds: it has a ``name``, or is a function of another package, which its entry point names."""
+"""Entry of a catalogue: it has a ``name``, or is another package's function, named by its entry point."""
 
 
 class Kinds(MutableMapping[str, Kind], Generic[Kind]):

@@ -1,4 +1,4 @@
-"""From a name or a file to a scenario, whatever moves its ankle: a vane alone, or a leg that walks.
+"""Loading of a scenario by name or file, whatever moves its ankle: a vane alone, or a leg that walks.
 
 The code of walks, which is much, is loaded only where one is asked for.
 """

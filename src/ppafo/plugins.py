@@ -21,7 +21,7 @@ Plugins = Iterable[str | Path]
 """Files (``laws.py``) or modules (``my_laws.hysteresis``) of the person."""
 
 VARIABLE = "PPAFO_PLUGINS"
-"""What child processes inherit: they know the modules that were named here."""
+"""Environment variable by which child processes inherit the names of the plug-in modules."""
 
 _NAME = r"[^\W\d]\w*(?:\.[^\W\d]\w*)*"
 _MODULE, OBJECT = re.compile(_NAME), re.compile(rf"{_NAME}:[^\W\d]\w*")

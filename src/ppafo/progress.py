@@ -1,4 +1,4 @@
-"""How far long work is: one kind of report for all of it, and the line that shows it on the side."""
+"""Progress of long work: one report for all kinds of it, and the line that shows it."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ _BETWEEN_LINES = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What is being done, how much of it is done, and how long that took.
+    """Progress of a task: its name, the fraction done, and the time it took.
 
     ``total`` is 0 where nobody knows it. Of ``done``, ``earlier`` were there at the start and ``failed`` failed;
     ``elapsed`` are the seconds since the start.
@@ -42,7 +42,7 @@ class Progress:
 
 
 Report = Callable[[Progress], None]
-"""What long work calls now and then; it may raise KeyboardInterrupt."""
+"""Callback of long work; it may raise KeyboardInterrupt."""
 
 
 def report_nothing(_progress: Progress) -> None:

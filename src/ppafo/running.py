@@ -108,7 +108,10 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
             best = (remedy, left.error)
     if best is not None:
         error = change_text(verdict.controlled, best[1])
-        return replace(verdict, tried=f"with {best[0].text} an RMS error of {error} is left{verdict.time_text}, as a further run shows")
+        return replace(
+            verdict,
+            tried=f"with {best[0].text} an RMS error of {error} is left{verdict.time_text}, as a further run shows",
+        )
     names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
     advice = f"{verdict.advice}; " if verdict.advice else ""
     return replace(verdict, tried=f"{advice}other {names} alone did not mend it")

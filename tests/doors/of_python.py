@@ -110,17 +110,6 @@ def assert_same_channels(found: Mapping[str, Floats], answer: Answer, but: Seque
     assert not differ, differ
 
 
-def assert_near_channels(found: Mapping[str, Floats], answer: Answer, share: float) -> None:
-    """Every channel that Python has too differs by at most a share of its range."""
-    differ = {
-        name: (float(np.abs(values - expected).max()), float(np.ptp(expected)))
-        for name, values in found.items()
-        if (expected := answer.channels.get(name)) is not None
-        and np.abs(values - expected).max() > share * np.ptp(expected)
-    }
-    assert not differ, differ
-
-
 def assert_near_metrics(found: Mapping[str, float], answer: Answer) -> None:
     """Every metric that Python has too is near; NaN stands for one that a run has not."""
     shared = {name: value for name, value in found.items() if name in answer.metrics}

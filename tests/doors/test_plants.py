@@ -7,17 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.engine.run import whole_and_rest
 from ppafo.exports.fmu.interface import plant_alone
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit
 from ppafo.running import simulate
-from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from scripts.instances import Instance
 from tests.doors.of_python import (
     Floats,
     answer_of,
-    assert_near_channels,
     assert_same_channels,
     parameters,
     run_by,
@@ -30,23 +27,6 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine"),
     pytest.mark.skipif(host_platform() != "linux64", reason="units are run in the tests on linux64 alone"),
 ]
-
-
-ALLOWED = 1.0e-3
-"""Share of the range of a channel by which a plant may differ that has other steps than the loop, or another path."""
-
-
-def has_other_steps(scenario: Scenario) -> bool:
-    """Whether the plant alone cannot have the steps of the closed loop.
-
-    An ankle that is led has the path between two samples from the inputs of the first. And where sensors look inside a
-    step, the loop ends a part there; no sensor looks at a plant alone.
-    """
-    motion = scenario.motion
-    is_led = isinstance(motion, PrescribedMotion) and motion.locked_angle is None
-    run, _ = scenario.motion.motion_kind.plan(scenario)
-    _, lag = whole_and_rest(run.signal_delay, run.step)
-    return is_led or lag > 0.0
 
 
 def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, Floats]:
@@ -70,8 +50,6 @@ def replayed(file: str, time: Floats, channels: dict[str, Floats]) -> dict[str, 
 @pytest.mark.usefixtures("quick_units")
 @pytest.mark.parametrize("case", parameters())
 def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_path: Path) -> None:
-    if case.name == "torque-task-anti-windup":
-        pytest.xfail("open: the plant of this long case differs from the loop")
     scenario = scenario_of(case)
     plant = plant_alone(scenario)
     with run_by(""):
@@ -79,7 +57,4 @@ def test_a_plant_under_recorded_inputs_has_the_bits_of_the_loop(case: Case, tmp_
     ((name, content),) = functional_unit(plant, 2, ["linux64"]).items()
     (tmp_path / name).write_bytes(content)
     found = replayed(str(tmp_path / name), answer.time, dict(answer.channels))
-    if has_other_steps(scenario):
-        assert_near_channels(found, answer, ALLOWED)
-    else:
-        assert_same_channels(found, answer)
+    assert_same_channels(found, answer)

@@ -1,4 +1,4 @@
-"""What a parameter takes of a call in Python, by the annotation that makes it an argument of a command as well."""
+"""Conversion of a Python argument by the annotation that also makes it an argument of a command."""
 
 import builtins
 import dataclasses
@@ -45,7 +45,7 @@ class _Names(dict[str, Any]):
 def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
     """Return the parameters by name, each with what its annotation says; a class that is not loaded is a ``NotLoaded``.
 
-    A parameter without an annotation has that of ``inspect``, as a function of somebody else may.
+    A parameter without an annotation has the empty one of ``inspect``, as a function of somebody else may.
     """
     said = _annotations(function)
     # As the function was written: a reader of help may be shown another signature.
@@ -284,4 +284,4 @@ _PLAIN: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     float: ("a finite number", taken_number()),
     Path: ("a path", _taken_path),
 }
-"""What a type without a ``Word`` takes."""
+"""Description and converter of each type without a ``Word``."""

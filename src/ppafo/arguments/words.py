@@ -30,7 +30,7 @@ _EXAMPLES = {
     "Hz": ("a frequency", ("Hz",)),
     "rad": ("an angle", ("deg", "rad")),
 }
-"""What a quantity is called, and the units in which people write it."""
+"""Description of each quantity, and units in which people write it."""
 _SHOWN_AGAIN = ("Pa_a", "N m", "kg/s", "m^3")
 """Quantities that differ from laboratory to laboratory, which people are shown in the unit that they gave."""
 _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
@@ -39,12 +39,12 @@ _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """How the text of a parameter is written and read, and what it takes of a call in Python.
+    """Text form of a parameter: how a command shows and parses it, and the values that a Python call may give.
 
     ``metavar`` is its name in the help, ``read`` turns the text into the value. ``take`` turns a Python value into the
     one that the function gets, with a ValueError for any other, and ``what`` names the values that it takes; without it
     the type of the annotation decides. ``option`` is its name where that is not the name of the parameter, and makes an
-    option of a parameter that Python takes by position. ``help`` is that of every function which says nothing else.
+    option of a parameter that Python takes by position. ``help`` is the default help text of the option.
     ``const`` is what an option without its value stands for, ``off`` the option that switches a flag off.
     ``is_repeated`` is said of several values whose type is not a sequence alone; ``takes_all`` where ``take`` gets all
     of them at once.

@@ -97,14 +97,14 @@ _PLAIN: Mapping[type, Word] = {
     float: Word("NUMBER", number),
     Path: Word("FILE", Path),
 }
-"""How a type without a ``Word`` is read."""
+"""Parser of each type without a ``Word``."""
 
 _PARAMETER = re.compile(r"(\w+): (.*)")
 
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What an annotation says of the text of a parameter."""
+    """Option type: how an annotation turns the text of a parameter into its value."""
 
     word: Word
     is_flag: bool = False
@@ -311,7 +311,7 @@ def _list(command: Command, as_json: bool) -> int:
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")
-"""What argparse makes of an ArgumentTypeError."""
+"""Form of argparse's message for an ArgumentTypeError."""
 
 _NEGATIVE_NUMBER = re.compile(r"-\d+|-\d*\.\d+")
 
@@ -325,7 +325,7 @@ class CommandParser(argparse.ArgumentParser):
     """A parser that raises ``UsageError`` where argparse would print its usage and end the process."""
 
     list_commands: Callable[[], str] | None = None
-    """What follows the description in the help; made only there, as it loads every verb."""
+    """Writer of the text after the description in the help; called only there, as it loads every command."""
 
     def format_help(self) -> str:
         """Return the help, with the commands where there are some."""

@@ -15,7 +15,7 @@ _FOLDER = resources.files("ppafo") / "examples"
 
 @dataclass(frozen=True, slots=True)
 class Example:
-    """What an example shows, the page that explains it, and its commands in order."""
+    """Example of the documentation: its title, the page that explains it, and its commands in order."""
 
     summary: str
     page: str

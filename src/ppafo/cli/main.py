@@ -25,7 +25,7 @@ _NAMES = {
     "GAIT": "ppafo.gait:list_gaits",
     "BOTTLE": "ppafo.parameters.bottles.bottle:list_bottles",
 }
-"""What lists the names that come with the package, by the word for a value in the help."""
+"""Function that lists the bundled names, by the placeholder of a value in the help."""
 _SCRIPT = """\
 {head}_ppafo() {{
   local word="${{COMP_WORDS[COMP_CWORD]}}" words="{commands}"
@@ -88,7 +88,7 @@ learn
   ppafo new example                         the examples of the how-to pages, ready to run
 
 All commands: ppafo --help"""
-"""What ``ppafo`` alone prints."""
+"""Text of ``ppafo`` without arguments."""
 
 EXIT_BAD_INPUT = 2
 _LONGEST_MESSAGE = 1000

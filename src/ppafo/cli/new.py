@@ -74,7 +74,7 @@ KINDS: dict[str, _NewFile] = {
         "ppafo sets parts --catalogue FILE",
     ),
 }
-"""What can be begun. To add one: a template of that name in ``templates``, and an entry here."""
+"""Kinds of file that ``ppafo new`` writes. To add one: a template of that name in ``templates``, and an entry here."""
 
 
 EXAMPLE = "example"

@@ -141,7 +141,7 @@ def said_files(said: Said) -> dict[str, bytes]:
 
 
 _UNPRINTABLE = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
-"""What a terminal takes for an order, or for another direction of writing: texts come from files of others."""
+"""Characters that control a terminal or change the direction of writing: texts may come from foreign files."""
 
 
 def print_result(text: str, document: Mapping[str, Any], as_json: bool) -> None:

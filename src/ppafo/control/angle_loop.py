@@ -34,7 +34,7 @@ LOAD_TIME = "time constant of the observed load"
 TORQUE_LAG = "time constant of the torque loop"
 TOLERANCE = "tolerance of the angle"
 REST_DISTANCE = "turn of a joint that shows motion"
-"""What a default may follow: the numbers that the functions below give."""
+"""Names of the loop's numbers that the default of a setting may follow; the functions below compute them."""
 
 OUTER_TIMES_INNER = 8.0
 """1/(w theta): four times the delay of the inner loop, which is two dead times."""
@@ -56,7 +56,7 @@ THIRD = 1.0 / 3.0
 
 
 class Joint(NamedTuple):
-    """What turns, with the gas behind it.
+    """Joint dynamics: inertia, friction and range of what turns, with the gas behind it.
 
     Inertia [kg m^2], gas spring [N m/rad], viscous damping [N m s/rad], friction in motion and static friction [N m],
     the way [rad] that it is to go at a time, largest torque of gravity [N m], and resolution and noise of the angle
@@ -132,7 +132,7 @@ def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
 
 
 def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:
-    """Command per torque error [1/(N m)]: that of the torque loop, 1/(2 R theta)."""
+    """Command per torque error [1/(N m)], as in the torque loop: 1/(2 R theta)."""
     return 0.5 / torque_in_dead_time(loop)
 
 

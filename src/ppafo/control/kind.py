@@ -1,4 +1,4 @@
-"""What a controller and a profile declare of themselves, and what the defaults of their settings may follow."""
+"""Declarations of controllers and profiles, and device numbers that the defaults of their settings may follow."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ OPEN_LOOP = "constant"
 
 VALVE_LAG, VALVE_DELAY = "lag of the valve", "dead time of the valve"
 PRESSURE_LAG, FORCE_LAG = "lag of the pressure sensors", "lag of the force sensors"
-"""What the default of a setting may follow of a device that has them: names in ``Quantity.follows``."""
+"""Sensor lags that the default of a setting may follow, where a device has them: names for ``Quantity.follows``."""
 
 NOMINAL = {
     name: f"nominal {name.replace('_', ' ')}"
@@ -53,13 +53,13 @@ NOMINAL = {
         "line_relieving",
     )
 }
-"""What the default of a setting may follow of the device, for a controller that knows it, by its number in the model.
+"""Device numbers that the default of a model-based controller's setting may follow, by their name in the model.
 
 ``simulation.nominal`` gives each its value.
 """
 
 Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
-"""What makes the numbers of a law from its settings."""
+"""Function that computes the numbers of a law from its settings."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from ppafo.model.elementary import TURN, sine_and_cosine_of_turns
 
 
 class ConstantProfile(NamedTuple):
-    """One level, in the unit of what is prescribed."""
+    """Constant reference, in the unit of the prescribed quantity."""
 
     level: Annotated[float, Number("", "the level")]
 
@@ -313,7 +313,7 @@ def _quantity(name: str) -> Quantity:
 
 
 _VALUES = tuple(f"value_{number:02}" for number in range(1, KNOTS + 1))
-"""They count from the level."""
+"""Settings of the knots' values, relative to the level."""
 
 TABLE = ProfileKind(
     name="tabulated",

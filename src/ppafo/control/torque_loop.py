@@ -34,7 +34,7 @@ DEAD_ZONE = "dead zone of the torque loop"
 RELEASE = "release of the torque loop"
 LEARNING_GAIN = "learning gain of the torque loop"
 LEAD = "lead of the torque loop"
-"""What a default may follow: the numbers that the functions below give."""
+"""Names of the loop's numbers that the default of a setting may follow; the functions below compute them."""
 
 LEAST_TORQUE = 5.0e-4
 """N m: a valve that moves the torque by less in the dead time leaves the gains at those of this."""

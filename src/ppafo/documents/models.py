@@ -62,7 +62,7 @@ def quote(value: object) -> str:
 
 @dataclass(frozen=True, slots=True)
 class _Spot:
-    """Where in a file a problem is: dotted path, the model that holds its last key, and the type of what is there."""
+    """Location of a problem in a file: dotted path, the model of its last key, and the type of its value."""
 
     path: str
     holder: Any
@@ -186,10 +186,10 @@ _SENTENCES: dict[str, Callable[[_Spot, ErrorDetails], str]] = {
 Model = TypeVar("Model", bound=BaseModel)
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
-"""What the name of a set or scenario looks like."""
+"""Pattern of the name of a set or scenario."""
 
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
-"""How the text of a number with its unit begins."""
+"""Pattern of the start of a number with its unit."""
 
 
 class StrictTable(BaseModel):

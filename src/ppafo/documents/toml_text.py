@@ -1,4 +1,4 @@
-"""From a name or a path to the document in a TOML file; every mistake is one clear line."""
+"""Reading of TOML files, by name or path; every mistake is one clear line."""
 
 import copy
 import os

@@ -29,7 +29,7 @@ TRACED_IN_WALKS: dict[str, str] = {
 }
 """Further ones of a walk: how the path of a number of its state ends, which not every controller has."""
 REQUEST = "controller_state.request.torque"
-"""Where a controller of walking keeps the torque that it wants, if it wants one."""
+"""Path of the torque that a walking controller requests."""
 
 
 def walk_traces(states: Mapping[str, type]) -> dict[str, str]:
@@ -42,5 +42,5 @@ def walk_traces(states: Mapping[str, type]) -> dict[str, str]:
 
 
 def paths_of_traces(states: Mapping[str, type], walks: bool) -> dict[str, str]:
-    """Where a lane has each channel that is no number of the state by its own path."""
+    """Path of each traceable channel in a lane that is not a state variable of that name."""
     return TRACED | (walk_traces(states) if walks else {})

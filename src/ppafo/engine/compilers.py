@@ -1,4 +1,4 @@
-"""What a compiler of programs is to the engine, and which of them there are.
+"""Protocol of a compiler of programs, and the compilers available.
 
 The engine writes the text of a program and knows no other language than Python. What compiles it through C lies above
 and is offered by the package as a whole, where it is imported.

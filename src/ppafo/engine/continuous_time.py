@@ -207,7 +207,7 @@ def free_motion(
 
 
 def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float, float], float]:
-    """What drives the joint of a run at rest before friction [N m], with its actuator, its loads and its leg.
+    """Torque on a joint at rest before friction [N m], with its actuator, loads and leg.
 
     The function takes states of effects by name, time [s], angle [rad] and two absolute pressures [Pa]. Equation (1).
     """

@@ -33,7 +33,7 @@ HEADER = '''"""Generated from the functions of ppafo; their hash is in the file 
 import math
 from collections import namedtuple
 '''
-"""What a text begins with."""
+"""First lines of a composed text."""
 INLINE = "@inline"
 """The mark of functions that its entries call."""
 ENTRY = '@entry("void({})")'

@@ -10,7 +10,7 @@ from typing import Any
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
 from ppafo.engine.program import Program
-from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, uses_of_group
+from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
 from ppafo.engine.source_text import (
     Composer,
     Names,
@@ -28,9 +28,9 @@ class Composed:
 
     function: FunctionType
     name: str
-    """Its name in the module."""
+    """Name of the function in the module."""
     effects: Effects
-    """What it reads of a lane, and what it sets."""
+    """Groups of a lane that the function reads, and those that it sets."""
     handed: tuple[str, ...]
     """Names that it is handed before its own arguments: groups of a lane, and the lane's number."""
     known: Mapping[str, Any]
@@ -40,7 +40,7 @@ class Composed:
     is_phase: bool
     """True where the loop over steps calls it, false where another function of the step does."""
     ending: str
-    """What its name ends with where another program has a function of that name that is written otherwise."""
+    """Suffix of its name, where another program has a different function of that name."""
 
     @property
     def own(self) -> str:
@@ -58,7 +58,7 @@ class StepText:
     parts: Program
     collector: SourceCollector
     ending: str = ""
-    """What the names of functions end with that another program has otherwise."""
+    """Suffix of the names of functions that another program has in a different form."""
     further: Mapping[str, Any] = field(default_factory=dict)
     """Classes of groups that are not the program's own."""
     states: dict[str, Any] = field(init=False)
@@ -90,7 +90,7 @@ class StepText:
         return self.collector.add_inside(inside, called)
 
     def effects_of(self, name: str) -> Effects:
-        """What a function of the step reads and sets."""
+        """Groups that a function of the step reads and sets."""
         return next(composed.effects for composed in self.composed.values() if composed.name == name)
 
     def handed_to(self, name: str) -> tuple[str, ...]:
@@ -132,8 +132,23 @@ class StepText:
             )
         return refusal(function.__code__.co_filename, node, problem)
 
+    def joined(self, functions: Sequence[PlainFunction], parts: Any, takes: Sequence[str]) -> list[ast.stmt]:
+        """Statements of functions one after another, as one function of the parameters ``takes`` has them.
+
+        Their groups are names in it. The ``parts`` that they know are not those of the step.
+        """
+        plain = [function for function in functions if isinstance(function, FunctionType)]
+        reduced = [(function, Reduction(self, function, {"parts": parts}).reduced()) for function in plain]
+        local = {name.id for _, tree in reduced for name in names_in(tree) if isinstance(name.ctx, ast.Store)}
+        found: list[ast.stmt] = []
+        for function, tree in reduced:
+            check_grammar(tree, function.__code__.co_filename)
+            composer = self.composer(function, Names(frozenset([*local, *takes]), self.kept, {}))
+            found += [composer.visit(statement) for statement in tree.body]
+        return found
+
     def composer(self, function: FunctionType, names: Names) -> Composer:
-        """What replaces names from outside a function of the step that was reduced."""
+        """Composer of a reduced function of the step: replaces names that are defined outside it."""
         return Composer(
             function,
             lambda called: self._name_inside(function, called),

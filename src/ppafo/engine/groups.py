@@ -14,7 +14,7 @@ from ppafo.errors import ProgramError
 
 
 class Role(Enum):
-    """What a group is to a run: given and unchanged, kept from step to step, or handed on inside a step."""
+    """Role of a group in a run: constant input, state kept from step to step, or intermediate of one step."""
 
     PARAMETER = "parameters"
     STATE = "states"

@@ -77,7 +77,7 @@ class PythonFunctions:
         return value
 
     def of(self, value: Any, inside: Any = None) -> Any:
-        """What stands for a value inside a function."""
+        """Replacement of a value inside a function."""
         if not self._links and self._operations is None:
             return value
         value = getattr(value, "__wrapped__", value)
@@ -148,7 +148,7 @@ def functions_of(program: Program, rows: EffectRows, operations: "Operations | N
 
 @lru_cache(maxsize=64)
 def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ...]]]:
-    """What stands for functions of the model in a program, and the rows that laws of its effects take."""
+    """Replacements of model functions in a program, and the rows that the laws of its effects take."""
     collector = SimpleNamespace(links={}, effects={})
     link_program(program, collector)
     return collector.links, collector.effects

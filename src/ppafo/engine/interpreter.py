@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 class PythonProgram:
-    """What a compiled program is to a block of lanes."""
+    """Pure-Python program with the interface of a compiled one."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
@@ -124,9 +124,9 @@ class PythonLanes:
                 vars(lane).update(lane["kept"] | {"remaining": lane.remaining})
 
     def traces(self, index: int, trace_every: int) -> bool:
-        """Whether a sample is traced."""
+        """Tell whether a sample is traced."""
         return index % trace_every == 0
 
     def slot(self, index: int, trace_every: int) -> int:
-        """Where its trace is kept: one with less room than samples keeps the last."""
+        """Index of a sample in the trace, a ring that keeps the last samples."""
         return index // trace_every % len(self.trace)

@@ -153,7 +153,7 @@ def _current_source(program: Program) -> str:
 
 @lru_cache(maxsize=64)
 def _known_source(program: Program) -> tuple[MadeFrom, str]:
-    """What a program is made from, and its source: the one that is kept of its parts, else written."""
+    """Inputs of a program and its source text, read from the cache or else written."""
     key = package_key(program)
     if key is None:
         return write_source(program)
@@ -166,7 +166,7 @@ def _known_source(program: Program) -> tuple[MadeFrom, str]:
 
 @lru_cache(maxsize=64)
 def write_source(program: Program, lanes: int = 0) -> tuple[MadeFrom, str]:
-    """What a program is made from, and its source for some lanes, 0 for as many as fit."""
+    """Inputs of a program and its source text for ``lanes`` runs side by side; 0 for the largest number that fits."""
     from ppafo.engine.loop_text import write_lanes  # a kept program needs no writer
 
     collector = SourceCollector(INLINE)
@@ -270,7 +270,7 @@ def _row_counts(program: Program) -> tuple[int, int]:
 
 
 class LaneBlock:
-    """One block of runs in progress; ``states`` (rows, runs) may be read and written between two ``advance``."""
+    """Block of runs in progress; ``states`` (rows, runs) may be read and written between calls of ``advance``."""
 
     def __init__(self, module: Advancing, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
         given, kept = _row_counts(program)
@@ -342,7 +342,7 @@ class LaneBlock:
 
 
 def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
-    """One block of all runs of a batch, not begun; ValueError for more than its program takes at once."""
+    """Block of all runs of a batch, before its first step; ValueError for more runs than its program takes at once."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     if runs > lanes:
         raise ValueError(f"{runs} runs do not fit a block of {lanes}; the others would stand still")

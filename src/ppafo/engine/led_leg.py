@@ -35,7 +35,7 @@ GAIT_SHANK = ProfileKind(
 
 @dataclass(frozen=True, slots=True)
 class LedLeg:
-    """What a foot on a prescribed shank adds to a run: the body that turns about the ankle, and the shank's profile."""
+    """Foot on a prescribed shank: the body that turns about the ankle, and the profile of the shank."""
 
     load: FootLoad
     shank: Any

@@ -1,4 +1,4 @@
-"""What a program calls in the place of functions of the model."""
+"""Replacement of model functions in a program by those of its actuator, effects and components."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,10 +13,10 @@ from ppafo.model.valves.kind import valve_problem
 
 
 class Linked(Protocol):
-    """What functions of the model that are called stand for."""
+    """Collector of the functions that replace model functions."""
 
     links: dict[Any, Any]
-    """What stands for others: under a pair of functions for its second inside its first alone.
+    """Replacement of each function; a pair of functions as key replaces the second only inside the first.
 
     Under a row and ``"_replace"`` is the class that ``row._replace`` makes.
     """

@@ -1,4 +1,4 @@
-"""Where the numbers of a step lie in the text of the loop: in rows of ``x`` for many runs, or under names for one.
+"""Storage of the numbers of a step in the text of the loop: rows of ``x`` for many runs, names for one run.
 
 The writer of the loop (``loop_text.py``) asks these for each phase that is called, each question to all runs, and each
 function of ``lanes``.
@@ -55,7 +55,7 @@ class Question(NamedTuple):
 
 
 class Rows(Protocol):
-    """Where the numbers of a step are, for the writer of the loop."""
+    """Storage of the numbers of a step, as the writer of the loop uses it."""
 
     arrays: frozenset[str]
     """Names of arrays in which numbers are, beside those of the loop over steps."""
@@ -79,11 +79,11 @@ class Rows(Protocol):
         """Expression for a function of ``lanes`` that gives something: ``traces`` or ``slot``."""
 
     def heading(self, function: FunctionType) -> list[ast.stmt]:
-        """What stands before the statements of a function of the loop."""
+        """First statements of a function of the loop."""
 
 
 class RowsOfLanes:
-    """Where each number of a program lies in the rows of ``x``: state, parameters, what a step hands on, its parts.
+    """Row of ``x`` of each number of a program: state, parameters, intermediates of a step, its parts.
 
     One array for all of them lets the compiler see that no two rows overlap. From row ``aside`` on lies what lanes that
     wait for others keep, where few do: the state, what was left of the step, and what it was handed.
@@ -181,7 +181,7 @@ class RowsOfLanes:
         return cells[len(self.state_at) :]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:
-        """Whether a sample is traced, and where its trace is kept: one with less room than samples keeps the last."""
+        """Test whether a sample is traced, or its index in the trace: a ring that keeps the last samples."""
         index, trace_every = arguments
         return f"{index} % {trace_every} == 0" if method == "traces" else f"{index} // {trace_every} % trace.shape[0]"
 
@@ -229,7 +229,7 @@ class RowsOfRun:
         return ["pass"]
 
     def value(self, method: str, arguments: Sequence[str]) -> str:  # noqa: ARG002 - a protocol
-        """That each sample is traced, and that its trace lies at the first place."""
+        """Constant: every sample is traced, at the first index."""
         return "True" if method == "traces" else "0"
 
     def heading(self, function: FunctionType) -> list[ast.stmt]:

@@ -50,7 +50,7 @@ class LoopText:
         return self.block(self.reduction.definition.tree.body)
 
     def either(self, own: list[ast.stmt], other: list[ast.stmt]) -> list[ast.stmt]:
-        """What this program does, or what the other one does: a question only where they differ."""
+        """Statements of this program or of the other one, under a condition only where they differ."""
         if [*map(ast.dump, own)] == [*map(ast.dump, other)]:
             return own
         return [ast.If(parse_expression(f"{NEEDS_PARTS} == 1"), other or [ast.Pass()], own)]
@@ -65,11 +65,11 @@ class LoopText:
         return composed
 
     def block(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
-        """What several statements become, one after the other."""
+        """Translation of a block of statements."""
         return [written for statement in statements for written in self.statement(statement)]
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
-        """What any statement becomes."""
+        """Translation of a statement of any kind."""
         match node:
             case ast.Expr(value=ast.Call() as call):
                 return self.called(call)
@@ -131,7 +131,7 @@ class LoopText:
         return own if self.other is None else self.either(own, self.other.phases(node))
 
     def of_lane(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
-        """What is done for one lane before the next one: phases, names, decisions of its numbers, counted loops."""
+        """Body of the loop over lanes: phases, names, conditional expressions and counted loops."""
         made: list[ast.stmt] = []
         for node in statements:
             match node:

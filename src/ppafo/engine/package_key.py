@@ -1,4 +1,4 @@
-"""What tells apart texts that need not be composed again: the package's own files, and the parts.
+"""Cache key of composed texts: hashes of the package's own files, and the parts of the program.
 
 A text follows from the functions of its parts and from those that compose it. Where all of them stand in files of this
 package, the bytes of these files, which are read once a process, and the names of the parts say which text it is. A
@@ -22,14 +22,14 @@ from ppafo.engine.source_text import MadeFrom, Read
 from ppafo.model.binding import frame_of
 
 COMPOSED = ("control", "engine", "metrics", "model", "processor", "signals")
-"""Where functions stand that the text of a program has, and those that compose it."""
+"""Packages with functions that enter the text of a program, or that compose it."""
 _PACKAGE = Path(__file__).parents[1]
 _SUFFIXES = (".py", ".c", ".h")
 _PLAIN = (bool, int, float, str)
 
 
 class Key(NamedTuple):
-    """What a text is made from, in words, and the names that it rests on with what they stand for."""
+    """Inputs of a text, in words, and the names that it depends on with their values."""
 
     words: str
     made_from: MadeFrom
@@ -124,7 +124,7 @@ def _described(value: Any) -> str:
 
 
 def _named(value: Any) -> str:
-    """Where a function, a class or a module of the package stands."""
+    """Qualified name of a function, class or module of the package."""
     module = value.__name__ if isinstance(value, ModuleType) else value.__module__
     if isinstance(value, type) and module == "builtins":
         return value.__qualname__

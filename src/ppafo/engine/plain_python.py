@@ -202,7 +202,7 @@ class Place(NamedTuple):
 
 
 def place_in(lines: list[str], number: int) -> Place | None:
-    """Where line ``number`` of a generated text comes from; None for lines that belong to no function of a file."""
+    """Source position of line ``number`` of a generated text; None for lines that belong to no function of a file."""
     for start in range(min(number, len(lines)) - 1, -1, -1):
         origin = _ORIGIN.match(lines[start])
         if origin is None:

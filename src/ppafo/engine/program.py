@@ -1,4 +1,4 @@
-"""Which compiled components a run is made of, and what these put in the place of functions of the model."""
+"""Program: the components (valve, controller, gas, ...) that one compiled model consists of."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ Rows = Mapping[str, type]
 
 
 class GasPhases(Protocol):
-    """How the gas in both chambers goes through a step of two stages: a module of ``engine.step``."""
+    """Two-stage step of the gas in both chambers: protocol of a module of ``engine.step``."""
 
     @property
     def IS_THERMAL(self) -> bool:  # noqa: N802 - constants of modules
@@ -48,7 +48,7 @@ class GasPhases(Protocol):
 
     @property
     def IN_SHAPES(self) -> Mapping[Any, Any]:  # noqa: N802
-        """What stands for its functions in a program whose actuator has a shape of its own."""
+        """Replacements of its functions for an actuator with chamber volumes of its own."""
 
     def groups(self, parts: "Program") -> Groups:
         """Groups of numbers that it has in a lane."""
@@ -82,7 +82,7 @@ class GasPhases(Protocol):
 
 
 class FeedPhases(Protocol):
-    """What stands between constant pressures and the valve, with a state that the stages solve with the gas."""
+    """Supply line between constant pressures and the valve, with a state solved together with the gas: protocol."""
 
     def groups(self, parts: "Program") -> Groups:
         """Groups of numbers that it has in a lane, the first stage of the gas among them."""
@@ -94,17 +94,17 @@ class FeedPhases(Protocol):
         """The plant at the pressures that feed it after the first stage."""
 
     def begin(self, parts: "Program", lane: "Lane", next_angle: float, length: float) -> None:
-        """The first stage, with that of the gas."""
+        """First stage, together with the first stage of the gas."""
 
     def end(self, parts: "Program", lane: "Lane", length: float) -> None:
         """State of the feed at the end of a step or part."""
 
     def error(self, parts: "Program", lane: "Lane") -> float:
-        """What that misses, over what is allowed [-]."""
+        """Error of the step over its tolerance [-]."""
 
 
 class LegPhases(Protocol):
-    """A leg that walks with the device, in a step."""
+    """Leg that walks with the device, in a step: protocol."""
 
     def groups(self, parts: "Program") -> Groups:
         """Groups of numbers that it has in a lane."""
@@ -114,55 +114,55 @@ class LegPhases(Protocol):
         """Groups of rows that what stands in ``links`` takes before its own arguments."""
 
     def links(self, parts: "Program") -> Mapping[Any, Any]:
-        """What stands for functions of the controller."""
+        """Replacements of functions of the controller."""
 
     def carry(self, parts: "Program", lane: "Lane") -> None:
-        """What a step is handed by the one before, where there was none."""
+        """Initial load of the foot, which is carried from step to step."""
 
     def find_place(self, parts: "Program", lane: "Lane", now: "Now") -> None:
-        """Where the gait is at the end of the step."""
+        """Gait phase at the end of the step."""
 
     def find_measured(self, parts: "Program", lane: "Lane") -> None:
-        """What was measured there."""
+        """Measured quantities at the end of the step."""
 
     def find_gait(self, parts: "Program", lane: "Lane") -> None:
-        """The gait there."""
+        """Gait at the end of the step."""
 
     def find_gait_of_task(self, parts: "Program", lane: "Lane", now: "Now") -> None:
-        """The gait there in a task sequence."""
+        """Gait at the end of the step, in a task sequence."""
 
     def begin(self, parts: "Program", lane: "Lane") -> None:
-        """Where the step would lead the foot."""
+        """Predicted step of the foot."""
 
     def assumed_angle(self, parts: "Program", lane: "Lane") -> float:
-        """Angle [rad] to which the volumes run."""
+        """Angle [rad] at the end of the step that the chamber volumes assume."""
 
     def hold_ahead(self, parts: "Program", lane: "Lane") -> None:
-        """The chambers there."""
+        """Chamber factors at the assumed angle."""
 
     def reach(self, parts: "Program", lane: "Lane") -> None:
-        """Where the step ends, unless an event leads elsewhere."""
+        """End of the step without an event."""
 
     def depart(self, parts: "Program", lane: "Lane") -> None:
-        """Where it ends then."""
+        """End of a step with an event."""
 
     def end(self, parts: "Program", lane: "Lane", length: float) -> None:
-        """``lane.after`` and ``lane.walk_after``, state and walk after the step."""
+        """Set ``lane.after`` and ``lane.walk_after``, state and walk after the step."""
 
 
 class FaultPhases(Protocol):
-    """Faults of a plant in a walk, and a shut-off valve in its line."""
+    """Faults of the plant in a walk, and a shut-off valve in its line: protocol."""
 
     def groups(self, parts: "Program") -> Groups:
         """Groups of numbers that they have in a lane."""
 
     def failed_plant(self, parts: "Program", lane: "Lane", time: float) -> PlantParameters:
-        """The plant as faults leave it at a time [s]."""
+        """Plant with its faults at a time [s]."""
 
     def failed_ports(
         self, parts: "Program", lane: "Lane", source: PlantParameters, port_1: Any, port_2: Any, time: float
     ) -> tuple[Any, Any]:
-        """The ports of both chambers behind a source as faults leave them at a time [s]."""
+        """Ports of both chambers behind a source, with the faults at a time [s]."""
 
     def decide(self, parts: "Program", lane: "Lane", now: "Now", ordered: float, after: Any) -> None:
         """Take a decision of the controller: the command ``ordered``, the state ``after`` it."""
@@ -183,7 +183,7 @@ class FootPhases(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """One combination of components; each combination is compiled once.
+    """Combination of components; each combination is compiled once.
 
     ``angle`` None leaves the vane unconstrained, otherwise that profile prescribes it. ``controller`` None leaves the
     command to the caller, sample by sample. ``ideal_sensors`` False adds noise and quantisation of the signals,
@@ -193,7 +193,8 @@ class Program:
     the ground and a gait lead it (``angle`` is None then; its sensors are its own); it walks stride after stride, or
     ``takes_task_sequence``: it stands, starts, changes its speed and stops. ``faults`` are those of the plant, with a
     shut-off valve, None where a walk has neither. ``is_adaptive`` True divides each
-    step as its error asks, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
+    step as its error asks, ``rests_whole`` True but one in which a led joint stands still where a locked one takes it
+    whole, ``samples_inside`` True where recorded samples lie between the steps. ``meters`` are updated
     at every sample that a recording would have, ``traced`` names channels, or paths of the state, that are kept at some
     of them. ``starts_apart`` True lets the run of each lane begin at a step of its own, while others of the block are
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
@@ -215,6 +216,7 @@ class Program:
     faults: FaultPhases | None = None
     feed: FeedPhases | None = None
     is_adaptive: bool = False
+    rests_whole: bool = False
     samples_inside: bool = False
     meters: tuple[MeterKind, ...] = ()
     traced: tuple[str, ...] = ()
@@ -317,28 +319,28 @@ class Program:
 
     @property
     def traces(self) -> dict[str, str]:
-        """Where a lane has each channel that can be traced and is no number of the state by its own path."""
+        """Path in a lane of each traceable channel that is not a state variable of that name."""
         return paths_of_traces(self.state_rows(), self.walks)
 
     @property
     def traced_paths(self) -> dict[int, str]:
-        """Where a lane has the channels that are traced, by their places."""
+        """Path in a lane of each traced channel, by its index."""
         paths = self.traces
         return {row: paths.get(name, name) for row, name in enumerate(self.traced)}
 
     @property
     def followed(self) -> str:
-        """What its reference is of; empty where it follows none: in a walk a controller makes its own."""
+        """Quantity that follows the reference; empty without one: in a walk, the controller makes its own."""
         return self.controlled if self.has_reference and not self.walks else ""
 
     @property
     def wanted(self) -> str:
-        """What its controller wants a value of: by the reference, or the torque that one of walking requests."""
+        """Quantity with a set-point: of the reference, or of a walking law that requests a torque."""
         return TORQUE if self.walks and self.requests_torque else self.followed
 
     @property
     def offers(self) -> frozenset[str]:
-        """What runs have, of all that metrics may need beside channels."""
+        """Properties of the runs that a metric may need beside channels."""
         has = {
             WALK: self.walks,
             STEADY: not self.takes_task_sequence,

@@ -19,7 +19,7 @@ from types import CodeType, FunctionType
 from typing import Any, NamedTuple, Protocol
 
 from ppafo.engine.plain_python import parse_module, refusal
-from ppafo.engine.rows import is_number, is_row, members
+from ppafo.engine.rows import is_number, is_row, members, rebuilt
 from ppafo.engine.source_text import is_step_function
 from ppafo.errors import ProgramError
 
@@ -43,7 +43,7 @@ def is_known_part(value: Any) -> bool:
 
 
 class Slot(NamedTuple):
-    """Where in a history a function sets a number: its places but the last, in terms of the function's parameters."""
+    """Element of a history that a function sets: its indices but the last, in terms of the function's parameters."""
 
     history: str
     places: tuple[ast.expr, ...]
@@ -55,7 +55,7 @@ Fields = frozenset[str] | None
 
 @dataclass(slots=True)
 class Effects:
-    """What a function reads of its lane, and what it sets, in the order in which it does.
+    """Groups that a function reads from its lane and those that it sets, in order of occurrence.
 
     What it sets are groups, with the fields that change, and numbers of histories.
     """
@@ -73,11 +73,11 @@ class Effects:
 
 
 class Gathering(Protocol):
-    """What a reduction asks of the collector that it works for."""
+    """Collector of composed functions, as the reduction uses it."""
 
     @property
     def parts(self) -> Any:
-        """What the device is made of."""
+        """Components of the device."""
 
     @property
     def rows(self) -> Mapping[str, Any]:
@@ -87,7 +87,7 @@ class Gathering(Protocol):
         """Add a function that another calls, with what is known of its arguments; return its name in the module."""
 
     def effects_of(self, name: str) -> Effects:
-        """What a function of the module reads and sets."""
+        """Groups that a function of the module reads and sets."""
 
     def handed_to(self, name: str) -> tuple[str, ...]:
         """Names that a function of the module is handed before its own arguments."""
@@ -157,7 +157,7 @@ def group_of_name(node: ast.expr) -> str:
 
 
 def uses_of_group(function: FunctionType, name: str, use: type[ast.expr_context]) -> list[ast.Attribute]:
-    """Where a function of the step reads or sets ``lane.NAME``, in order."""
+    """Reads or assignments of ``lane.NAME`` in a function of the step, in order."""
     nodes = [node for node in ast.walk(definition_of(function).tree) if isinstance(node, ast.Attribute)]
     found = [node for node in nodes if node.attr == name and isinstance(node.ctx, use)]
     return [node for node in found if isinstance(node.value, ast.Name) and node.value.id == "lane"]
@@ -225,7 +225,7 @@ class Reduction:
             raise self.refuse(node, f"'{ast.unparse(node)}': {error}") from error
 
     def outside(self, node: ast.expr) -> Any:
-        """What an expression stands for outside the function; ``_UNKNOWN`` where it has a value only inside."""
+        """Value of an expression outside the function; ``_UNKNOWN`` if it has a value only inside."""
         value = self.value_of(node)
         if value is not _UNKNOWN:
             return value
@@ -274,7 +274,7 @@ class Reduction:
         return made
 
     def part(self, node: ast.AST) -> ast.AST:
-        """One of several parts of an expression."""
+        """Reduction of one operand of an expression."""
         if isinstance(node, ast.keyword):
             return ast.keyword(node.arg, self.visit(node.value))
         return self.visit(node) if isinstance(node, ast.expr) else node
@@ -296,7 +296,7 @@ class Reduction:
         return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
     def of_boolop(self, node: ast.BoolOp) -> ast.expr:
-        """What is left of a link of conditions."""
+        """Reduction of ``and`` and ``or``."""
         ends, made = isinstance(node.op, ast.Or), list[ast.expr]()
         for item in node.values:
             value = self.asked(item)
@@ -362,6 +362,8 @@ class Reduction:
         if called is getattr:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
+        if called is rebuilt:
+            return self.row_of(self.value_of(node.args[0]), self.arguments(ast.Starred(node.args[1])))
         if is_step_function(called):
             name, arguments = self.called(called, node)
             if self.collector.effects_of(name).results:
@@ -439,7 +441,7 @@ class Reduction:
         return made
 
     def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
-        """What a statement becomes."""
+        """Reduction of a statement."""
         match node:
             case ast.Expr(value=ast.Call() as call):
                 return self.call_that_sets(call)
@@ -562,29 +564,38 @@ class Reduction:
 
     def number_by_number(self, row: Any, choice: ast.IfExp) -> ast.expr:
         """A choice between two rows as the row of the choices between their numbers: no branch, by any compiler."""
+        pairs = zip(self.numbers_of(row, choice.body), self.numbers_of(row, choice.orelse), strict=True)
+        return self.row_of(row, (ast.IfExp(choice.test, yes, other) for yes, other in pairs))
 
-        def chosen(kind: Any, yes: ast.expr, other: ast.expr) -> ast.expr:
-            if is_number(kind):
-                return ast.IfExp(choice.test, yes, other)
-            inner = [chosen(inside, part_of(yes, way), part_of(other, way)) for way, inside in members(kind)]
-            if not is_row(kind) or not inner:
-                return ast.Tuple([*inner], ast.Load())
-            return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
+    def row_of(self, kind: Any, numbers: Iterator[ast.expr]) -> ast.expr:
+        """A row, nested or not, of the next of some numbers, as ``rebuilt`` makes it."""
+        if is_number(kind):
+            return next(numbers)
+        inner = [self.row_of(inside, numbers) for _, inside in members(kind)]
+        if not is_row(kind) or not inner:
+            return ast.Tuple([*inner], ast.Load())
+        return ast.Call(ast.Name(self.collector.keep(kind), ast.Load()), inner, [])
 
-        def part_of(owner: ast.expr, way: str) -> ast.expr:
-            key = int(way[1:-1]) if way[0] == "[" else way[1:]
-            if isinstance(owner, ast.Name):
-                try:
-                    value = self.collector.value_kept(owner.id)
-                except KeyError:
-                    pass
-                else:
-                    return self.written(value[key] if isinstance(key, int) else getattr(value, key))
-            if isinstance(key, int):
-                return ast.Subscript(owner, ast.Constant(key), ast.Load())
-            return ast.Attribute(owner, key, ast.Load())
+    def numbers_of(self, kind: Any, row: ast.expr) -> Iterator[ast.expr]:
+        """Expressions of the numbers of a row, nested or not, in their order."""
+        if is_number(kind):
+            yield row
+        for way, inside in members(kind):
+            yield from self.numbers_of(inside, self.part_of(row, way))
 
-        return chosen(row, choice.body, choice.orelse)
+    def part_of(self, owner: ast.expr, way: str) -> ast.expr:
+        """A field or an item of a row; of one that is known it is known."""
+        key = int(way[1:-1]) if way[0] == "[" else way[1:]
+        if isinstance(owner, ast.Name):
+            try:
+                value = self.collector.value_kept(owner.id)
+            except KeyError:
+                pass
+            else:
+                return self.written(value[key] if isinstance(key, int) else getattr(value, key))
+        if isinstance(key, int):
+            return ast.Subscript(owner, ast.Constant(key), ast.Load())
+        return ast.Attribute(owner, key, ast.Load())
 
     def call_that_sets(self, node: ast.Call) -> list[ast.stmt]:
         """A call of a function that sets groups of its lane: these get what it returns."""

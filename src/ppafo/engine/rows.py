@@ -115,7 +115,7 @@ def group_of(name: str, groups: Mapping[str, type], rows: "np.ndarray[Any, np.dt
 
 
 def of_each(function: Callable[..., Any], *rows: Any) -> Any:
-    """What a function makes of some NamedTuples of floats; where they have arrays (runs,), run by run."""
+    """Result of a function of NamedTuples of floats; run by run if their fields are arrays (runs,)."""
     kinds, numbers = [type(row) for row in rows], leaves(rows)
 
     def from_numbers(*numbers: float) -> Any:

@@ -1,4 +1,4 @@
-"""One run as values: what both the lanes and the reference solver are given."""
+"""Run as values: input of both the lanes and the reference solver."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ WHOLE = 1.0e-9
 
 
 class LegGroups(NamedTuple):
-    """How a leg goes through a step, its groups of parameters, and its groups of states at the start, by name."""
+    """Leg of a run: its phases, its groups of parameters, and the initial values of its groups of states, by name."""
 
     leg: LegPhases
     takes_task_sequence: bool
@@ -101,7 +101,7 @@ class Walk:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """What lines behind regulators add to a run; the regulators are set to the supply pressures of the plant."""
+    """Supply lines behind regulators; the regulators are set to the supply pressures of the plant."""
 
     parameters: "SupplyLines"
     initial: "LineState"
@@ -281,7 +281,7 @@ def states_at_start(run: Run) -> list[Any]:
 
 
 def moment_at_start(plant: PlantParameters, initial: PlantState) -> Moment:
-    """What effects see of the plant in its initial state."""
+    """State of the plant that effects depend on, at the start of the run."""
     pressure_1, pressure_2 = chamber_pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
     return _at_rest(initial, pressure_1, pressure_2)
 

@@ -196,7 +196,7 @@ class Composer(ast.NodeTransformer):
         return [ast.Name(row, ast.Load()) for row in rows]
 
     def handed_over(self, value: Any, node: ast.expr) -> ast.expr:
-        """What is written for a value that is not called. ProgramError for a function that needs rows of effects."""
+        """Text of a value that is passed and not called. ProgramError for a function that needs rows of effects."""
         stand_in = self.stand_in(value, node)
         if isinstance(stand_in, ast.Name) and self.rows_of(stand_in.id):
             raise self.refuse(node, f"an effect acts inside '{ast.unparse(node)}', so that it can only be called")
@@ -228,7 +228,7 @@ class Composer(ast.NodeTransformer):
         ]
 
     def kind_of(self, node: ast.expr) -> Any:
-        """What is declared of a value, by the annotations of functions and of fields; None where nothing is."""
+        """Declared type of a value, by the annotations of functions and fields; None if undeclared."""
         if isinstance(node, ast.Attribute) and (owner := self.row_of(node.value)) is not None:
             return owner.__annotations__.get(node.attr)
         if isinstance(node, ast.Call):
@@ -282,7 +282,7 @@ class Composer(ast.NodeTransformer):
         return ast.Call(ast.Name(self.add(row), ast.Load()), values, [])
 
     def value_of(self, node: ast.expr) -> Any:
-        """What a name or ``module.name`` stands for now outside the function. ProgramError where it has no value."""
+        """Present value of a name or ``module.name`` outside the function. ProgramError if it has none."""
         if isinstance(node, ast.Name) and node.id in self.kept:
             return self.kept[node.id]
         if isinstance(node, ast.Name) and node.id not in self.local:
@@ -311,7 +311,7 @@ class Composer(ast.NodeTransformer):
         return value
 
     def stand_in(self, value: Any, node: ast.expr) -> ast.expr:
-        """What is written for a value from outside. ProgramError where it is nothing that can be compiled.
+        """Text of a value from outside the function. ProgramError if it cannot be compiled.
 
         A function that remembers its results (``functools.lru_cache``) is what it remembers.
         """
@@ -352,7 +352,7 @@ class Composer(ast.NodeTransformer):
             return ast.UnaryOp(ast.USub(), ast.Constant(-value))
         if type(value) in (bool, int):
             return ast.Constant(value)
-        if type(value) is tuple:
+        if type(value) is tuple or value == ():  # a row without numbers is no struct
             return ast.Tuple([self.literal(inner, where, name) for inner in value], ast.Load())
         if is_row(type(value)):
             fields = [self.literal(inner, where, name) for inner in value]
@@ -638,7 +638,7 @@ def _code_of(tree: ast.FunctionDef, function: FunctionType) -> Iterator[CodeType
 
 
 def _shape(code: CodeType) -> tuple[Any, ...]:
-    """What a code object computes, without the places of its lines and its docstring."""
+    """Instructions of a code object, without line numbers and docstring."""
     # Texts are left out: a docstring may have changed without a change of what runs.
     constants = [(type(constant), repr(constant)) for constant in code.co_consts if not isinstance(constant, str)]
     return code.co_code, code.co_names, code.co_varnames, code.co_argcount, code.co_kwonlyargcount, constants

@@ -1,4 +1,4 @@
-"""What leaves the package for other tools: thin layers around the translation of a program, made of templates.
+"""Exports for other tools: thin layers of templates around the translation of a program.
 
 In a template a mark between two @ is a word that is filled in.
 """
@@ -24,10 +24,10 @@ def filled(text: str, words: Mapping[str, str]) -> str:
 
 
 def in_markdown(text: str) -> str:
-    """What a scenario says, for a page in Markdown: one line of plain words, without marks, links or HTML."""
+    """Text of a scenario for a page in Markdown: one line of plain words, without markup, links or HTML."""
     return _OF_MARKDOWN.sub(r"\\\1", one_line(text))
 
 
 def in_comment(text: str) -> str:
-    """What a scenario says, for a comment in C: one line that neither ends the comment nor begins another."""
+    """Text of a scenario for a comment in C: one line that neither ends the comment nor starts another."""
     return one_line(text).replace("*/", "* /").replace("/*", "/ *")

@@ -1,4 +1,4 @@
-"""Whether the curves of one stride agree: delay, side and size of each, estimated against the others.
+"""Agreement of the curves of one stride: delay, side and scale of each, estimated against the others.
 
 Healthy walking shows where each curve belongs. Just after toe-off the foot is furthest in plantarflexion, and then the
 shank furthest back; ankle moment and vertical force end the push-off together. While the foot stands flat the ankle

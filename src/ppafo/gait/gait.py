@@ -58,7 +58,7 @@ def plain_unit(unit: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """One periodic curve: coefficients of its series in SI units, and how much strides differ.
+    """Periodic curve: coefficients of its Fourier series in SI units, and the variation between strides.
 
     ``deviation`` is the standard deviation between strides, root mean square over the stride; 0 where it is not known.
     """
@@ -109,7 +109,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """One stride of one wearer, as curves over the phase; those that were not recorded are None.
+    """Stride of one wearer, as curves over the phase; None for a curve that was not recorded.
 
     ``body_mass`` [kg], ``stature`` [m] of the subject, None where not known, ``stride_time`` [s], ``stance_share``
     (share of the stride until toe-off), ``walking_speed`` [m/s], None where nobody recorded it. The two deviations are

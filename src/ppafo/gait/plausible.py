@@ -1,4 +1,4 @@
-"""Whether a stride is plausible: limits wide enough for impaired walking, which exclude what no leg does.
+"""Plausibility of a stride: limits wide enough for impaired walking that exclude the impossible.
 
 Each refusal names file, curve, number and limits, and the remedy for what is wrong with units, signs and sides. A sign
 is refused only where the other one fits clearly better: impaired walking breaks every rule of healthy walking a little.
@@ -17,7 +17,7 @@ from ppafo.gait.gait import HARMONICS, KNEE, Gait, fit_curve
 from ppafo.signals.recording import Floats
 
 SignSource = Literal["map", "columns", "gait_file"]
-"""What says how the numbers count: a gait map, the columns of the file by convention, or a gait file."""
+"""Source of the sign convention: a gait map, the file's own convention, or a gait file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class MeanStride:
     stride_time: float
     signs_from: SignSource
     is_knee_one_marker: bool = False
-    """Whether both coordinates of the knee are of one marker, so that no scale can be between them."""
+    """True if both coordinates of the knee are of one marker, which excludes a scale between them."""
 
 
 def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
@@ -314,7 +314,7 @@ def check_moment(walk: MeanStride) -> None:
 
 
 _UNCLEAR_MOMENT = 0.5
-"""Of the largest moment into plantarflexion; healthy walking has 0.05 to 0.2 of it into dorsiflexion."""
+"""Fraction of the largest plantarflexion moment; healthy walking has 0.05 to 0.2 of it into dorsiflexion."""
 
 
 def moment_remarks(moment: Floats) -> list[str]:
@@ -407,7 +407,7 @@ class _Mistake:
 
     @property
     def is_of_one_alone(self) -> bool:
-        """Whether one curve alone has another scale."""
+        """Tell whether exactly one curve has another scale."""
         return self.forward[1] == self.up[0] == 0.0 and self.forward[0] != self.up[1]
 
 

@@ -21,7 +21,7 @@ PICTURE = "rgb_array"
 
 
 class PneumaticEnv(gymnasium.Env[Observations, Any]):
-    """One device that an agent commands, one step every sample period of its scenario or walk.
+    """Device commanded by an agent, one step per sample period of its scenario or walk.
 
     ``task`` is 'torque', 'angle' or 'walk'; ``scenario`` the name or file of a scenario, or of a walk, and
     ``overrides`` change it: of the task's own, with late, noisy sensors with steps, unless one is given. ``actions``

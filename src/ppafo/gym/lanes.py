@@ -54,7 +54,7 @@ class Columns:
     goals: Floats
 
     def repeated(self, count: int) -> "Columns":
-        """Return the start of one episode as that of ``count`` equal ones."""
+        """Start of ``count`` equal episodes, from the start of one."""
         return Columns(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
 
 
@@ -69,7 +69,7 @@ class Judging:
 
 @dataclass(frozen=True, slots=True)
 class Seen:
-    """What a step shows of every environment: observations (environments, observed), the rest (environments,)."""
+    """Result of a step in every environment: observations (environments, observed), the rest (environments,)."""
 
     observations: NDArray[np.float32]
     rewards: Floats

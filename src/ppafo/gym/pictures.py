@@ -1,4 +1,4 @@
-"""What an episode looks like: the vane at its angle, and angle and error over time, as the bytes of a picture."""
+"""Picture of an episode: the vane at its angle, and angle and error over time, as image bytes."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,13 +17,13 @@ _SIZE = (6.4, 3.6)
 _RESOLUTION = 100
 """Dots an inch: 640 by 360 points, even numbers as films want them."""
 _SHAFT = 0.15
-"""Radius of the shaft over that of the housing."""
+"""Ratio of the radii of shaft and housing [-]."""
 _NEUTRAL = 90.0
 """Angle of a neutral ankle [deg]."""
 
 
 class Moment(NamedTuple):
-    """What a picture shows of a time [s]: the angle of the vane [rad], and the error in the unit of the task."""
+    """Frame of a picture: time [s], angle of the vane [rad], and error in the unit of the task."""
 
     time: float
     angle: float
@@ -33,7 +33,7 @@ class Moment(NamedTuple):
 def picture(moments: Sequence[Moment], unit: str, period: float) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of the moments of an episode, in order; at least one.
 
-    ``unit`` is that of their errors, "rad" or "N m"; ``period`` [s] is the shortest span of time that is shown.
+    ``unit`` is the unit of their errors, "rad" or "N m"; ``period`` [s] is the shortest span of time that is shown.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

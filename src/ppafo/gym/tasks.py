@@ -23,7 +23,7 @@ LONGEST_SINCE = 10.0
 
 
 class Goal(NamedTuple):
-    """What an episode asks for: an angle [rad] to turn to, or the torque of a stride; each task takes its own part."""
+    """Goal of an episode: an angle [rad] to turn to, or the torque of a stride; each task uses its own field."""
 
     angle: float
     profile: TorqueProfile
@@ -45,7 +45,7 @@ class Requested(NamedTuple):
 
 
 class Sensed(NamedTuple):
-    """What every task shows: angle [rad], absolute pressures [bar], and the torque worked out from them [N m]."""
+    """Observation common to all tasks: angle [rad], absolute pressures [bar], torque computed from them [N m]."""
 
     angle: float
     pressure_1: float
@@ -54,7 +54,7 @@ class Sensed(NamedTuple):
 
 
 class TorqueView(NamedTuple):
-    """What the sensors show, requested torque [N m], its rate [N m/s], last command [-]."""
+    """Observation: sensors, requested torque [N m], its rate [N m/s], last command [-]."""
 
     sensed: Sensed
     requested: float
@@ -63,7 +63,7 @@ class TorqueView(NamedTuple):
 
 
 class AngleView(NamedTuple):
-    """What the sensors show, requested angle [rad], last command [-]."""
+    """Observation: sensors, requested angle [rad], last command [-]."""
 
     sensed: Sensed
     requested: float
@@ -71,7 +71,7 @@ class AngleView(NamedTuple):
 
 
 class WalkView(NamedTuple):
-    """What the sensors show, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
+    """Observation: sensors, forces of heel and toe [N], time since the heel was loaded [s], last command [-].
 
     The time counts from the last strike that the heel sensor showed; a command is -1 to 1, or 2 for venting.
     """
@@ -84,7 +84,7 @@ class WalkView(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What a step leads to: reward [-], error, gas from the supply so far [kg], 1 where it failed or is through.
+    """Result of a step: reward [-], error, gas from the supply so far [kg], 1 for a failed or finished episode.
 
     Gas counts from the begin of the episode.
     """
@@ -106,14 +106,14 @@ def sensed_of(seen: Measurement | GaitMeasurement) -> Sensed:
 def view_torque(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> TorqueView:
-    """What is observed while a torque is followed."""
+    """Observation while a torque is followed."""
     return TorqueView(sensed=sensed_of(seen), requested=wanted.torque, requested_rate=wanted.rate, command=command)
 
 
 def view_angle(
     seen: Measurement, goal: Goal, memory: Memory, wanted: Requested, command: float, time: float
 ) -> AngleView:
-    """What is observed while the vane turns to an angle."""
+    """Observation while the vane turns to an angle."""
     return AngleView(sensed=sensed_of(seen), requested=goal.angle, command=command)
 
 
@@ -247,4 +247,4 @@ TASKS = {
         ),
     )
 }
-"""By the word with which an environment is made."""
+"""Tasks by the name with which an environment is made."""

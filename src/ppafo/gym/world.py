@@ -1,4 +1,4 @@
-"""What one environment and many have in common: their settings, spaces, episodes and lanes."""
+"""Common basis of single and vector environments: settings, spaces, episodes and lanes."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -116,14 +116,14 @@ DEFAULTS: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }
 """Scenario or walk of each task where none is given, and the overrides that make it."""
 VARIED: Mapping[str, Ranges] = {"torque": {"reference.level": ("1 N m", "4.5 N m")}}
-"""What is drawn in these beside what the parameter set has intervals for."""
+"""Values drawn in these tasks in addition to the intervals of the parameter set."""
 TARGETS = ("40 deg", "110 deg")
 WALKING_TIME = 6.0
 """Length of an episode on a leg that walks [s]."""
 CONTINUOUS, ON_OFF = "continuous", "on_off"
 PHYSICAL, SCALED = "physical", "scaled"
 COMMANDS = 3
-"""Of a pair of on/off valves: -1, 0 and 1."""
+"""Number of commands of a pair of on/off valves: -1, 0 and 1."""
 LARGEST_RATE, LARGEST_FORCE = 1.0e3, 5.0e3
 """Bounds of the requested rate [N m/s] and of the forces [N] that are observed."""
 HEADROOM = 2.0
@@ -132,7 +132,7 @@ HEADROOM = 2.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What environments are made with beside their task; ``PneumaticEnv`` says what each is."""
+    """Settings of an environment beside its task; ``PneumaticEnv`` explains each."""
 
     scenario: str | Path | None = None
     overrides: Sequence[str] = ()
@@ -205,11 +205,11 @@ _EPISODES: Mapping[str, Callable[[str | Path, Sequence[str], Ranges, Settings], 
     "angle": _angle_episodes,
     "walk": _walk_episodes,
 }
-"""What the episodes of each task are drawn from."""
+"""Constructor of the episodes of each task."""
 
 
 class World:
-    """What one environment and many have in common: episodes, spaces, and lanes for as many as are asked for."""
+    """Common basis of single and vector environments: episodes, spaces, and lanes for any number of environments."""
 
     def __init__(self, task: str, settings: Settings) -> None:
         self.settings = settings

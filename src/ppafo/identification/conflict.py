@@ -1,4 +1,4 @@
-"""Whether parts of the recordings agree on the numbers: Hausman's test of sensors, recordings and stated limits."""
+"""Consistency of parts of the recordings: Hausman's test of sensors, recordings and stated limits."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -22,7 +22,7 @@ STATED = "stated limit"
 """Group of a conflict that is not among recordings: they want a tolerance beyond its limit."""
 
 _SMOOTHEST = 0.15
-"""Innovation [-] below which residuals are no noise: that of a sensor with a first order lag of 90 samples.
+"""Innovation [-] below which residuals are not noise: a sensor with a first-order lag of 90 samples.
 
 Noise with a lag of 33 samples, 0.24, is estimated down to 0.19 in two recordings of 500.
 """

@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from ppafo.errors import IdentificationError
 
 Verdict = Literal["identified", "holds for this model only", "not identifiable", "at its bound"]
-"""What the recordings say about a value.
+"""Verdict of the recordings on a value.
 
 Only the first is given where the model explains the recordings; the second is written into a set as a fitted value that
 nobody should take for the device's own.
@@ -61,12 +61,12 @@ class Estimate:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the value may be used in a parameter set."""
+        """Tell whether the value may be used in a parameter set."""
         return self.verdict in _USABLE
 
     @property
     def is_identified(self) -> bool:
-        """Whether the recordings fix the value and the model explains them: only such a value counts as identified."""
+        """Tell whether the recordings fix the value and the model explains them."""
         return self.verdict == "identified"
 
     @property

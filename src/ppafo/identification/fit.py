@@ -31,7 +31,7 @@ from ppafo.signals.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class Fit:
-    """What recordings say of numbers, SI units, in the order of ``numbers``.
+    """Result of a fit in SI units, in the order of ``numbers``.
 
     ``low`` and ``high`` are intervals at the confidence, ``noise`` standard deviations and ``correlation`` orders of
     the autoregression by channel, ``residuals`` measured less model, ``outliers`` the rows
@@ -205,7 +205,7 @@ def _outliers(work: Work, left: Floats) -> Indices:
 
 
 class _Settled(NamedTuple):
-    """Where the steps of a fit ended: scaled numbers, residuals of the samples, the line through both, the last gain.
+    """End of a fit: scaled numbers, residuals of the samples, linearisation there, and gain of the last step.
 
     ``gain`` is by how much the last step that was tried would lower the cost, at most 0 where it was not taken, and
     -inf where no run succeeds there.

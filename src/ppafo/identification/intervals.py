@@ -1,4 +1,4 @@
-"""Where the interval of a number ends, and which combinations of numbers nothing fixes.
+"""Ends of the interval of a number, and combinations of numbers that the recordings leave undetermined.
 
 At the estimate the law is a straight line, whose intervals are the covariance's. Where the law bends, such as along two
 numbers of which the product counts, other numbers may explain as much far beyond it: an end lies where the least

@@ -14,7 +14,7 @@ HIGHEST_ORDER = 12
 SAMPLES_PER_COEFFICIENT = 100
 """Samples for each coefficient of the autoregression at least; 100 white ones then get none in 7 of 10 fits."""
 _LARGEST_REFLECTION = 1.0 - 1.0e-9
-"""Of residuals that follow a law exactly, such as a constant's: no innovation would be left."""
+"""Largest reflection coefficient: residuals that follow a law exactly, such as a constant, leave no innovation."""
 
 _GAINS = tuple(2.0**-power for power in range(1, 9))
 """Gains of a level that are tried; with less it would not move within some hundred samples."""

@@ -53,7 +53,7 @@ _FILE = TomlKind(
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What a procedure may lean on: the set as it stands, the chosen valve, the bench, what messages call the place."""
+    """Context of a procedure: parameter set, chosen valve, bench, and label of its section in messages."""
 
     parameter_set: ParameterSet
     valve: str

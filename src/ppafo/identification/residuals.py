@@ -1,4 +1,4 @@
-"""What a fit moves and what it compares: numbers with priors, rows of residuals, and runs at scaled points."""
+"""Unknowns and residuals of a fit: numbers with priors, rows of residuals, and runs at scaled points."""
 
 import math
 from collections.abc import Callable

@@ -40,12 +40,12 @@ class Source:
 
     @property
     def name(self) -> str:
-        """What messages call it: the file's name, else the recording's label."""
+        """Label in messages: the file's name, else the recording's label."""
         return self.reference.partition(" sha256:")[0] or self.recording.label
 
     @property
     def trace(self) -> str:
-        """What an estimate says of it."""
+        """Reference of the recording in the source of an estimate."""
         return self.reference or self.recording.label
 
 
@@ -66,7 +66,7 @@ class Use:
     last: float
 
     def overlaps(self, other: "Use") -> bool:
-        """Whether both use samples of one time in one channel, should they be the same recording.
+        """Tell whether both uses share samples of a channel, if they are of the same recording.
 
         Without channels all of them count.
         """

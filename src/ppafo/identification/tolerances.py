@@ -1,4 +1,4 @@
-"""What a bench and a set do not know exactly: the table [bench], the defaults, and the one rule for priors.
+"""Tolerances of bench and parameter set: the table [bench], the defaults, and the one rule for priors.
 
 Usual errors of sensors and supply are those of ``usual_errors.py``. A set states half a 95 % interval, which is 1.96
 standard deviations.
@@ -57,7 +57,7 @@ _LARGEST_FRACTION = 0.5
 
 
 class BenchSection(StrictTable):
-    """What the bench does not know exactly: limits on either side; 0 is known exactly."""
+    """Tolerances of the bench: limits on either side; 0 for an exact value."""
 
     load: Annotated[Text | None, Field(description="of the external torque, of each recording; default 2 %")] = None
     supply: Annotated[Text | None, Field(description="of each supply pressure, of each recording; 1 psi_d")] = None
@@ -153,7 +153,7 @@ class Tolerances:
 
 
 DEFAULTS = Tolerances()
-"""Of a bench of which a problem says nothing."""
+"""Tolerances of a bench without a section [bench]."""
 
 _UNITS = {
     "load": "1",

@@ -19,7 +19,7 @@ _SHARE, _MOST_NAMED = 0.05, 3
 
 
 def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, str]:
-    """Return a number in an SI unit in that of a file, where one is ``stated``, else in the one that is shown.
+    """Number and unit for display: the file's unit if ``stated``, else the one that is shown.
 
     A pressure that a file has as gauge is shown absolute, as it is kept.
     """

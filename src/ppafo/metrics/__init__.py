@@ -1,4 +1,4 @@
-"""What a recording says in numbers: named values with units, the same for measured and simulated data.
+"""Metrics of a recording: named values with units, the same for measured and simulated data.
 
 To add a metric: a function and its MetricKind in a module of this folder, listed in its METRICS.
 """

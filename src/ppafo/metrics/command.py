@@ -1,4 +1,4 @@
-"""How often a command turns from one way to the other, and how far the torque goes: does a loop oscillate?
+"""Oscillation of a loop: reversals of the command's direction, and the overshoot of the torque.
 
 A loop that is too fast for the dead time of its valve opens it fully one way and then the other. A reversal is a
 command from beyond +0.5 to beyond -0.5 or back; in a walk both belong to one task, without venting in between.
@@ -42,7 +42,7 @@ def start_reversals(_course: Course, sample: Sample) -> Reversals:
 
 
 def update_reversals(state: Reversals, _course: Course, sample: Sample) -> Reversals:
-    """One more where the command goes the other way than last in this task."""
+    """Count a reversal if the command changes direction within the task."""
     command, task = sample.command, sample.stride.phase
     begins = task != state.task or command > VENTS_ABOVE
     before, now = 0.0 if begins else state.way, way_of(command)
@@ -116,7 +116,7 @@ def start_asked(_course: Course, _sample: Sample) -> Asked:
 
 
 def update_asked(state: Asked, _course: Course, sample: Sample) -> Asked:
-    """One sample more, where a torque is asked for."""
+    """Add a sample to the sums, if a torque is requested."""
     error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
     return Asked(
         state.squares + (error * error if counts else 0.0),

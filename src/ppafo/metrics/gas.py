@@ -14,7 +14,7 @@ from ppafo.signals.meter import NO_ENERGY, NO_GAS, Course, EnergySample, GasSamp
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
-    """What a total, a channel, grows by from the first sample to the last, in its unit, or a function of several."""
+    """Increase of a cumulative channel from the first to the last sample, or a function of several."""
     # A total counts from the start of the run, and a recording may be a part of one.
     gains = [float(recording[channel][-1] - recording[channel][0]) for channel in channels]
     return gains[0] if function is None else float(function(*gains))
@@ -171,7 +171,7 @@ def start_work(course: Course, sample: Sample) -> Work:
 
 
 def update_work(state: Work, course: Course, sample: Sample) -> Work:
-    """One interval more, by the trapezoidal rule over the angle."""
+    """Add one interval by the trapezoidal rule over the angle."""
     piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
     return Work(sample.torque, sample.angle, state.work + piece)
 
@@ -181,7 +181,7 @@ WORK = MeterKind("work", Work, start_work, update_work, of_motion=True)
 
 
 def ratio(above: Floats, below: Floats) -> Floats:
-    """One over the other; nan where the other is not above 0."""
+    """Quotient; nan if the divisor is not positive."""
     # nan where a recording has None: a column has no other word for it.
     found: Floats = above / choose(below > 0.0, below, math.nan)
     return found
@@ -202,7 +202,7 @@ def _of_gains(
     function: PlainFunction | None = None,
     meter: MeterKind = GAS,
 ) -> MetricKind:
-    """What a total has grown by, or a function of what several have."""
+    """Metric of the increase of a total, or of a function of several."""
     compute = partial(gained, channels=channels, function=function)
     places = tuple(f"meters.{meter.name}.gained.{channel}" for channel in channels)
     return MetricKind(name, unit, summary, channels, compute, ReadAt(places, function), (meter,))

@@ -1,4 +1,4 @@
-"""What a metric declares and what it gives; the two parts of a torque task, the ramp and the hold after it."""
+"""Declaration and value of a metric; the two parts of a torque task, the ramp and the hold after it."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Metric:
-    """One number about a recording, in SI units, with what it means."""
+    """Value of a metric of a recording, in SI units, and its meaning."""
 
     value: float
     unit: str
@@ -57,7 +57,7 @@ class Metrics(dict[str, Metric]):
 
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What is left of runs that were metered and not recorded; every number is an array (runs,), or a float of one run.
+    """Final meter states of runs that were not recorded; every number is an array (runs,), or a float for one run.
 
     ``meters`` has the last state of each meter by its name; ``course`` the reference's, () where none needs it;
     ``interval`` is the time between two samples [s] and ``samples`` their number; ``traces`` has channels sample by
@@ -94,7 +94,7 @@ def _entry(row: Any, name: str) -> Any:
 
 
 def less(number: Floats, other: Floats) -> Floats:
-    """One number less another one of its unit (runs,)."""
+    """Difference of two numbers of one unit (runs,)."""
     return number - other
 
 

@@ -1,4 +1,4 @@
-"""How the vane moves."""
+"""Metrics of the vane's motion."""
 
 from functools import partial
 from typing import NamedTuple
@@ -107,7 +107,7 @@ def start_foot_error(course: Course, sample: Sample) -> FootError:
 
 
 def update_foot_error(state: FootError, course: Course, sample: Sample) -> FootError:
-    """One interval more."""
+    """Add one interval."""
     error = sample.foot.angle - sample.foot.measured_angle
     square = error * error
     return FootError(square, state.total + 0.5 * (state.last + square), min(state.lowest, sample.foot.toe_difference))

@@ -73,7 +73,7 @@ class CurrentStride(NamedTuple):
 
 
 class EndedStrides(NamedTuple):
-    """How many strides were ``whole``, had help throughout, and are ``averaged``: those with help but the first.
+    """Counts of strides: ``whole``, ``helped`` (with help throughout), and ``averaged`` (helped but the first ones).
 
     Over the averaged ones: sums of what each adds to the totals, of squared errors of the torque in push-off
     [(N m)^2], and of the samples there.

@@ -1,4 +1,4 @@
-"""How restless a task is: changes of state of the valves and oscillations of what is controlled.
+"""Switching and oscillation of a task: changes of state of the valves, and reversals of the controlled quantity.
 
 The state of a valve is the one that the command orders, at the samples: valve A of a pair is on above 0, valve B below,
 both are off at 0 and where the command vents. Each change of each valve counts one, so a reversal of a pair counts two.
@@ -103,7 +103,7 @@ def start_switchings(course: Course, sample: Sample) -> Switchings:
 
 
 def update_switchings(state: Switchings, course: Course, sample: Sample) -> Switchings:
-    """One more for each valve that the command orders to change."""
+    """Count each valve that the command orders to change."""
     position_a, position_b = ordered_positions(sample.command)
     changes = abs(position_a - state.position_a) + abs(position_b - state.position_b)
     return Switchings(position_a, position_b, state.changes + changes)
@@ -159,7 +159,7 @@ def start_oscillations(course: Course, sample: Sample) -> Oscillations:
 
 
 def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> Oscillations:
-    """One sample more; the first one of the hold is the last one of the ramp too."""
+    """Add one sample; the first sample of the hold is also the last one of the ramp."""
     value = value_in(sample)
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)
     anew = course.hold_start == sample.number

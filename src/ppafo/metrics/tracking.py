@@ -1,4 +1,4 @@
-"""How well what is controlled follows its reference."""
+"""Tracking errors of the controlled quantity against its reference."""
 
 from collections.abc import Callable
 from functools import partial
@@ -72,7 +72,7 @@ def start_squared_error(course: Course, sample: Sample) -> SquaredError:
 
 
 def update_squared_error(state: SquaredError, course: Course, sample: Sample) -> SquaredError:
-    """One interval more."""
+    """Add one interval."""
     error = sample.reference - value_in(sample)
     square = error * error
     # In intervals: all have one length, which cancels where the sum is read.

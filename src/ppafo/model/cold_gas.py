@@ -85,7 +85,7 @@ class ColdSupply(NamedTuple):
 
 
 class SupplyState(NamedTuple):
-    """What changes: the bottle as in ``BottleState``, temperatures of regulator and hose [K], dry ice in the seat [kg].
+    """State of a supply: ``BottleState``, temperatures of regulator and hose [K], dry ice in the seat [kg].
 
     Totals since the start [J]: enthalpy that left the bottle, enthalpy delivered, heat from the room into all parts.
     """
@@ -102,7 +102,7 @@ class SupplyState(NamedTuple):
 
 
 class SupplyNow(NamedTuple):
-    """What a supply offers in a state: content of the bottle, highest pressure [Pa] and flow [kg/s] of its regulator.
+    """Capability of a supply: content of the bottle, highest pressure [Pa] and flow [kg/s] of its regulator.
 
     ``outlet_temperature`` of the gas behind the regulator and ``gas_temperature`` behind the hose [K].
     """
@@ -186,7 +186,7 @@ def enthalpy_behind_seat(line: Isobar, enthalpy: float, ice: float, mass: float)
 def supply_now(
     table: FluidTable, line: Isobar, supply: ColdSupply, state: SupplyState, near: float, mass: float
 ) -> SupplyNow:
-    """What a supply offers in a state whose content is ``near`` a temperature [K]: pressure, flow and warmth.
+    """Capability of a supply in a state with a content ``near`` a temperature [K]: pressure, flow and temperature.
 
     ``mass`` [kg] is what the device draws in a step, the last one for the next, which dry ice cools while it lasts.
     """

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 Numeric = TypeVar("Numeric", float, NDArray[np.float64])
 """A float, or an array (runs,) of them: what a function of plain arithmetic takes and gives back."""
 Result = TypeVar("Result")
-"""What a function of floats returns."""
+"""Return type of a function of floats."""
 Problem = tuple[Any, Callable[[int], str]]
-"""What may be wrong with runs: a truth value for all of them or an array (runs,), and the message about one of them.
+"""Possible fault of runs: a truth value for all or an array (runs,), and the message about one of them.
 
 The message is made of the number of a run, from 0; it is one line, as an error shows it.
 """

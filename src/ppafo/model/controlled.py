@@ -1,4 +1,4 @@
-"""What a law controls: the torque of the actuator, the angle, the pressure in a chamber or the difference of both.
+"""Controlled quantity of a law: torque of the actuator, angle, pressure in a chamber, or pressure difference.
 
 ``controlled`` and ``steered`` are ports: a program whose reference is no torque has the functions of its entry in the
 table in their place. To add one: a function and a line of ``CONTROLLED``.
@@ -52,7 +52,7 @@ def turned_round(error: float) -> float:
 
 
 def seen_value(measurement: Measurement) -> float:
-    """What the sensors show of what is controlled, in the unit of the reference."""
+    """Controlled quantity as measured, in the unit of the reference."""
     return controlled(measurement.angle, measurement.pressure_1, measurement.pressure_2, measurement.torque)
 
 
@@ -62,7 +62,7 @@ def seen_error(reference: float, measurement: Measurement) -> float:
 
 
 def value_in(sample: Sample) -> float:
-    """What is controlled, at a sample, in the unit of the reference."""
+    """Controlled quantity at a sample, in the unit of the reference."""
     return controlled(sample.angle, sample.pressure_1, sample.pressure_2, sample.torque)
 
 
@@ -120,7 +120,7 @@ class Controlled:
 
     @property
     def channel(self) -> str:
-        """Its channel in a recording; the one of a difference of pressures is recorded where it is controlled."""
+        """Channel of the quantity in a recording; a pressure difference is recorded only if it is controlled."""
         return self.name
 
     @property
@@ -204,7 +204,7 @@ CONTROLLED: dict[str, Controlled] = {
         ),
     )
 }
-"""What a reference can be of, by the word that a file has in ``reference.of``."""
+"""Controlled quantities, by the word that a file has in ``reference.of``."""
 
 ANYTHING = tuple(CONTROLLED)
-"""What a law can follow that acts on the error alone."""
+"""Controlled quantities of a law that acts on the error alone: all."""

@@ -1,4 +1,4 @@
-"""What a component declares: its numbers, with name, unit, range and meaning, and its laws, which are plain functions.
+"""Declaration of a component: its numbers, with name, unit, range and meaning, and its laws, plain functions.
 
 A number is declared once, as a field of a frozen dataclass or of a NamedTuple:
 ``area: Annotated[float, Number("m^2", "area of the opening")]``.
@@ -15,7 +15,7 @@ from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hint
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
-    """One parameter of a component: default and range in the SI ``unit``, ``summary`` its meaning."""
+    """Declared parameter of a component: default and range in the SI ``unit``, ``summary`` its meaning."""
 
     name: str
     unit: str

@@ -1,4 +1,4 @@
-"""How a wearer leads the leg: a measured gait as Fourier series, stride after stride, or in a task sequence.
+"""Gait that leads the leg: a measured stride as Fourier series, repeated or in a task sequence.
 
 First the series, then the gait phase and what was measured there, then a task sequence: standing, starting, changing
 the speed, stairs, stopping.
@@ -107,7 +107,7 @@ def term_rate(one: Harmonic, at: Harmonic) -> float:
 
 
 class GaitSeries(NamedTuple):
-    """One stride from heel strike to heel strike.
+    """Fourier series of one stride from heel strike to heel strike.
 
     Shank angle and ankle angle [rad] with the signs of ``model.leg``, ankle moment per body mass [N m/kg], positive in
     plantarflexion, vertical ground force in body weights [-], acceleration of the knee forward and up [m/s^2].
@@ -161,7 +161,7 @@ class GaitPlace(NamedTuple):
 
 
 class GaitMeasured(NamedTuple):
-    """What was measured of a gait at an instant: the first numbers of ``GaitNow``, in its order."""
+    """Measured quantities of a gait at an instant: the first fields of ``GaitNow``, in its order."""
 
     phase: float
     shank: float
@@ -214,7 +214,7 @@ def place_at(timing: GaitTiming, time: float) -> GaitPlace:
 
 
 def measured_at(gait: GaitSeries, timing: GaitTiming, leg: LegParameters, place: GaitPlace) -> GaitMeasured:
-    """What was measured of a gait at a place in the stride, in newtons of this leg."""
+    """Measured quantities of a gait at a phase of the stride, with forces [N] scaled to this leg."""
     at = place.at
     return GaitMeasured(
         phase=place.phase,
@@ -319,7 +319,7 @@ standing."""
 
 
 class SequencePart(NamedTuple):
-    """One part: start and length [s], phase at its start [turns], and what changes over it: first value and gain.
+    """Part of a task sequence: start and length [s], initial phase [turns], initial value and gain of each quantity.
 
     Strides per second [Hz], ``stride`` (angles over the recorded ones) [-] and ``load`` [body weights] that the foot
     carries in standing. ``slope`` [rad] of the ground, above 0 uphill, which its gain changes too. ``tilt`` [rad] leans
@@ -375,7 +375,7 @@ class Pace(NamedTuple):
 
 
 class Marks(NamedTuple):
-    """What marks a stride now: force [N] of a scuff under the toes, and 1 where only the forefoot meets the ground."""
+    """Features of the present stride: force [N] of a scuff under the toes, and 1 for a forefoot strike."""
 
     scuff_force: float
     forefoot: float
@@ -464,7 +464,7 @@ def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing
 
 
 def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
-    """How far the shank leans forward for a strike with the toes: most at the strike, none at toe-off and standing."""
+    """Forward lean of the shank for a strike with the toes: largest at the strike, zero at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
     # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.
     since = phase - standing if phase >= standing else phase - standing + 1.0

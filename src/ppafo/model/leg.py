@@ -53,7 +53,7 @@ class ShankNow(NamedTuple):
 
 
 class FootLoad(NamedTuple):
-    """What turns about the ankle of a prescribed shank: mass moment [kg m] and inertia about the ankle [kg m^2].
+    """Foot and plate about the ankle of a prescribed shank: mass moment [kg m] and inertia about the ankle [kg m^2].
 
     Length of the shank [m] and gravity [m/s^2] are of the leg.
     """

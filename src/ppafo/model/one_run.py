@@ -43,4 +43,4 @@ FOR_ONE_RUN = {
     columns.truncated: truncated,
     columns.whole: whole,
 }
-"""What stands for each in a program of one run."""
+"""Scalar replacement of each array function in a program of one run."""

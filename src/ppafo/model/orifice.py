@@ -181,7 +181,7 @@ def check_valve_flow_slopes(
 
 
 Terms = tuple[float, float, float, float, float, float, float]
-"""One number for each coefficient; there are ``TERMS``."""
+"""Coefficients of a series, ``TERMS`` in number."""
 NODES: Terms = (0.01371, 0.117149, 0.300253, 0.522087, 0.735768, 0.900391, 0.988845)
 """Nodes at which a curve meets the exact function: 1 - r over its value at the critical ratio.
 

@@ -245,7 +245,7 @@ def chamber_pressures(
 
 
 class SinglePort(NamedTuple):
-    """One open path: conductance [kg/(s Pa)], absolute pressure of the node [Pa], and 1 if that is the source.
+    """Open path: conductance [kg/(s Pa)], absolute pressure of the node [Pa], and 1 if the node is the source.
 
     ``is_relieving`` is 1 where gas may flow back into the node, else 0.
     """

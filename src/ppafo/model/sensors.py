@@ -1,4 +1,4 @@
-"""What a controller sees of the plant: ideal, or with a bandwidth, noise and quantisation; and in a walk.
+"""Sensors of the controller: ideal, or with bandwidth, noise and quantisation; also those of a walk.
 
 Noise is a pure function of seed, sample number and channel, so that a run gives the same noise alone, in any block
 and on any number of threads. A controller of walking sees two force sensors under the foot beside angle and pressures,
@@ -53,7 +53,7 @@ def decay_factors(rate: float, step: float) -> tuple[float, float]:
 
 
 def follow(rate: float, step: float, shown: float, before: float, now: float) -> float:
-    """What a first-order sensor shows after a step [s] in which the truth runs straight, in its own unit; exact."""
+    """Reading of a first-order sensor after a step [s] with a linear true value, in its own unit; exact."""
     kept, mean = decay_factors(rate, step)
     return kept * shown + (mean - kept) * before + (1.0 - mean) * now if rate > 0.0 else now
 
@@ -142,7 +142,7 @@ class GaitMeasurement(NamedTuple):
 
 
 class Fault(NamedTuple):
-    """What is wrong with a sensor from ``time`` [s] on: it shows its last value (``holds`` 1) or ``reading``.
+    """Fault of a sensor from ``time`` [s] on: it repeats its last value (``holds`` 1) or shows ``reading``.
 
     With ``distorts`` 1 it shows gain times what is there, plus an offset and a drift [1/s] in its own unit, with a
     fraction of the other sensor of its kind (``crosstalk``), a first-order lag (``memory``, what is left of its last
@@ -165,7 +165,7 @@ class Fault(NamedTuple):
 
 
 class GaitSensors(NamedTuple):
-    """How sensors follow, noise and step of the forces [N], fractions of samples that are lost, and faults.
+    """Sensors of a walk: response, noise and resolution of the forces [N], fractions of lost samples, and faults.
 
     ``follow_rate`` [1/s] of the force sensors; ``angle_memory`` and ``pressure_memory`` are what is left of a
     first-order sensor's last value after one sample, 0 for one that follows at once.
@@ -322,7 +322,7 @@ def measure_gait(
 
 
 def samples_late(fault: Fault, time: float, sample: int) -> int:
-    """How many samples ago a reading was made that arrives at ``time`` [s], the time of ``sample``."""
+    """Age, in samples, of the reading that arrives at ``time`` [s], the time of ``sample``."""
     # No reading is older than the first one.
     late = int(fault.late_samples) if is_active(fault, time) else 0
     return min(late, sample)
@@ -331,7 +331,7 @@ def samples_late(fault: Fault, time: float, sample: int) -> int:
 def late_measurement(
     heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, plant: PlantParameters
 ) -> GaitMeasurement:
-    """What a controller gets of readings, late ones too: forces [N], angle [rad], pressures [Pa]."""
+    """Measurement of a walking controller from readings, possibly delayed: forces [N], angle [rad], pressures [Pa]."""
     return GaitMeasurement(
         angle=angle,
         pressure_1=pressure_1,

@@ -22,7 +22,7 @@ SHUT_OFF = (
     Quantity("mass", "kg", "its mass", 0.06, 0.0, 1.0),
     Quantity("power", "W", "what holds it open, as long as the device helps", 0.5, 0.0, 100.0),
 )
-"""What a walk says of a shut-off valve; mass and power of a miniature 3/2 solenoid with a holding circuit, assumed."""
+"""Settings of a shut-off valve; mass and power of a miniature 3/2 solenoid with a holding circuit, assumed."""
 
 
 class ShutOff(NamedTuple):
@@ -41,7 +41,7 @@ NOT_FITTED = ShutOff(0.0, 0.0, NEVER)
 
 
 class Unpowered(NamedTuple):
-    """For how long [s] the shut-off valve has had no power, and for how long the controller has been silent.
+    """Time [s] for which the shut-off valve has been without power, and the controller silent.
 
     It has none since the controller stopped, was in a brown-out, or was silent for longer than the watchdog allows.
     """
@@ -66,7 +66,9 @@ def is_silenced(shut_off: ShutOff, unpowered: Unpowered) -> bool:
 def next_unpowered(
     shut_off: ShutOff, unpowered: Unpowered, runs: bool, stopped: bool, brown_out: bool, period: float
 ) -> Unpowered:
-    """How long the valve has had no power after a sample at which the controller ``runs`` or not, a ``period`` [s] on.
+    """Time for which the valve has been without power, one sample ``period`` [s] on;
+
+    ``runs`` if the controller is alive.
 
     The power is gone where the controller has ``stopped`` the device, and at once in a ``brown_out``. A watchdog that
     has acted stays: what the controller would do when it comes back is not known.

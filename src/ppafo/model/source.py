@@ -125,7 +125,7 @@ class BottleWall(NamedTuple):
 
 
 class BottleState(NamedTuple):
-    """What changes in a bottle: mass [kg] and internal energy [J] of the content, temperature of its wall [K]."""
+    """State of a bottle: mass [kg] and internal energy [J] of the content, temperature of its wall [K]."""
 
     mass: float
     energy: float
@@ -133,7 +133,7 @@ class BottleState(NamedTuple):
 
 
 class BottleContent(NamedTuple):
-    """What a bottle holds: temperature [K], absolute pressure [Pa], liquid [kg], enthalpy of what leaves [J/kg]."""
+    """Content of a bottle: temperature [K], absolute pressure [Pa], liquid [kg], enthalpy of the outflow [J/kg]."""
 
     temperature: float
     pressure: float

@@ -1,4 +1,4 @@
-"""What a page knows of its scenarios: settings with units, limits and sliders, relations, channels and metrics."""
+"""Content of a page about its scenarios: settings with units, limits and sliders, relations, channels and metrics."""
 
 import json
 import math
@@ -244,7 +244,7 @@ def _gauge_texts(scenario: Scenario, settings: Iterable[Mapping[str, Any]]) -> d
 
 
 def _scales(shown: Iterable[tuple[str, str]]) -> dict[str, list[dict[str, Any]]]:
-    """How each unit that somebody may type becomes one in SI: in decimals, as ``ppafo.units`` reckons."""
+    """Conversion of each unit that may be entered into SI: in decimals, as ``ppafo.units`` computes."""
     wanted: dict[str, dict[str, None]] = {}
     for si, unit in sorted(shown):
         wanted.setdefault(si, {}).update(dict.fromkeys((unit, *_UNITS.get(si, ()), si)))

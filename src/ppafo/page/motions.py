@@ -1,4 +1,4 @@
-"""What a page shows and asks of a vane alone, and what of a walk: tab, colour, claims, limits of its settings."""
+"""Presentation of a vane alone and of a walk on a page: tab, colour, claims, limits of the settings."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -15,10 +15,10 @@ _WALKED = 6
 
 
 class ShownMotion(Protocol):
-    """What a page shows and asks of the scenarios whose files have one layout."""
+    """Presentation of the scenarios whose files have one layout: protocol."""
 
     claims: ClassVar[str]
-    """Which claims of ``words.toml`` a page makes of it."""
+    """Section of ``words.toml`` with the claims of a page about it."""
 
     def declared(self) -> Declared:
         """Return what its file can hold."""

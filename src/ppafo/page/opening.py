@@ -1,4 +1,4 @@
-"""What a page opens with, found by running its programs: what each setting changes there, and the first panel.
+"""Opening of a page, found by running its programs: effect of each setting, and the first panel.
 
 The package keeps this of its own scenarios in ``opening.json``, which ``scripts/page_tables.py`` writes; of others it
 is computed when the page is made.
@@ -25,12 +25,12 @@ MOST_FIRST = 12
 LEAST_CHANGE = 1e-3
 """Change, as a fraction, below which a setting changes nothing that could be seen."""
 _STEP = 0.2
-"""How far a setting is moved to either side: this fraction of its value; of a gauge pressure above the atmosphere."""
+"""Change of a setting to either side, as a fraction of its value; for a gauge pressure, of its gauge value."""
 _PLACES = 300
 _NATURE = ("gas.", "gas_model.", "flow.", "run.", "sensors.seed", "supply.atmospheric_pressure")
 """Settings that never come first: what nature sets, and how finely a run is computed and for how long."""
 _RANKED = ("published", "task", "changed", "identified", "fitted", "datasheet", "derived", "assumed", "default")
-"""Of two settings with one effect, such as an area and its discharge coefficient, the better known one is shown."""
+"""Provenances in order of display: of two settings with one effect, the better known one is shown."""
 
 
 def opening_of(
@@ -62,7 +62,7 @@ def opening_like(module: WasmModule) -> dict[str, Any]:
 
 
 def _key(module: WasmModule, changes: Mapping[str, float], claims: Sequence[str]) -> str:
-    """What names a scenario as its file and overrides have it, with what a page changes of it."""
+    """Hash that identifies a scenario with its file, overrides and the changes of a page."""
     content = [module.description["document"], module.description["overrides"], sorted(changes.items()), list(claims)]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:32]
 

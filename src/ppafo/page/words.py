@@ -1,4 +1,4 @@
-"""What a page says and over what its sliders go: ``words.toml``."""
+"""Texts of a page and ranges of its sliders: ``words.toml``."""
 
 import tomllib
 from functools import cache

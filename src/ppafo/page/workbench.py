@@ -84,7 +84,7 @@ def live_part(scenarios: "Sequence[str | Scenario]") -> LivePart | None:
 
 
 class _PageContent(NamedTuple):
-    """What a page simulates and shows, its packed modules by name, and the picture of its first tab."""
+    """Content of a page, its packed modules by name, and the picture of its first tab."""
 
     document: dict[str, Any]
     modules: dict[str, str]
@@ -138,7 +138,7 @@ def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) 
 
 
 def _opening(simulated: Simulated, form: str, claims: Sequence[str]) -> dict[str, Any]:
-    """What a program shows as it opens, with the metrics called claims; a block opens as the shipped scenario does."""
+    """Opening state of a program, with the metrics in ``claims``; a block opens like the shipped scenario."""
     if form == "block":
         return opening_like(simulated.module)
     return opening_of(simulated.scenario, simulated.module, usual_values(simulated.scenario), claims)

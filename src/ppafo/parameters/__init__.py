@@ -1,4 +1,4 @@
-"""What a device is: values with provenance, parameter sets as files, and the device in SI units."""
+"""Description of a device: values with provenance, parameter sets as files, and the device in SI units."""
 
 from ppafo.parameters.building import build_device
 from ppafo.parameters.loading import list_sets, load_device, load_parameter_set

@@ -1,4 +1,4 @@
-"""From a parameter set to a device in SI units; here, and not earlier, a set must be complete and make sense."""
+"""Construction of a device in SI units from a parameter set, which must be complete and consistent by then."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -46,7 +46,7 @@ _SAME = 1.0e-9
 _COVERED = 1.01
 """A supply this much above the pressures of a table is still covered by it."""
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
-"""From a section and what is declared for it: its numbers in SI, by name."""
+"""Function that reads a section by its declared quantities: numbers in SI, by name."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
 
 

@@ -1,4 +1,4 @@
-"""What a device is, in SI units: plain frozen values that the rest of the package computes with."""
+"""Device in SI units: plain frozen values with which the rest of the package computes."""
 
 import math
 from collections.abc import Mapping
@@ -120,7 +120,7 @@ class Friction:
 
 @dataclass(frozen=True, slots=True)
 class FootPlate:
-    """What the vane moves: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
+    """Foot plate: inertia about the ankle [kg m^2], largest gravity torque m g l [N m]; equation (1)."""
 
     inertia: Annotated[
         float, Number("kg m^2", "inertia about the ankle", minimum=0.0, maximum=1e3, minimum_allowed=False)
@@ -146,7 +146,7 @@ class Supply:
 
     @property
     def has_one_pressure(self) -> bool:
-        """Whether both regulators are set to one pressure, so that a change of the first is one of both."""
+        """Tell whether both regulators are set to one pressure, so that they are changed together."""
         # Two texts of one pressure in two units differ in the last bits.
         return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
 
@@ -170,7 +170,7 @@ class Valve:
 
 @dataclass(frozen=True, slots=True)
 class Flow:
-    """How flow is computed: the pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
+    """Computation of flow: pressure ratio [-] above which it is linear in the ratio, as in ISO 6358."""
 
     linear_ratio: Annotated[
         float, Number("", "pressure ratio above which flow is linear", minimum=0.99, maximum=0.9999)

@@ -78,7 +78,7 @@ def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> Term:
 
 @dataclass(frozen=True, slots=True)
 class Follows:
-    """How a number is made of others, in SI units, as long as it is not given itself: the sum of terms and a gap.
+    """Default of a number as a function of others, in SI units: the sum of terms and a gap.
 
     ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
     """
@@ -89,12 +89,12 @@ class Follows:
 
     @property
     def sources(self) -> tuple[str, ...]:
-        """What is followed."""
+        """Paths of the numbers that it follows."""
         return tuple(source for term in self.terms for source in term.sources)
 
     @property
     def is_same(self) -> bool:
-        """Whether the number is its source's."""
+        """Tell whether the number equals its source."""
         return not self.gap and [term.function for term in self.terms] == [itself]
 
     def number(self, present: Callable[[str], Any]) -> Any:

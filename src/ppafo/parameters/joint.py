@@ -1,4 +1,4 @@
-"""What an actuator turns, in words: the joint and its two directions."""
+"""Joint that an actuator turns, in words: its name and its two directions."""
 
 from dataclasses import dataclass
 
@@ -11,12 +11,12 @@ OPPOSITES = {
     "internal rotation": "external rotation",
 }
 OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
-"""What movements of a joint are called, and those against them."""
+"""Opposite of each joint movement."""
 
 
 @dataclass(frozen=True, slots=True)
 class Joint:
-    """What the actuator turns, in words: the joint, what a growing angle is called there, and a falling one."""
+    """Joint that the actuator turns, in words: its name, the movement of a growing angle, and of a falling one."""
 
     name: str = "ankle"
     positive: str = "plantarflexion"

@@ -34,7 +34,7 @@ from ppafo.units.shown import shown_text
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
-"""By section the forms in which something is given, each as the names of its values."""
+"""Alternative forms of a section's numbers, each as the names of its values."""
 _ORIFICE = tuple(tuple(quantity.name for quantity in form) for form in (AREA_FORM, SONIC_FORM))
 FORMS: Forms = {"valve": _ORIFICE, "actuator.leak": _ORIFICE, "controller": (("rate",), ("period",))}
 

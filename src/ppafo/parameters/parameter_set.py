@@ -31,11 +31,11 @@ if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
 
 Origin = Literal["published", "datasheet", "derived", "identified", "fitted", "assumed"]
-"""How a value came to be known; ``fitted`` is one that recordings do not fix, or whose recordings no model explains."""
+"""Provenance of a value; ``fitted`` is neither fixed by its recordings nor explained by a model of them."""
 
 
 CONFIDENCE = 0.95
-"""Of the interval whose half width an entry states."""
+"""Confidence of the interval whose half width an entry states."""
 
 
 class Entry(StrictTable):

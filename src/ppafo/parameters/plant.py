@@ -1,4 +1,4 @@
-"""From a device to the numbers that the plant and its effects compute with."""
+"""Numbers of the plant and its effects, computed from a device."""
 
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -135,7 +135,7 @@ def plant_with(device: Device, valve: Restriction, leak: Restriction, external_t
 
 
 SEEN_BY_EFFECTS = ("gas", "actuator", "friction", "foot_plate", "supply")
-"""What ``prepare`` of an effect sees of a device; an exported library has these sections in C."""
+"""Sections of a device that ``prepare`` of an effect may read; an exported library has them in C."""
 
 
 Sections = Mapping[str, Any]

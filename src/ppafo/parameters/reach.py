@@ -37,7 +37,7 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
 def supply_for(device: Device, angle: float, torque: float) -> float | None:
     """Supply pressure [Pa absolute] with which a device gives a static torque [N m] at an angle [rad].
 
-    Chamber 1 raises the torque above that of the vented actuator, chamber 2 lowers it. None where no supply up to
+    Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it. None where no supply up to
     ``HIGHEST_PRESSURE`` gives it.
     """
     own, vented = static_torque(device), float(device.supply.atmospheric_pressure)

@@ -13,11 +13,11 @@ from ppafo.storage.files import write_file
 # mspdebug's simulator of an MSP430, driven by its console.
 
 _CYCLES = re.compile(rb"MCLK:\s+(\d+)")
-"""Where mspdebug says how many cycles have passed."""
+"""Form of mspdebug's cycle counter."""
 _ASKED = "asked.txt"
 """File of the questions for some samples."""
 _SAID_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
-"""What mspdebug is asked behind each question: the cycles, and the four bytes of the outputs."""
+"""Query of mspdebug after each sample: cycle count, and the four bytes of the outputs."""
 
 
 @final
@@ -41,7 +41,7 @@ class MspdebugSimulator:
         self._answer()
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """What it decides for some samples in turn, at most 50: asked at once, so that neither waits for the other."""
+        """Controller decisions for up to 50 consecutive samples, requested in one batch to avoid a round trip each."""
         asked = []
         for readings in every:
             sent = " ".join(f"0x{byte:02x}" for number in readings for byte in number.to_bytes(2, "little"))
@@ -58,7 +58,7 @@ class MspdebugSimulator:
         return decisions
 
     def stack(self) -> int:
-        """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
+        """Deepest use of the stack [bytes]: what it has overwritten of RAM that was filled before."""
         self._say(f"md {self._start} {self._free}\n{_SAID_OUTPUTS}")
         shown = self._console.until(b"simulated_outputs 4\n")
         self._console.until(b"\n")
@@ -128,7 +128,7 @@ MSP430F2013 = Target(
 
 
 def _words_of_cortex(name: str, part: str, pins: Mapping[str, str]) -> dict[str, str]:
-    """What fills the templates for a Cortex-M on a micro:bit, whose compiler may be gcc, clang or zig."""
+    """Template variables for a Cortex-M on a micro:bit, whose compiler may be gcc, clang or zig."""
     for_zig = f"zig cc -target thumb-freestanding-eabi -mcpu={name.replace('-', '_')}"
     return {
         "needs": "gcc for ARM without a system",

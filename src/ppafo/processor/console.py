@@ -11,7 +11,7 @@ from weakref import finalize
 from ppafo.errors import SimulationError, one_line, reason
 
 UNTOUCHED = 0xA5
-"""What the RAM for the stack is filled with, so that what the stack has overwritten can be seen."""
+"""Fill byte of the stack's RAM, which reveals the bytes that the stack has overwritten."""
 _PATIENCE = 60.0
 """Seconds without a byte before a simulator is given up; a busy machine starts QEMU in some ten."""
 
@@ -46,7 +46,7 @@ class Console:
             raise SimulationError(f"{self._name} has ended: {reason(error)}; {self._last()}") from error
 
     def until(self, mark: bytes) -> bytes:
-        """What the program says up to a mark. SimulationError where it falls silent."""
+        """Output of the program up to a mark. SimulationError if it falls silent."""
         assert self._process.stdout is not None
         while mark not in self._seen:
             ready, _, _ = select.select([self._process.stdout], [], [], _PATIENCE)
@@ -69,5 +69,5 @@ def _end(process: "subprocess.Popen[bytes]") -> None:
 
 
 def depth_of_stack(memory: bytes) -> int:
-    """How deep a stack has been [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
+    """Deepest use of a stack [bytes] that grows down from the end of memory filled with ``UNTOUCHED``."""
     return len(memory) - next((depth for depth, byte in enumerate(memory) if byte != UNTOUCHED), len(memory))

@@ -154,7 +154,7 @@ def _typed_row(kind: Any, collector: SourceCollector) -> Row:
 
 
 TICK = 125.0e-6
-"""What a sample period must be a multiple of [s]: one pulse of the timer."""
+"""Unit of the sample period [s]: one pulse of the timer."""
 MOST_TICKS = 32767
 """Largest number of ticks that 16 bits hold with a sign."""
 _TEMPLATES = ("Makefile", "README.md", "board.h", "board_simulated.c", "controller.h", "host.c", "main.c")

@@ -1,4 +1,4 @@
-"""What a small processor computes with: products by shifts and additions, gains as whole numbers, converter readings.
+"""Arithmetic of a small processor: products by shifts and additions, integer gains, converter readings.
 
 A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 15) >> places``, rounded down each time.
 """
@@ -77,7 +77,7 @@ SETTINGS = (
         "converter_range", "Pa_a", "pressure at which the converter shows its largest number", 1.0e6, 1.0e4, 1.0e8
     ),
 )
-"""What a scenario says of the converter of an integer controller."""
+"""Settings of the converter of an integer controller."""
 
 
 class Converter(NamedTuple):
@@ -104,7 +104,7 @@ class Steps(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """What the converter shows, from 0 to its largest reading: reference, pressure in chamber 1 and in chamber 2."""
+    """Converter readings, from 0 to the largest one: reference, pressure in chamber 1 and in chamber 2."""
 
     reference: int
     pressure_1: int
@@ -148,7 +148,7 @@ def count_of(value: float, step: float, top: float) -> int:
 
 
 def read(converter: Converter, reference: float, measurement: Measurement) -> Readings:
-    """What a converter shows of a reference [N m] and of the measured pressures [Pa]."""
+    """Converter readings of a reference [N m] and of the measured pressures [Pa]."""
     return Readings(
         reference=count_of(reference + converter.middle * converter.torque_step, converter.torque_step, converter.top),
         pressure_1=count_of(measurement.pressure_1, converter.pressure_step, converter.top),

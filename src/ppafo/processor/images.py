@@ -25,7 +25,7 @@ class Memory(NamedTuple):
 
 
 class Machine(NamedTuple):
-    """What QEMU calls a machine: its name, and the clock of its processor [Hz]."""
+    """Machine of QEMU: its name, and the clock of its processor [Hz]."""
 
     name: str
     clock: float
@@ -70,10 +70,10 @@ class ProcessorSimulator(Protocol):
         """Reset the processor, and let it come to where it waits for a sample."""
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """What the processor decides for some samples in turn, at most 50, asked at once where the simulator can."""
+        """Controller decisions for up to 50 consecutive samples, in one batch where the simulator can."""
 
     def stack(self) -> int:
-        """How deep the stack has been [bytes]."""
+        """Deepest use of the stack [bytes]."""
 
     close: Callable[[], object]
     """Ends the simulator."""

@@ -70,7 +70,7 @@ class SimulatedController:
 
 
 class Cost(NamedTuple):
-    """What a controller takes of a target.
+    """Resources of a target that a controller needs.
 
     Sizes of the program and depth of the stack [bytes]; cycles or instructions of a sample, as the target counts them,
     the most and the mean of all.
@@ -177,7 +177,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
-    """What the decisions of a processor took of it. SimulationError where there are none."""
+    """Resources that the decisions took on a processor. SimulationError without decisions."""
     if not decisions:
         raise SimulationError("no sample was taken on the processor")
     work = [decision.work for decision in decisions]
@@ -244,4 +244,4 @@ TRIED = (
     TriedLaw("`on_off`", "torque-task-solenoid", ()),
     TriedLaw("`on_off_dead_zone`", "torque-task-proportional", ("controller.kind=on_off_dead_zone",)),
 )
-"""What the table has, for each target."""
+"""Rows of the table, for each target."""

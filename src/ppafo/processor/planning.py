@@ -1,4 +1,4 @@
-"""From the settings of an integer law to its whole numbers, in floats for the lanes, and what may be wrong."""
+"""Integer numbers of an integer law from its settings, as floats for the lanes, and their possible faults."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -9,11 +9,11 @@ from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
 from ppafo.processor.images import Decision, Image, Target
 
 DEEPEST = 1024
-"""How far below the end of RAM the stack is looked for [bytes]."""
+"""Size of the memory below the end of RAM that is searched for the stack [bytes]."""
 _SHIFT = 7
 """Power of 2 that QEMU takes for an instruction, in nanoseconds."""
 _NANOSECONDS = 2**_SHIFT
-"""What an instruction takes of the machine's time [ns]: more than two ticks of the counter, so that none is missed."""
+"""Duration of an instruction on the machine [ns]: more than two ticks of the counter, so that none is missed."""
 _COUNTER_BITS = 24
 """Bits of SysTick, the counter that counts the ticks of the processor's clock down."""
 _PIECE = 1024
@@ -55,7 +55,7 @@ class Debugger:
         self._expect(self.packet("c" if address is None else f"c{address | _THUMB:x}")[:3], "T05")
 
     def read(self, address: int, size: int) -> bytes:
-        """What is in memory."""
+        """Content of memory."""
         content = b""
         for at in range(address, address + size, _PIECE):
             count = min(_PIECE, address + size - at)
@@ -109,7 +109,7 @@ class QemuSimulator:
         self.debugger.go_on()
 
     def samples(self, every: Sequence[Iterable[int]]) -> list[Decision]:
-        """What it decides for some samples, one after the other."""
+        """Controller decisions for consecutive samples."""
         decisions = []
         for readings in every:
             self.debugger.write(self._readings, b"".join(number.to_bytes(2, "little") for number in readings))
@@ -123,5 +123,5 @@ class QemuSimulator:
         return decisions
 
     def stack(self) -> int:
-        """How deep the stack has been [bytes]: what it has written of the RAM that was filled before."""
+        """Deepest use of the stack [bytes]: what it has overwritten of RAM that was filled before."""
         return depth_of_stack(self.debugger.read(self._bottom, DEEPEST))

@@ -1,4 +1,4 @@
-"""What controllers on the simulator of a processor came to, in words and as data."""
+"""Results of controllers on the simulator of a processor, in words and as data."""
 
 import itertools
 from collections.abc import Callable, Sequence

@@ -1,1 +1,1 @@
-"""What an analysis found, and the one way in which it becomes text, JSON, a page and a folder."""
+"""Findings of an analysis, and their output as text, JSON, page and folder."""

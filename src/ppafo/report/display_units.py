@@ -1,4 +1,4 @@
-"""Quantities and metrics as a person is shown them, in the units of ``units/shown.py``; files and data stay in SI."""
+"""Quantities and metrics as people are shown them, in the units of ``units/shown.py``; files and data stay in SI."""
 
 import math
 from collections.abc import Mapping
@@ -19,7 +19,7 @@ _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
 """Units that an axis writes in a form of their own."""
 _PRESSURE_KINDS = {"_g": " gauge", "_a": " absolute"}
-"""What an axis writes for the end of a unit of pressure."""
+"""Words on an axis for the ending of a pressure unit."""
 _METRIC = ".4g"
 """Digits of a metric."""
 

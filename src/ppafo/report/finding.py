@@ -1,4 +1,4 @@
-"""What an analysis found, as values: sentences, tables of columns, panels. SI until it is text.
+"""Finding of an analysis as values: sentences, tables of columns, panels. In SI until it becomes text.
 
 A ``Finding`` is all that an analysis returns; text, JSON, page, figures and folder are made of it here.
 """
@@ -30,7 +30,7 @@ Cell = str | float | Interval | None
 NOTHING = "-"
 """The text of a cell in which there is nothing to say."""
 MARK = "*"
-"""What stands before a row that stands out."""
+"""Mark before a highlighted row."""
 REPORT = "report.html"
 FORMATS = ("png", "svg")
 """Formats of a figure in a folder."""
@@ -40,7 +40,7 @@ _ORIGINS = {
     "synthetic": "The recordings are synthetic: the simulated test bench made them, nothing was measured.",
     "measured": "",
 }
-"""What a page says of where its numbers come from, by their kind."""
+"""Statement of a page on the origin of its numbers, by kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ class Part:
 
     @property
     def has_head(self) -> bool:
-        """Whether the columns have titles."""
+        """Tell whether the columns have titles."""
         return any(column.title for column in self.columns)
 
     @property
@@ -161,7 +161,7 @@ def _units_of(finding: "Finding[Any]", *_: Any, **__: Any) -> Mapping[str, str]:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Finding(Generic[T_co]):
-    """What an analysis found: ``found`` are the numbers in SI, which are also its JSON; the rest says and shows them.
+    """Finding of an analysis: ``found`` are the numbers in SI, which are also its JSON; the rest presents them.
 
     A ``found`` that is more than its numbers says its JSON itself, as ``json_document()``. ``name`` is the stem of its
     files and its command, unless ``command`` says another; ``kicker`` says above the title what kind of page this is.

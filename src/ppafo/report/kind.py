@@ -1,4 +1,4 @@
-"""What a number is: its words, its unit in SI, how people are shown it. Declared once for text, tables and axes."""
+"""Kind of a number: its words, SI unit and display form, declared once for text, tables and axes."""
 
 from dataclasses import dataclass
 
@@ -38,7 +38,7 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """What a number is: its words, unit in SI, quantity (``QUANTITIES``; else shown in SI), and form.
+    """Kind of a number: words, SI unit, quantity (``QUANTITIES``; else shown in SI), and form.
 
     ``given`` is the unit in which the user gave it, which goes before that of the set.
     """

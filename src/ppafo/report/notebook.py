@@ -1,4 +1,4 @@
-"""What a notebook shows of a result, without a word of its own: numbers as a table, and the figure as a picture."""
+"""Display of a result in a notebook: numbers as a table, and the figure as a picture."""
 
 import base64
 import html

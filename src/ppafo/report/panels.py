@@ -99,7 +99,7 @@ SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
         x, y, c=mark.to, s=9, linewidths=0, cmap="cividis", rasterized=True, **mark.style
     ),
 }
-"""How a mark is drawn, by its shape: axes, mark, and where it is in the units that are shown.
+"""Drawing function of a mark, by its shape: takes axes, mark, and its positions in the units shown.
 
 ``line``, ``bars`` (edges and counts), ``reach`` (points with the half width ``to``), ``band`` (between two rows of y),
 ``span`` and ``strip`` (between two x, two y), ``upright`` (from one y to another), ``level`` and ``at`` (a line across

@@ -1,4 +1,4 @@
-"""What was measured, the law or the model beside it, and what is left: the panels of every fit and comparison."""
+"""Panels of every fit and comparison: measurements, the law or model beside them, and the residuals."""
 
 import math
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ _READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
 
 
 class _Look(NamedTuple):
-    """How readings are drawn: colour, how many at most, words of Matplotlib.
+    """Style of readings: colour, largest number drawn, keywords of Matplotlib.
 
     A page with every sample would have some megabytes.
     """

@@ -1,4 +1,4 @@
-"""What people call a setting: ``setting_names.toml``, for the axes of figures and for the page that simulates."""
+"""Display names of settings: ``setting_names.toml``, for the axes of figures and for the page that simulates."""
 
 import tomllib
 from functools import cache

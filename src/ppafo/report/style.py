@@ -26,7 +26,7 @@ COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
 
 
 class Look(NamedTuple):
-    """How one thing looks in every figure, and on the page that simulates: colour, line and marker."""
+    """Style of one item in every figure, and on the page that simulates: colour, line and marker."""
 
     colour: str
     line: str = "-"
@@ -39,14 +39,14 @@ CHAMBER_1 = Look(GREEN, marker="^")
 CHAMBER_2 = Look(PURPLE, marker="v")
 REFERENCE = Look(BLACK, line="--")
 EXPERIMENT = Look(GREY, marker=".")
-"""What was measured, on a bench or on the simulated test bench."""
+"""Style of measurements, from a bench or from the simulated test bench."""
 ACTUAL = Look(BLUE)
-"""What a device does whose valve is no matter."""
+"""Style of a device irrespective of its valve."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
 PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 """Curves of the page that simulates, on white: numbers 1 to 4 of its style sheet."""
 PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kind, look in _VALVES.items()})
-"""Which of these the curves of a kind of valve have there."""
+"""Index of the page's colour for the curves of each kind of valve."""
 
 
 def look_of_valve(kind: str) -> Look:

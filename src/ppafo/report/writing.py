@@ -1,4 +1,4 @@
-"""What is written becomes fit to be read: signs and units typeset, columns aligned, templates of pages filled."""
+"""Typesetting of output: signs and units, aligned columns, filled templates of pages."""
 
 import base64
 import re

@@ -23,7 +23,7 @@ from ppafo.model.sensors import follow_rate
 
 
 class RigPhysics(NamedTuple):
-    """What the rig has beyond the plant, SI units.
+    """Physics of the rig beyond the plant, SI units.
 
     ``virial`` is b [m^3/kg]. A sensor with a follow rate [1/s] of 0 shows the present; a ``supply_rate`` [1/s] of 0 is
     a regulator without droop.
@@ -121,7 +121,7 @@ class Side(NamedTuple):
 
 
 class Observables(NamedTuple):
-    """What a bench could observe: both nodes, driving torque [N m] and the static limit of friction [N m] now."""
+    """Observable quantities of a bench: both nodes, driving torque [N m] and static limit of friction [N m] now."""
 
     node_1: Node
     node_2: Node
@@ -187,7 +187,7 @@ def chamber_nodes(plant: PlantParameters, rig: RigPhysics, state: RigState, angl
 
 
 def observables(given: RigNumbers, state: RigState, angle: float, added_torque: float) -> Observables:
-    """What a bench could observe at an angle [rad]; ``added_torque`` [N m] comes from a leg."""
+    """Observable quantities of a bench at an angle [rad]; ``added_torque`` [N m] comes from a leg."""
     plant, rig = given.plant, given.rig
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
     torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque

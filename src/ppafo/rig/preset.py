@@ -205,7 +205,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """One experiment to be done: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
+    """Experiment to be run: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
 
     preset: Preset
     seed: int
@@ -345,7 +345,7 @@ _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """One sensor at work: offset that was drawn, step of quantisation, and the noise of every sample to come."""
+    """Sensor of a run: its offset, its quantisation step, and the noise of every sample to come."""
 
     offset: float
     resolution: float

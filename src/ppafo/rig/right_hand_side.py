@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 
 
 class VaneInputs(NamedTuple):
-    """What the equations are told of the vane: angle [rad], prescribed rate [rad/s] and torque of a leg [N m].
+    """Inputs of the equations for the vane: angle [rad], prescribed rate [rad/s] and torque of a leg [N m].
 
     The rate of an unconstrained vane is one of the unknowns; ``rate`` is 0 then.
     """
@@ -53,7 +53,7 @@ def slopes_of(given: RigNumbers, state: RigState, inputs: Inputs, direction: flo
 
 
 def observed_in(given: RigNumbers, state: RigState, inputs: Inputs) -> Observed:
-    """What a bench could observe in a state."""
+    """Observable quantities of a bench in a state."""
     now = observables(given, state, inputs.vane.angle, inputs.vane.added_torque)
     return Observed(
         pressure_1=now.node_1.pressure,

@@ -92,7 +92,7 @@ class RigRun:
     device: Device
     """The device as it truly is, which the sensors and the controller do not know."""
     run: Run
-    """Its run on the plain model, without what the rig has beyond."""
+    """Run on the plain model, without the additions of the rig."""
     physics: RigPhysics
     line_orifice: ExactOrifice
     initial: RigState
@@ -110,7 +110,7 @@ class RigRun:
 
 @dataclass(slots=True)
 class RigSolution:
-    """What truly happened: one row or number for each sample time of the run."""
+    """True solution of a run: one row or number for each sample time."""
 
     states: Floats
     """Unknowns (samples, unknowns of ``RigState``) [SI]."""
@@ -140,7 +140,7 @@ def solve_rig(rig_run: RigRun) -> RigSolution:
 
 
 class _Equations:
-    """What holds in one run at a time [s], for its unknowns (unknowns,) and its mode; it keeps no state of the run.
+    """Equations of one run at a time [s], for its unknowns (unknowns,) and its mode; stateless.
 
     The mode is the ``direction`` in which the vane slides: 1, -1, or 0 where it is held or its angle is prescribed.
     """
@@ -268,7 +268,7 @@ class _Course:
         return self.solution
 
     def measure(self) -> Measurement:
-        """What the controller reads now."""
+        """Present measurement of the controller."""
         rig_run, observed = self.rig_run, self.equations.observe(self.time, self.unknowns)
         state = self.equations.with_prescribed_angle(self.time, self.unknowns)
         pressures = np.array([observed.pressure_1, observed.pressure_2])

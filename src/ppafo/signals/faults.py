@@ -1,4 +1,4 @@
-"""What can be wrong with recorded numbers, found in the numbers alone: gaps in time, and sensors at their limit."""
+"""Faults of recorded numbers, detected in the numbers alone: gaps in time, and sensors at their limit."""
 
 import math
 from dataclasses import dataclass

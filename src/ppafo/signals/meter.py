@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 WALK, STEADY, REQUESTED, LED_SHANK = "walk", "steady strides", "requested torque", "shank of a gait"
-"""What a metric may need beside channels: a walk, one of equal strides, a controller of it that wants a torque; or a
-leg whose shank a gait leads."""
+"""Needs of a metric beside channels: walk, equal strides, requested torque of a walk, or a gait-led shank."""
 
 
 class FootSample(NamedTuple):
@@ -25,7 +24,7 @@ class FootSample(NamedTuple):
 
 
 class StrideSample(NamedTuple):
-    """Where a walk is in its stride.
+    """Stride of a walk at a sample.
 
     ``supplied_mass`` [kg], ``strides``, ``positive_push_off_work`` and ``net_push_off_work`` [J], ``clearances`` [m]
     and ``toe_landings`` are totals since the start, as in the state of the leg; ``phase`` is the one that the
@@ -69,7 +68,7 @@ NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
 
 
 class Sample(NamedTuple):
-    """One sample of a recording: its number from 0, channels in SI units, and those of gas, foot and stride.
+    """Sample of a recording: its number from 0, channels in SI units, and those of gas, foot and stride.
 
     ``reference`` is in the unit of what is controlled. What a run does not have is 0: reference, temperatures and
     ``energy`` of gas without an energy balance, ``foot`` but on the shank of a gait, ``stride`` but in a walk. There
@@ -93,7 +92,7 @@ class Sample(NamedTuple):
 
 
 class Course(NamedTuple):
-    """What is known of the whole reference, in its unit, and where it rests.
+    """Summary of the whole reference, in its unit, and the start of its rest.
 
     Its last value; the farthest that it goes over all samples, from 0 or, where it is no torque, from what is
     controlled as the run begins; ``tolerance`` is the difference from the last value up to which it counts as resting;

@@ -21,7 +21,7 @@ TIME_UNIT = "s"
 PLAIN_NUMBER = "-"
 
 Between = Literal["hold", "linear"]
-"""What a channel does between two samples: it keeps the earlier value, or runs straight from one to the other."""
+"""Interpolation of a channel between two samples: previous value, or linear."""
 BETWEEN: tuple[Between, ...] = get_args(Between)
 
 
@@ -118,13 +118,13 @@ CHANNELS: dict[str, ChannelKind] = {
     "direction": ChannelKind(PLAIN_NUMBER, "1 while the pressure rises, -1 while it falls", is_held=True),
     "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),
 }
-"""To add one: one line here. A recording may also have channels that are not listed."""
+"""Known channels. To add one: one line here. A recording may also have channels that are not listed."""
 
 
 Floats = NDArray[np.float64]
 
 RecordingKind = Literal["measured", "simulated", "synthetic"]
-"""Where a recording comes from: sensors, a model's own output, or the simulated bench that stands in for sensors."""
+"""Origin of a recording: sensors, the output of a model, or the simulated test bench."""
 
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _KINDS: tuple[RecordingKind, ...] = get_args(RecordingKind)

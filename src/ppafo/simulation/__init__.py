@@ -1,1 +1,1 @@
-"""From a scenario to a result: the experiment, the run, and its outcome."""
+"""Simulation of a scenario: the experiment, the run, and its result."""

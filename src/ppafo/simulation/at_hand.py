@@ -1,4 +1,4 @@
-"""What every result with a recording has at hand: channels in any unit, tables, and what a notebook shows of it."""
+"""Common access to a result with a recording: channels in any unit, tables, and its display in a notebook."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Protocol
@@ -22,7 +22,7 @@ class Recorded(Protocol):
 
     @property
     def scenario(self) -> Scenario:
-        """What was run."""
+        """Scenario of the run."""
 
     @property
     def recording(self) -> Recording:

@@ -1,4 +1,4 @@
-"""How far a run can be trusted: the error of its steps, and whether it comes again.
+"""Reliability of a run: the error of its steps, and its repeatability.
 
 The error of the time stepping falls with the allowed one, so nearly all of it is in what changes where a run has a
 sixteenth of it. A loop with coarse sensors or repeated impacts may amplify a difference that is too small to measure
@@ -25,7 +25,7 @@ from ppafo.units import without_exponent
 from ppafo.units.shown import in_units, units_in_force
 
 SHORTER = 4
-"""How many times shorter the steps of a finer run are; its allowed error is smaller by the square."""
+"""Ratio by which the steps of a finer run are shorter; its allowed error is smaller by the square."""
 MARGIN = 1.5
 """Estimated error over the change: it is then above the error in 99 % of drawn runs (docs/evidence.md)."""
 LARGEST_OF_ANGLE, LARGEST_OF_PRESSURE, LARGEST_OF_TEMPERATURE = 2.0e-4, 1.0e-3, 2.0e-3
@@ -34,7 +34,7 @@ SMALLEST_TOLERANCE = 1.0e-6
 """Smallest ``run.tolerance`` that a run may have [-]."""
 
 MOVE = 1.0e-7
-"""How far a start or a measurement is moved, as a fraction of its range."""
+"""Perturbation of a start or a measurement, as a fraction of its range."""
 ALLOWED_CHANGE = 1.0e-3
 """Largest change of a metric that counts as none, as a fraction of its value or of the range of its quantity."""
 
@@ -128,7 +128,7 @@ class NumberCheck:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Check:
-    """What of a run is determined: its metrics, and its angle, pressures and temperatures over time.
+    """Repeatability of a run: of its metrics, and of its angle, pressures and temperatures over time.
 
     ``error`` is the estimated error of the run from its steps, of which the one with finer steps has a sixteenth.
     ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
@@ -151,7 +151,7 @@ class Check:
 
     @property
     def sentence(self) -> str:
-        """What the check found, in plain words."""
+        """Result of the check, in plain words."""
         if self.is_determined:
             return (
                 f"All metrics are repeatable: none changes by more than {ALLOWED_CHANGE:.0e} of its value or its "
@@ -211,7 +211,7 @@ class Ran(Protocol):
 
     @property
     def scenario(self) -> Scenario:
-        """What was run."""
+        """Scenario of the run."""
 
     @property
     def recording(self) -> Recording:
@@ -223,11 +223,11 @@ class Ran(Protocol):
 
     @property
     def status(self) -> Any:
-        """How it ended, a ``Status``."""
+        """End of the run, a ``Status``."""
 
 
 Again = Callable[[Sequence[Run]], Sequence[Ran]]
-"""What runs other plans of the same scenario."""
+"""Function that runs other plans of the same scenario."""
 
 
 def finer(run: Run) -> Run:
@@ -276,7 +276,7 @@ def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
 
 
 def _courses_of(result: Ran) -> list[str]:
-    """What of a run is compared over time: temperatures where they are recorded."""
+    """Channels of a run that are compared over time: temperatures if recorded."""
     return [name for name, channels in _COURSES.items() if all(channel in result.recording for channel in channels)]
 
 

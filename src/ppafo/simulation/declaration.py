@@ -73,9 +73,9 @@ PERIOD = Quantity("period", "s", "time between two samples; or give the rate", N
 SAMPLING = (RATE, PERIOD)
 
 REFERENCE_OF = "reference.of"
-"""What the reference is a value of, by a word of ``CONTROLLED``."""
+"""Path of the controlled quantity, a word of ``CONTROLLED``."""
 PURPOSE = "reference.beyond_reach"
-"""Where a file says why its reference lies beyond the reach of the device."""
+"""Key of a file with the reason why its reference lies beyond the reach of the device."""
 _OF_REACH = ("reference.", "supply.", "actuator.", "motion.", "device.")
 """Beginnings of the paths of a reference, and of what decides how far a device reaches."""
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
@@ -102,7 +102,7 @@ TEXTS = ("name", "description", "device.set", "device.valve")
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """What files of one kind of scenario can hold, for the kinds that a document names.
+    """Possible content of the files of one kind of scenario, for the kinds that a document names.
 
     ``texts`` are paths, ``quantities`` the declarations of numbers by path; ``find_kinds`` loads the kinds of other
     packages, ``check_motion`` refuses a kind of motion that they cannot have, with the place that begins the message.
@@ -327,7 +327,7 @@ def line_paths() -> dict[str, Quantity]:
 OF_A_VANE = Declared(
     find_kinds, texts, lambda document: quantities(document) | line_paths(), check_motion=check_motion_kind
 )
-"""What the file of a vane alone can hold; one without lines can be given some."""
+"""Possible content of the file of a vane alone; a file without supply lines can be given some."""
 
 
 @dataclass(frozen=True, slots=True)

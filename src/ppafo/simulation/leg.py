@@ -101,7 +101,7 @@ def foot_load(
     foot_inertia: float,
     shank_length: float,
 ) -> FootLoad:
-    """What turns about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
+    """Foot and plate about the ankle of a leg: J and S of equation (11) with (1), docs/equations.md.
 
     Inertia [kg m^2] and largest gravity torque [N m] of foot plate and vane, then the foot and the shank as in ``Leg``.
     """

@@ -1,4 +1,4 @@
-"""From a name, a file or plain Python values to a scenario in SI units; every mistake is one clear line.
+"""Loading of a scenario in SI units by name, file or plain values; every mistake is one clear line.
 
 First what makes a Scenario of a document with overrides, and says what no source gives in it; then names and files.
 """
@@ -434,7 +434,7 @@ FILE = TomlKind("scenario", "scenario", resources.files("ppafo") / "scenarios", 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How the files of one kind of scenario are laid out and built: the kind of file, what it holds, model, builder.
+    """Layout of the files of one kind of scenario: kind of file, possible content, model, builder.
 
     ``model`` has the sections and kinds of a document alone, ``whole`` all there are: messages speak of these.
     """

@@ -43,7 +43,7 @@ class MeanChambers(NamedTuple):
 
 
 class StillPlant(NamedTuple):
-    """What a kind may ask of its plant (``ShapedPlant``), for an actuator on its own that stands still."""
+    """Resting plant of an actuator alone (``ShapedPlant``), as a kind may read it."""
 
     shape: Any
     gas_product: float

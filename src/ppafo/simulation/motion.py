@@ -1,4 +1,4 @@
-"""What moves a vane alone, as kinds of motion: locked, free, along a profile, or with the foot of a leg.
+"""Kinds of motion of a vane alone: locked, free, along a profile, or with the foot of a leg.
 
 Each kind declares what a file says of it, and how that is read and checked against the stops of the device. What only
 a run or an ensemble of such a motion needs is loaded when it is called.

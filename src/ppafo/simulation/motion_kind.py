@@ -35,7 +35,7 @@ class Clock:
 
 
 class Seen(NamedTuple):
-    """How a law sees what it controls: the row of its signals, how late they are, and the paths that fill the row.
+    """Signals of a law: the row of its signals, their delay, and the paths that fill the row.
 
     ``places`` makes the two angles [rad] between which the joint is of the stops and the row. ``turning`` makes inertia
     and gravity torque of the row for a law of an angle; None for any other.
@@ -54,7 +54,7 @@ Measured = tuple["Recording", Mapping[str, "Metric"], str]
 
 @runtime_checkable
 class MotionKind(Protocol[ScenarioType_contra]):
-    """What a motion brings to the runs of its scenarios. Any number of a scenario may be an array (runs,)."""
+    """Contribution of a motion to the runs of its scenarios. Any number of a scenario may be an array (runs,)."""
 
     @property
     def name(self) -> str:
@@ -62,7 +62,7 @@ class MotionKind(Protocol[ScenarioType_contra]):
 
     @property
     def section(self) -> "MotionSection | None":
-        """What the file of a vane alone has as ``[motion]``; None in the layout of a walk."""
+        """Table ``[motion]`` in the file of a vane alone; None in the layout of a walk."""
 
     @property
     def layout(self) -> str:
@@ -135,7 +135,7 @@ class MotionKind(Protocol[ScenarioType_contra]):
 
 @dataclass(frozen=True, slots=True)
 class MotionSection:
-    """What ``[motion]`` holds for a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
+    """Table ``[motion]`` of a kind of motion of a vane alone: its numbers, and the table of a profile, if any.
 
     ``read(reading, device, duration, step, folder)`` gives the motion; times are in seconds, and in ``folder`` relative
     paths begin.

@@ -1,4 +1,4 @@
-"""What a law with a model, and the observer of the chambers, believe of a device: which of its numbers they follow."""
+"""Nominal device of a model-based law and of the chamber observer: the device numbers that it follows."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -96,7 +96,7 @@ def as_content(number: float, molar_mass: float, temperature: float) -> float:
 
 
 def time_of_joint(joining: float, holding: float) -> float:
-    """How long both chambers are joined, or chamber 2 then keeps its gas [s]."""
+    """Time for which both chambers are joined, or for which chamber 2 then keeps its gas [s]."""
     return joining + holding
 
 
@@ -124,7 +124,7 @@ def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: B
 
 
 def rest_of(volume: float, growth: float, stops: Range) -> float:
-    """What of a volume [m^3] in the middle is left at a stop, a twentieth at least, for a growth [m^3/rad]."""
+    """Remainder at a stop of a volume [m^3] at mid-range, at least a twentieth of it, for a growth [m^3/rad]."""
     return max(volume - 0.5 * growth * (stops.angle_max - stops.angle_min), LEAST_SHARE * volume)
 
 

@@ -1,4 +1,4 @@
-"""From settings to a run, of a scenario or a walk: step sizes, rows of parameters, initial gas.
+"""Plan of a run, of a scenario or a walk: step sizes, rows of parameters, initial gas.
 
 What the numbers come to is pure functions of one run or of columns of runs: Python plans with them, and an exported
 library has them in C.
@@ -78,7 +78,7 @@ def plan_run(scenario: Scenario) -> Run:
 
 @dataclass(frozen=True, slots=True)
 class Components:
-    """What any run is made of, scenario or walk; numbers in SI units, which may be arrays (runs,).
+    """Components of a run, scenario or walk; numbers in SI units, which may be arrays (runs,).
 
     Without a ``path`` the vane is free; without a ``controller`` the caller sets the command. ``thermal`` and
     ``supply_lines`` None stand for gas that keeps its temperature and for constant supply pressures. ``sections`` hold
@@ -422,7 +422,7 @@ def nearly_whole(steps: Numeric) -> Numeric:
 
 
 def thermal_gas(walls: GasModel, gas: Gas) -> ThermalParameters:
-    """How a gas with an energy balance takes up heat."""
+    """Parameters of the gas with an energy balance: heat exchange with the walls."""
     exchange = wall_exchange(
         walls.heat_transfer_coefficient, walls.wall_area_per_volume, gas.heat_capacity_ratio, gas.specific_gas_constant
     )

@@ -18,7 +18,7 @@ from ppafo.units.shown import in_units, shown_text
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
-"""How far beyond a stop an angle may be [rad]: rounding of a stop that is given in degrees; of more a share."""
+"""Tolerance of an angle beyond a stop [rad]: rounding of a stop given in degrees."""
 
 
 def profile_parameters(choice: ProfileChoice) -> Any:

@@ -50,7 +50,7 @@ class SampledRun:
         return requested
 
     def measurement(self) -> Any:
-        """What the sensors show at the present sample: a ``Measurement``, of a walk a ``GaitMeasurement``."""
+        """Sensor readings at the present sample: a ``Measurement``, of a walk a ``GaitMeasurement``."""
         return self._see(self.taken)
 
     def go_on(self, command: float) -> None:
@@ -99,7 +99,7 @@ def _group(batch: Batch, name: str) -> Any:
 
 
 def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measurement]:
-    """What the controller measures at a sample: the present state, or an earlier one where sensors are late."""
+    """Function that returns the measurement at a sample: of the present state, or earlier for delayed sensors."""
     program, per_sample = batch.program, batch.clock.steps_per_sample
     rows = row_numbers(program.state_rows())
     plant, sensors, actuator = _group(batch, "plant"), _group(batch, "sensors"), program.actuator
@@ -131,7 +131,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
 
 
 def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMeasurement]:
-    """What the controller of a walk measures at a sample, of the present state.
+    """Function that returns the measurement of a walking controller at a sample, of the present state.
 
     ScenarioError for sensors that are late and for gas that warms, of which the lanes know more than this.
     """

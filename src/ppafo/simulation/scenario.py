@@ -1,4 +1,4 @@
-"""What is run: one device in one experiment, as frozen values in SI units.
+"""Scenario: one device in one experiment, as frozen values in SI units.
 
 ``load_scenario`` makes one from a file; in Python, ``dataclasses.replace`` changes a value and ``controlled_by`` puts
 an object of your own in charge of the valve.
@@ -94,7 +94,7 @@ class FreeMotion:
 
     @property
     def motion_kind(self) -> "MotionKind[Scenario]":
-        """What it brings to the runs of its scenarios."""
+        """Kind of this motion: its contribution to the runs."""
         return MOTIONS["free" if self.leg is None else "leg"]
 
     @property
@@ -104,7 +104,7 @@ class FreeMotion:
 
     @property
     def form(self) -> str:
-        """What no number of it changes, in words."""
+        """Fixed form of the motion, independent of its numbers, in words."""
         return (
             "free" if self.leg is None else f"free with the foot of a leg, whose shank is led, `{self.leg.shank.kind}`"
         )
@@ -138,7 +138,7 @@ class PrescribedMotion:
 
     @property
     def motion_kind(self) -> "MotionKind[Scenario]":
-        """What it brings to the runs of its scenarios."""
+        """Kind of this motion: its contribution to the runs."""
         return MOTIONS[self.kind]
 
     @property
@@ -148,7 +148,7 @@ class PrescribedMotion:
 
     @property
     def form(self) -> str:
-        """What no number of it changes, in words."""
+        """Fixed form of the motion, independent of its numbers, in words."""
         return f"prescribed, `{self.profile.kind}`"
 
     @property
@@ -161,11 +161,11 @@ class PrescribedMotion:
 
 
 class Motion(Protocol):
-    """What moves the ankle: a vane alone, or a leg that wears the device, which a package above this one knows."""
+    """Motion of the ankle: a vane alone, or a leg with the device, which is defined in a package above."""
 
     @property
     def motion_kind(self) -> "MotionKind[Scenario]":
-        """What it brings to the runs of its scenarios."""
+        """Kind of this motion: its contribution to the runs."""
 
     @property
     def label(self) -> str:
@@ -263,7 +263,7 @@ class SupplyLine:
 
 @dataclass(frozen=True, slots=True)
 class Sensors:
-    """What the controller sees, ideal by default.
+    """Sensors of the controller, ideal by default.
 
     Age of a measurement when it is used [s], standard deviations [rad], [Pa], steps of quantisation [rad], [Pa], the
     seed of the noise, and first-order bandwidths of the angle sensor and the pressure sensors [Hz], 0 for none.
@@ -282,7 +282,7 @@ class Sensors:
 
     @property
     def flaws(self) -> tuple[float, ...]:
-        """What makes these sensors worse than ideal ones [s, rad, Pa, rad, Pa, Hz, Hz]; each 0 where it does not."""
+        """Imperfections of the sensors [s, rad, Pa, rad, Pa, Hz, Hz]; 0 for an ideal one."""
         noise, steps = (self.angle_noise, self.pressure_noise), (self.angle_resolution, self.pressure_resolution)
         return self.delay, *noise, *steps, self.angle_bandwidth, self.pressure_bandwidth
 
@@ -327,7 +327,7 @@ class Assumption:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where a scenario comes from, for the record: file, parameter set, valve, overrides and what the file said."""
+    """Origin of a scenario, for the record: file, parameter set, valve, overrides and the document of the file."""
 
     file: str | None
     parameter_set: str
@@ -388,7 +388,7 @@ class Scenario:
 
     @property
     def stiffness(self) -> Any:
-        """By how much faster the pressure of its gas follows than at one temperature [-]: its heat capacity ratio."""
+        """Stiffness of the gas pressure relative to constant temperature [-]: its heat capacity ratio."""
         return 1.0 if self.gas_model is None else self.device.gas.heat_capacity_ratio
 
     @property

@@ -1,4 +1,4 @@
-"""One run: its result, how it comes about, and what it determines."""
+"""Single run of a scenario: its plan, its execution and its result."""
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -39,7 +39,7 @@ _OF_STEPS = ("result.failure_time", "result.too_many_parts", "pace.", "valve_sta
 
 @dataclass(frozen=True, slots=True)
 class Status:
-    """How a run ended: ``time`` [s] is where a diverged run stopped; ``message`` says its state and the remedy."""
+    """End of a run: ``time`` [s] is where a diverged run stopped; ``message`` has its state and the remedy."""
 
     kind: Literal["completed", "diverged"]
     time: float | None = None
@@ -117,7 +117,7 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What makes the run useless for its purpose, a sentence each: a loop that does not follow its reference."""
+        """Reasons why the run is useless for its purpose, one sentence each: a loop that misses its reference."""
         verdict = self.tracking
         return () if verdict is None else (verdict.sentence,)
 

@@ -1,4 +1,4 @@
-"""Which numbers of a device the gains of a law follow that nobody gives; the rules are ``control.torque_loop``'s.
+"""Numbers of a device that the default gains of a law follow; the rules are in ``control.torque_loop``.
 
 A gain is a frame here: the chambers of the actuator, the flow of the valve and what comes late are put in their places,
 so that one function of floats gives the gain in a file, in a study and in an exported library.
@@ -38,7 +38,7 @@ _OF_DEVICE = (
 )
 _OF_ANGLE = ("sensors.angle_bandwidth", "sensors.angle_resolution", "sensors.angle_noise")
 LEG_PATHS = ("motion.foot_mass", "motion.foot_mass_centre", "motion.foot_inertia")
-"""What the foot of a leg adds."""
+"""Paths of the foot of a leg."""
 
 
 class FlowNumbers(NamedTuple):
@@ -103,7 +103,7 @@ LegOnSine: Any = row_with("LegOnSine", OfLeg, **_Sine)
 
 
 class SpoolParts(NamedTuple):
-    """What the time of a spool is made of: the time [s] after which the valve has followed a command."""
+    """Functions for the time of a spool: the time [s] after which the valve has followed a command."""
 
     follow_time: Callable[[Any], float]
 
@@ -140,7 +140,7 @@ def between(stops: Range, angle: float) -> float:
 
 
 class LoopParts(NamedTuple):
-    """What a loop is made of, each by the rows that it takes.
+    """Functions for the torque loop, each taking the rows it needs.
 
     The chambers of the actuator at an angle [rad], the two angles [rad] between which the joint is, R T times the
     conductance of the valve [m^3/s], how late the valve follows a command [s] once it is sampled every period [s], how
@@ -157,35 +157,35 @@ class LoopParts(NamedTuple):
 
 
 class JointParts(NamedTuple):
-    """What a joint is made of: chambers of the actuator; inertia [kg m^2] and gravity torque [N m] of what turns."""
+    """Functions for the joint: chambers of the actuator; inertia [kg m^2] and gravity torque [N m]."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
     turning: Callable[[Any], tuple[float, float]]
 
 
 class AngleParts(NamedTuple):
-    """What a loop of the angle is made of: the torque loop of a device and its joint, by all their rows."""
+    """Functions for the loop of the angle: torque loop of a device and its joint, by all their rows."""
 
     torque_loop_of: Callable[..., TorqueLoop]
     joint_of: Callable[..., Joint]
 
 
 class GainParts(NamedTuple):
-    """What a gain is made of: the loop of a device, and a rule of ``control.torque_loop``."""
+    """Functions for a gain: torque loop of a device, and a rule of ``control.torque_loop``."""
 
     loop_of: Callable[..., TorqueLoop]
     rule: Callable[..., float]
 
 
 class ReachParts(NamedTuple):
-    """What a share of a reach is made of: the reach of a device, and a rule of ``control.torque_loop``."""
+    """Functions for a share of the reach: torque reach of a device, and a rule of ``control.torque_loop``."""
 
     reach_of: Callable[..., float]
     rule: Callable[[float], float]
 
 
 class GainOfJointParts(NamedTuple):
-    """What a gain is made of that the joint decides too: loop and joint, and a rule of ``control.angle_loop``."""
+    """Functions for a gain of loop and joint: both, and a rule of ``control.angle_loop``."""
 
     torque_loop_of: Callable[..., TorqueLoop]
     joint_of: Callable[..., Joint]
@@ -222,7 +222,7 @@ def lag_of_sensor(bandwidth: float) -> float:
 
 
 def time_in_scenario(signals: Signals) -> float:
-    """How old a measurement is [s], and how late the pressure sensors follow."""
+    """Age of a measurement [s]: transport delay and lag of the pressure sensors."""
     return signals.delay + lag_of_sensor(signals.bandwidth)
 
 
@@ -232,12 +232,12 @@ def time_in_walk(signals: SignalsOfWalk) -> float:
 
 
 def torque_by_pressure_1(mean: MeanChambers) -> float:
-    """How what is controlled goes with the pressure in chamber 1: of a torque [m^3], which grows with it."""
+    """Derivative of the controlled quantity by the pressure in chamber 1: for a torque [m^3], positive."""
     return mean.torque_per_pressure_1
 
 
 def torque_by_pressure_2(mean: MeanChambers) -> float:
-    """How what is controlled falls with the pressure in chamber 2: of a torque [m^3]."""
+    """Negative derivative of the controlled quantity by the pressure in chamber 2: for a torque [m^3]."""
     return mean.torque_per_pressure_2
 
 
@@ -299,7 +299,7 @@ def reach_of(
 
 
 def time_with_angle(signals: Any) -> float:
-    """How old a measurement is [s], and how late the slower of the sensors follow."""
+    """Age of a measurement [s]: transport delay and lag of the slower sensors."""
     late: float = max(lag_of_sensor(signals.bandwidth), lag_of_sensor(signals.angle_bandwidth))
     age: float = signals.delay
     return age + late
@@ -364,7 +364,7 @@ def gain_of_joint(
     *,
     parts: GainOfJointParts,
 ) -> float:
-    """What a rule makes of the torque loop of a device and of its joint, which is to go so far at a time [rad]."""
+    """Gain by a rule for the torque loop of a device and its joint, for a ``travel`` [rad] at a time."""
     loop = parts.torque_loop_of(settings, stops, around, numbers, valve, signals)
     return parts.rule(loop, parts.joint_of(settings, stops, around, signals, travel))
 
@@ -379,7 +379,7 @@ def gain_of_loop(
     *,
     parts: GainParts,
 ) -> float:
-    """What a rule makes of the torque loop of a device."""
+    """Gain by a rule for the torque loop of a device."""
     return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals))
 
 
@@ -393,7 +393,7 @@ def share_of_reach(
     *,
     parts: ReachParts,
 ) -> float:
-    """What a rule makes of the reach of a device."""
+    """Number by a rule for the torque reach of a device."""
     return parts.rule(parts.reach_of(settings, stops, around, numbers, valve, signals))
 
 
@@ -408,7 +408,7 @@ def gain_of_loop_and_setting(
     *,
     parts: GainParts,
 ) -> float:
-    """What a rule makes of the torque loop of a device and of another setting of the law."""
+    """Gain by a rule for the torque loop of a device and another setting of the law."""
     return parts.rule(parts.loop_of(settings, stops, around, numbers, valve, signals), setting)
 
 
@@ -437,12 +437,12 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
     RATE: torque_loop.torque_rate,
     DEAD_TIME: torque_loop.dead_time,
 }
-"""What follows the torque loop alone, and by which rule."""
+"""Rule of each number that follows the torque loop alone."""
 _OF_REACH: dict[str, Callable[[float], float]] = {
     torque_loop.DEAD_ZONE: torque_loop.dead_zone,
     torque_loop.RELEASE: torque_loop.release,
 }
-"""What follows the reach of a device, and by which rule."""
+"""Rule of each number that follows the torque reach of a device."""
 
 
 _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
@@ -459,14 +459,14 @@ _OF_JOINT: dict[str, Callable[[TorqueLoop, Joint], float]] = {
     angle_loop.TOLERANCE: angle_loop.tolerance,
     angle_loop.REST_DISTANCE: angle_loop.rest_distance,
 }
-"""What follows the torque loop and the joint, and by which rule."""
+"""Rule of each number that follows torque loop and joint."""
 
 _PER_PRESSURE: dict[str, tuple[Callable[[MeanChambers], float], Callable[[MeanChambers], float]]] = {
     "pressure_1": (whole_pressure, no_pressure),
     "pressure_2": (no_pressure, whole_pressure),
     "pressure_difference": (whole_pressure, whole_pressure),
 }
-"""How a pressure that is controlled goes with both."""
+"""Derivatives of a controlled pressure by both chamber pressures."""
 
 
 class LoopFrames(NamedTuple):

@@ -11,9 +11,9 @@ from ppafo.errors import DataError, one_line
 from ppafo.signals.recording import Floats
 
 DateOrder = Literal["day month", "month day"]
-"""What comes first in a date such as 03/04/2026."""
+"""Order of day and month in a date such as 03/04/2026."""
 ClockForm = Literal["h:min", "min:s"]
-"""What a time of day such as 08:10 is."""
+"""Meaning of a time of day such as 08:10."""
 
 _DAY = 86400.0
 """Seconds of a day."""

@@ -24,7 +24,7 @@ Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
 
 class MappedChannel(StrictTable):
-    """Where one channel comes from: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
+    """Source of one channel: a column, or a constant. The value is sign * (factor * number + offset) in unit."""
 
     column: Annotated[
         Annotated[int, Field(ge=1)] | Text | None, Field(description="number of the column from 1, or its name")
@@ -74,7 +74,7 @@ class MappedDirection(StrictTable):
 
 
 class ColumnMap(StrictTable):
-    """How a file is written and what its columns are."""
+    """Format of a file and meaning of its columns."""
 
     delimiter: Annotated[
         Literal["comma", "semicolon", "tab", "whitespace"], Field(description="what separates columns")
@@ -165,7 +165,7 @@ def check_sources(columns: ColumnMap) -> None:
 
 
 class MappedTable(NamedTuple):
-    """What a map takes of a file.
+    """Content of a file that a map selects.
 
     ``numbers`` are the columns by channel, as the file has them. A time of day has its cells in ``clock``, and in
     ``dates`` those of a column beside it. ``rows`` say where each sample stands in the file, as a number of what

@@ -41,7 +41,7 @@ _OWN_COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """What a header says of a column: channel (or time), the unit of its numbers, what it does between samples."""
+    """Column as its header declares it: channel (or time), the unit of its numbers, interpolation between samples."""
 
     name: str
     unit: str
@@ -91,7 +91,7 @@ def parse_header(cells: list[str]) -> list[Column]:
 
 
 def is_of_frame(cells: Sequence[str]) -> bool:
-    """Whether a header is that of a result's ``to_dataframe().to_csv()``: channels of a simulation, bare and in SI.
+    """Tell whether a header is of a result's ``to_dataframe().to_csv()``: channels of a simulation, bare and in SI.
 
     Bare names alone do not say so: a logger may call a column in degrees ``angle``.
     """
@@ -151,10 +151,10 @@ SPLIT_NUMBERS = (
     "commas seem to separate columns and decimals alike: write the file with decimal points, or with another delimiter "
     'and read it through a column map with decimal = "comma"'
 )
-"""Of rows that have twice as many cells as there are columns."""
+"""Message about rows with twice as many cells as there are columns."""
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+(?:[eE][+-]?\d+)?\s*", re.ASCII)
 _SIMILAR = 0.8
-"""How near a word has to be to a kind to be a misspelling of it; 'measurement: run 3' is a remark like any other."""
+"""Similarity above which a word is a misspelt kind; 'measurement: run 3' is a remark like any other."""
 
 
 def write_csv(path: str | Path, recording: Recording) -> Path:

@@ -149,7 +149,7 @@ _MASS_FLOW = "kg/s"
 
 
 class _Surroundings(NamedTuple):
-    """What a file does not say: the atmosphere [Pa absolute], and the gas of its volume flows, empty where unknown."""
+    """Surroundings that a file does not state: atmosphere [Pa absolute], gas of its volume flows, empty if unknown."""
 
     atmosphere: float
     gas: str

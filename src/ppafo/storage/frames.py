@@ -26,12 +26,12 @@ PANDAS_READERS = {
     ".hdf5": "read_hdf({path!r})",
     ".pkl": "read_pickle({path!r})",
 }
-"""How pandas reads a table, by its suffix."""
+"""Call of pandas that reads a table, by its suffix."""
 OTHER_READERS = {
     ".npz": "DataFrame(dict(numpy.load({path!r})))",
     ".tdms": "DataFrame(nptdms.TdmsFile({path!r}).as_dataframe())",
 }
-"""How a table gets into pandas by another library."""
+"""Call that reads a table into pandas with another library, by its suffix."""
 
 
 def is_frame(value: object) -> bool:
@@ -40,7 +40,7 @@ def is_frame(value: object) -> bool:
 
 
 def remedy_for(path: str | Path) -> str:
-    """How to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
+    """Advice to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
     suffix = Path(path).suffix.lower()
     call = (PANDAS_READERS | OTHER_READERS).get(suffix)
     if call is None:

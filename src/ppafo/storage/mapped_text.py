@@ -1,4 +1,4 @@
-"""What a column map takes of a table of text: cells become numbers, in the file's own units, row by row.
+"""Application of a column map to a table of text: cells become numbers, in the file's own units, row by row.
 
 Every refusal names line and column of the file, or the key of the map, and says how to go on.
 """
@@ -33,7 +33,7 @@ _GROUPED = {
 """The whole part of a number with groups of three digits, by the name of the mark between them."""
 
 _SERIAL_MONITOR = re.compile(r"(\d{1,2}:\d{2}:\d{2}[.,]\d{3}) -> ")
-"""What the serial monitor of the Arduino IDE puts before each line."""
+"""Prefix of each line by the serial monitor of the Arduino IDE."""
 _STAMP = "timestamp"
 """Name of the column that its times become."""
 _STAMP_OF_HEADER = re.compile(r"^\d{1,2}:\d{2}:\d{2}\.\d{3}")
@@ -54,7 +54,7 @@ _WORDS_OF_DIRECTION = {
     **dict.fromkeys(_DOWNWARDS, -1.0),
     **dict.fromkeys(("none", "hold", "0"), 0.0),
 }
-"""What people write for directions; ``-`` alone and ``+`` too."""
+"""Words for directions; ``-`` alone and ``+`` too."""
 
 Rows = Iterator[tuple[int, list[str]]]
 """Cells of a row, each with the line of the file in which it stands."""

@@ -40,7 +40,7 @@ _OF_DAMAGE = (
     NameError,
     EOFError,
 )
-"""What the libraries raise on damaged files."""
+"""Exceptions of the libraries on damaged files."""
 _LABELS = ("colheaders", "labels", "names")
 """Fields of a structure that may have the names of the columns of another."""
 
@@ -80,7 +80,7 @@ def _plainly(name: str, kind: str) -> str:
 
 @dataclass(slots=True)
 class _Contents:
-    """What was found in a file so far, as ``MatlabFile`` has it."""
+    """Content found in a file so far, as ``MatlabFile`` has it."""
 
     columns: dict[str, Floats] = field(default_factory=dict)
     texts: dict[str, list[str]] = field(default_factory=dict)

@@ -20,7 +20,7 @@ from ppafo.storage.files import read_bytes
 from ppafo.storage.netcdf import BETWEEN, PLAIN_NUMBER_IN_NETCDF
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
-"""What h5py raises where a file is cut off or damaged."""
+"""Exceptions of h5py on a truncated or damaged file."""
 _KINDS_OF_NUMBERS = frozenset("fiu")
 """NumPy's letters for floats, integers and integers without sign."""
 _GZIP, _SHUFFLE, _FLETCHER = 1, 2, 3
@@ -32,7 +32,7 @@ _BYTES_OF_A_FLOAT = 8
 _ALWAYS_ALLOWED = 32_000_000
 """Bytes of memory that any file may ask for."""
 _MAXIMUM_GROWTH = 100
-"""How many times its own size [-] a larger file may ask for."""
+"""Largest size of the content over the size of a larger file [-]."""
 _CHECKSUM_BYTES = 64
 """Bytes by which a chunk may be larger than its numbers; a Fletcher checksum takes four."""
 

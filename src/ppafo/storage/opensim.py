@@ -24,11 +24,11 @@ _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)",
 _DEGREES = re.compile(r"inDegrees\s*=\s*(\w+)", re.IGNORECASE)
 _SENTENCE = re.compile(r"angles are in (degrees|radians)", re.IGNORECASE)
 _KIND = "kind="
-"""What the header says of a recording that nobody measured, where this package wrote the file."""
+"""Header word for a recording that was not measured, in a file written by this package."""
 _MOST_DIGITS = 11
 """Digits of a count in a header; no file has more rows."""
 GAPS = ("nan",)
-"""What stands for a gap in a table."""
+"""Cells that mean a gap in a table."""
 _KINDS: tuple[RecordingKind, ...] = ("simulated", "synthetic")
 
 
@@ -52,7 +52,7 @@ class OpenSimTable:
 
 
 class _Header(NamedTuple):
-    """What the header of a table says; counts of rows and columns are None where it has none.
+    """Header of a table; counts of rows and columns are None if it has none.
 
     ``end`` is the index, from 0, of the line that ends it.
     """
@@ -228,7 +228,7 @@ _SIGNS = {
     r"ankle_angle_[rl]_device(_moment)?": "is what the device gives the wearer, above 0 in dorsiflexion",
     r"ground_force_[rl]_vy": "is above 0 upward",
 }
-"""What the header says of the signs of the columns in OpenSim's names."""
+"""Sign conventions stated in the header, for the columns in OpenSim's names."""
 
 
 def _signs(names: Sequence[str]) -> str:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pyarrow.parquet as pq
 
 _COMPRESSION_LEVEL = 1
-"""Of zstd: the quickest."""
+"""Compression level of zstd: the fastest."""
 _MAXIMUM_VALUES = 200_000_000
 """Values of a table that is read; a chunk with channels over time has some millions."""
 _FLOATING_TYPES = ("double", "float")

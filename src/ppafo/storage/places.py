@@ -30,7 +30,7 @@ class Place(Protocol):
 
     @property
     def address(self) -> str:
-        """What messages call it, and from which another process can open it."""
+        """Name in messages, by which another process can open it."""
         ...
 
     def names(self) -> frozenset[str]:

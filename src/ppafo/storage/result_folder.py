@@ -38,7 +38,7 @@ _NAMED = 3
 
 @dataclass(frozen=True, slots=True)
 class FolderKind:
-    """What a command writes: what messages call it, the file by which it is recognised, the hashes of all others.
+    """Kind of output folder: its name in messages, the file by which it is recognised, the hashes of all others.
 
     ``document_of(folder)`` reads the mark, which states the hashes by name; DataError where it is somebody else's.
     """
@@ -196,7 +196,7 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StoredResult:
-    """What a result folder holds: the recording, and ``run.json`` as plain data."""
+    """Content of a result folder: the recording, and ``run.json`` as plain data."""
 
     folder: Path
     recording: Recording
@@ -281,10 +281,10 @@ ColumnsLike = Annotated["ColumnMap | str | Path", Word("FILE.toml[:NAME]")]
 """A column map, or the name of one: a file, and the name in it where it has several."""
 
 TEXT_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".log", ".asc")
-"""Of tables of text."""
+"""Suffixes of text tables."""
 
 WALK_RECORDING = "recording.nc"
-"""What the folder of a walk has in place of a result."""
+"""Recording in the folder of a walk."""
 
 
 @checked
@@ -371,7 +371,7 @@ def _read_file(file: Path, atmosphere: float) -> Recording:
 
 
 def _read_text(file: Path, atmosphere: float) -> Recording:
-    """Return the recording in a table of text; that of a result folder is what ``run.json`` beside it says of it."""
+    """Return the recording in a table of text; in a result folder, with label and kind of ``run.json`` beside it."""
     recording = read_csv(file, atmosphere=atmosphere)
     run_file = file.parent / RUN_FILE
     if file.name != CSV_FILE or not run_file.exists():

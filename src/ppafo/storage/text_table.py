@@ -1,4 +1,4 @@
-"""What the text tables of motion analysis, ``.mot``, ``.sto`` and ``.trc``, have in common: lines, numbers, a clock."""
+"""Common reading of the text tables of motion analysis, ``.mot``, ``.sto`` and ``.trc``: lines, numbers, a clock."""
 
 import re
 from collections.abc import Sequence

@@ -21,7 +21,7 @@ _HEAD_LINES = 5
 """Lines before the first row."""
 _UNITS = ("mm", "cm", "m")
 _UNSEEN = ("", "nan")
-"""What stands for the coordinates of a marker that was not seen."""
+"""Cells that mean an unseen marker."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -17,7 +17,7 @@ REFUSED, OUT_OF_MEMORY = 76, 77
 _ALWAYS_ALLOWED = 400_000_000
 """Bytes of memory that reading any file may take."""
 _MAXIMUM_GROWTH = 100
-"""How many times its own size [-] reading a larger file may take."""
+"""Largest memory for reading over the size of a larger file [-]."""
 
 
 def read_on_trial(reader: str, library: str, path: str) -> int:

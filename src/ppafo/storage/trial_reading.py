@@ -11,7 +11,7 @@ from ppafo.storage import trial_process
 from ppafo.storage.trial_process import OUT_OF_MEMORY, REFUSED
 
 TRIAL = ("-P", "-m", trial_process.__name__)
-"""What Python runs in the other process; by ``-P`` nothing of the working folder is imported."""
+"""Arguments of Python for the other process; by ``-P`` nothing of the working folder is imported."""
 
 _MAXIMUM_SECONDS = 30.0
 """Time [s] that reading any file may take: what the start of a process takes on a busy computer."""

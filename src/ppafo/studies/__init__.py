@@ -1,1 +1,1 @@
-"""What the questions with random draws share: study files, distributions, draws, runs, intervals."""
+"""Common basis of the analyses with random draws: study files, distributions, draws, runs, intervals."""

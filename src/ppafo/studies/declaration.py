@@ -15,7 +15,7 @@ MAXIMUM_RUNS = 2**32
 MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 """Rows that are held in memory until they are on the disk: of some ten columns about 100 MB."""
 LARGEST_SEED = 2**32 - 1
-"""Of 32 bits, so that a seed is exact in a column of floats."""
+"""Largest seed: 32 bits, so that it is exact in a column of floats."""
 MAXIMUM_GRID_VALUES = 1_000_000
 """Values of one axis, which are made before anything is run."""
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -28,7 +28,7 @@ _Only = Annotated[Texts, Field(description="names of the configurations in which
 
 
 class Configuration(StrictTable):
-    """One base scenario; several of them get the same draws."""
+    """Base scenario of a study; all configurations get the same draws."""
 
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="label in tables and figures")]
     scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
@@ -120,7 +120,7 @@ class Triangular(StrictTable):
 
 
 class Choice(StrictTable):
-    """One of some values, each with its weight; equal weights by default."""
+    """Discrete distribution: values with weights, equal by default."""
 
     path: _Path
     kind: Literal["choice"]
@@ -164,7 +164,7 @@ class Correlation(StrictTable):
 
 
 class Sample(StrictTable):
-    """How often and how the distributions are drawn; the whole sample is taken at every point of the grid."""
+    """Sampling: number and method of the draws; the whole sample is taken at every point of the grid."""
 
     method: Literal["random", "latin_hypercube", "sobol"]
     runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]

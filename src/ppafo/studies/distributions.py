@@ -129,7 +129,7 @@ class TriangularBetween:
 
 @dataclass(frozen=True, slots=True)
 class OneOf:
-    """One of some values; ``cumulated`` are the cumulated weights, the last one 1."""
+    """Discrete distribution; ``cumulated`` are the cumulated weights, the last one 1."""
 
     choices: tuple[float, ...]
     cumulated: tuple[float, ...]

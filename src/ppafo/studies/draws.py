@@ -196,7 +196,7 @@ def check_fraction(value: float, name: str, least: float = 0.0) -> None:
 
 
 CONFIDENCE = "confidence", 0.5
-"""What ``check_fraction`` is told of a confidence: one below a half is a mistake, such as 0.05."""
+"""Name and lower limit of a confidence for ``check_fraction``: below a half it is a mistake, such as 0.05."""
 
 
 def atmosphere_of(scenario: Scenario, varied: Collection[str]) -> float | None:

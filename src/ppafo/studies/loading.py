@@ -1,4 +1,4 @@
-"""From a name, a file or plain data to a study in SI units; every mistake is one clear line."""
+"""Loading of a study in SI units by name, file or plain data; every mistake is one clear line."""
 
 import copy
 from collections.abc import Iterable, Mapping, Sequence
@@ -96,7 +96,7 @@ def load_study(
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """What messages call a file, where relative paths in it begin, and its bytes, none where it came as data."""
+    """Source of a study: its name in messages, folder of its relative paths, and its bytes, None for data."""
 
     file: str
     folder: Path

@@ -1,4 +1,4 @@
-"""What a study varies: paths with units and limits, tables ``[[vary]]`` as axes and distributions in SI units."""
+"""Varied values of a study: paths with units and limits, tables ``[[vary]]`` as axes and distributions in SI units."""
 
 import math
 from collections.abc import Callable, Iterable
@@ -253,7 +253,7 @@ _DISTRIBUTIONS: dict[str, Callable[[Any, VariedPath], Distribution]] = {
     "choice": _choice,
     "whole_numbers": partial(_bounded, WholeNumbersBetween),
 }
-"""What builds each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
+"""Builder of each kind. To add one: a table in ``declaration``, a class in ``distributions``, a line here."""
 
 
 def _bounds(entry: Any, varied: VariedPath) -> tuple[float, float]:

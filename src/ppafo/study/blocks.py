@@ -18,7 +18,7 @@ MAXIMUM_RUNS_OF_CHUNK = 65_536
 _FEWEST_RUNS_OF_CHUNK = 512
 """Runs of a chunk at least, however much memory their channels over time take."""
 _SLOW_RUNS_OF_CHUNK = 64
-"""Where a Python object controls: some seconds, after which progress is said and nothing of it is lost."""
+"""Runs of a chunk with a Python controller: a few seconds between reports, so that little is lost."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
 """Bytes of the channels over time of a chunk, while it is computed."""
 

@@ -255,7 +255,7 @@ class _StoredScenario(_Part):
 
 
 class _Stored(_Part):
-    """What every reader of the document relies on; ``check_same_study`` compares it with the study asked for."""
+    """Guaranteed fields of the document; ``check_same_study`` compares it with the requested study."""
 
     study: _StoredStudy
     scenarios: dict[str, _StoredScenario]

@@ -22,7 +22,7 @@ class SentPlugin:
 
     @property
     def digest(self) -> str:
-        """What tells one version of the module from another one."""
+        """Hash of the version of the module."""
         return hashlib.sha256(repr(self.files).encode()).hexdigest()
 
 

@@ -57,7 +57,7 @@ _BYTES_OF_FILE = 12_000
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a worker needs beside the number of a chunk: study, address of the folder, threads, the person's modules."""
+    """Work for a process beside the number of a chunk: study, address of the folder, threads, plug-in modules."""
 
     study: Study
     address: str

@@ -70,7 +70,7 @@ _OF_HEADERS = frozenset(
 _MACRO = re.compile(
     r"(_[A-Z_]|(PPAFO|ppafo|DBL|FLT|LDBL|FP|MATH|M|INT|UINT|INTMAX|UINTMAX|SIZE|PTRDIFF|WCHAR|WINT|SIG|INT\d+|UINT\d+)_)"
 )
-"""How names begin that headers or compilers keep for themselves."""
+"""Prefixes of names that headers or compilers reserve."""
 _WORDS = {"and": "&&", "or": "||"}
 _LEVELS = {"or": 2, "and": 3, **dict.fromkeys(("<", "<=", ">", ">=", "==", "!="), 5), "+": 8, "-": 8, "*": 9, "/": 9}
 PART = "ppafo_part"
@@ -310,7 +310,7 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What makes a translation unit one for people: short names, and nothing that is not used.
+    """Readable form of a translation unit: short names, and nothing unused.
 
     ``names`` are the short names by the module's own, where no two are the same; ``declared`` are structs that the
     file around it declares, by their rows; ``around`` is that file. Functions are plain static ones.
@@ -394,7 +394,7 @@ def _comment(text: str, further: Iterable[str] = ()) -> str:
 
 @dataclass(slots=True)
 class _Writer:
-    """What has been written so far: structs by type; ``outer`` are names of functions, and of structs in the end."""
+    """State of the writer: structs by type; ``outer`` are names of functions, and of structs in the end."""
 
     documents: Mapping[str, str]
     outer: set[str]
@@ -432,7 +432,7 @@ class _Writer:
         return self.names[kind]
 
     def struct_name(self, kind: Items | Row) -> str:
-        """What a struct would be called if no other were."""
+        """Preferred name of a struct."""
         if isinstance(kind, Row):
             return kind.name if self.reading is None else self.reading.names.get(kind.name, kind.name)
         if kind.is_uniform:
@@ -475,7 +475,7 @@ class _Writer:
         return ["\n".join([*struct, *head, *body])]
 
     def function(self, function: Function) -> str:
-        """One function with its comment."""
+        """Text of a function with its comment."""
         self.owner = function.source
         writer = _Body(self, function, scopes_of(function))
         # An unused parameter is a warning, and warnings are errors where people read the export.

@@ -1,4 +1,4 @@
-"""How a compiler of C is run: what it is asked, how long it may take, and what it says where it fails.
+"""Call of a C compiler: its arguments, its time limit, and its message if it fails.
 
 A program that is kept from earlier is loaded without this.
 """
@@ -31,7 +31,7 @@ def asked(
     scratch: Path | None = None,
     limit: float | None = None,
 ) -> "subprocess.CompletedProcess[str]":
-    """What a compiler says and how it ends, run in ``folder``; CompilerError, with a remedy, if it cannot be run.
+    """Output and exit status of a compiler run in ``folder``; CompilerError, with a remedy, if it cannot be run.
 
     ``scratch`` is where it has its temporary files, which it leaves there when it is killed. CompilerError if it does
     not end within ``limit`` [s], ``LONGEST_COMPILING`` unless given; it is ended then, with what it has started.
@@ -101,7 +101,7 @@ _PASSING = (
     "killed signal",
     "cache directory",
 )
-"""What compilers say where the computer lacks something at that moment, in small letters."""
+"""Fragments of compiler messages about a temporary lack of resources, in lower case."""
 
 
 def compile_library(source: str, library: Path, command: Sequence[str], flags: Sequence[str]) -> None:

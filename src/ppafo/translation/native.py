@@ -20,9 +20,9 @@ from ppafo.errors import SimulationError, reason
 from ppafo.translation.native_entries import fill_module, parameters_of
 
 FOR_GCC = ("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre", "--param", "sra-max-scalarization-size-Ospeed=4096")
-"""What lets gcc take lanes side by side: without them it makes jumps of choices first. The bits stay as they are."""
+"""Flags by which gcc vectorises over lanes: without them it turns choices into jumps. The bits stay the same."""
 _LIBRARY_AS_IT_RUNS = tuple(f"-fno-builtin-{name}" for name in sorted(LIBRARY))
-"""Else a compiler works out what it can by itself, to other last bits than the library's, which Python calls."""
+"""Flags against constant folding of library calls, whose last bits would differ from the library's."""
 _THIS_PROCESSOR = "-march=native" if platform.machine().lower() in ("x86_64", "amd64", "i686") else "-mcpu=native"
 """gcc and clang name the processor that they run on by one flag on x86, by another one elsewhere."""
 _WIDEST_VECTORS = ("-mprefer-vector-width=512",) if _THIS_PROCESSOR.startswith("-march") else ()
@@ -122,7 +122,7 @@ def _command(name: str) -> tuple[str, ...]:
 
 @cache
 def _file_identity(command: str) -> tuple[str, int, int]:
-    """Where a compiler's file is, its size and its time: an update changes them, and no process need be started."""
+    """Path, size and time of a compiler's file: an update changes them, and no process need be started."""
     file = Path(command).resolve()
     try:
         status = file.stat()
@@ -133,7 +133,7 @@ def _file_identity(command: str) -> tuple[str, int, int]:
 
 @cache
 def described_processor() -> str:
-    """What the processor can do, as the system says it."""
+    """Description of the processor by the system."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:

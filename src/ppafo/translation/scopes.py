@@ -1,4 +1,4 @@
-"""Which assignments of a function are needed, and where its names are declared: as far in and as late as can be."""
+"""Needed assignments of a function, and scopes of its names: declared as deep and as late as possible."""
 
 import ast
 from collections.abc import Iterable, Iterator
@@ -135,7 +135,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
 
 
 def scopes_of(function: Function) -> Scopes:
-    """Where each local name of a function is declared."""
+    """Block in which each local name of a function is declared."""
     scopes = Scopes()
     scopes.look(function.body)
     # In order of names: the order of a set changes from process to process, and an export has one text.

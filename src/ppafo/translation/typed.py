@@ -117,7 +117,7 @@ class Perform:
 
 @dataclass(frozen=True, slots=True)
 class Note:
-    """What a text that is written for translation says of the lines behind it."""
+    """Comment in a translated text about the lines after it."""
 
     text: str
 
@@ -134,17 +134,17 @@ class Parameter(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Function:
-    """One function for one choice of types."""
+    """Function for one choice of types."""
 
     name: str
     source: str
-    """Its name in the composed module, which has it once for all types."""
+    """Name in the composed module, which has the function once for all types."""
     parameters: tuple[Parameter, ...]
     returns: Type | None
     """None where it returns nothing."""
     body: tuple[Statement, ...]
     bound: tuple[str, ...] = ()
-    """Which functions were handed over as arguments, each as ``NAME is FUNCTION``."""
+    """Functions passed as arguments, each as ``NAME is FUNCTION``."""
     is_entry: bool = False
     """True where it returns nothing and is called from outside."""
 

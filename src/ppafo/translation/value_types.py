@@ -8,14 +8,14 @@ from ppafo.engine.entries import entry_types
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """One number: ``bool``, ``int`` (64 bits, products wrap), ``float`` (64 bits), ``int16`` or ``int32``."""
+    """Type of a number: ``bool``, ``int`` (64 bits, products wrap), ``float`` (64 bits), ``int16`` or ``int32``."""
 
     name: str
 
 
 BOOL, INT, FLOAT = Scalar("bool"), Scalar("int"), Scalar("float")
 INT16, INT32 = Scalar("int16"), Scalar("int32")
-"""What ``widths`` makes of whole numbers for small processors; the walk itself finds none."""
+"""Integer types that ``widths`` assigns for small processors; type inference itself finds none."""
 _ORDER = (BOOL, INT, FLOAT)
 
 

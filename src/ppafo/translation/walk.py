@@ -90,7 +90,7 @@ class Expressions:
         return term
 
     def condition(self, node: ast.expr) -> Term:
-        """Whether an expression is true."""
+        """Translation of an expression as a condition."""
         if isinstance(node, ast.BoolOp):
             return _linked(node, [self.condition(value) for value in node.values])
         term = self.scalar(node)
@@ -408,7 +408,7 @@ def kind_of(kind: Type) -> str:
 
 
 def _without_field(owner: str, name: str, kind: Type) -> str:
-    """What to say of a value that has no such field, with those that it has."""
+    """Message about a value without such a field, with its fields."""
     if not isinstance(kind, Row):
         return f"{owner} is {kind_of(kind)} and has no '{name}'"
     fields = [field for field, _ in kind.fields]
@@ -422,7 +422,7 @@ _INSTEAD = {
     "log": ", whose last bits differ between computers: take logarithm(number) of ppafo.model.elementary",
     "pow": ", whose last bits differ between computers: take power(base, exponent) of ppafo.model.elementary",
 }
-"""What to write in the place of a function of a library, where the package has that."""
+"""Replacement for a function of a library, if the package has one."""
 
 
 def _literal(term: Term) -> int | None:
@@ -508,7 +508,7 @@ class _ModuleWalk:
 
 
 class _FunctionWalk:
-    """One function for one choice of types; gone through again where a name turns out to hold a wider type."""
+    """Translation of one function for one choice of types; repeated if a name turns out to have a wider type."""
 
     def __init__(self, module: _ModuleWalk, definition: ast.FunctionDef) -> None:
         self.module = module
@@ -568,7 +568,7 @@ class _FunctionWalk:
         return tuple(chain.from_iterable(map(self.statement, body)))
 
     def statement(self, node: ast.stmt) -> list[Statement]:
-        """What a statement of Python becomes."""
+        """Translation of a Python statement."""
         match node:
             case ast.Pass():
                 return []

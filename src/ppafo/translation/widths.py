@@ -73,7 +73,7 @@ _COMPARISONS = frozenset({"<", "<=", ">", ">=", "==", "!=", "and", "or", "not"})
 
 @dataclass(slots=True)
 class _Ranges:
-    """What every name, term, field and result ever holds; terms are known by their identity."""
+    """Value ranges of all names, terms, fields and results; terms are known by their identity."""
 
     functions: Mapping[str, Function]
     names: dict[tuple[str, str], Range] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class _Ranges:
     returned: dict[str, Range] = field(default_factory=dict)
 
     def call(self, function: Function, arguments: tuple[Range, ...]) -> Range:
-        """What a function returns for some ranges of its parameters."""
+        """Range of a function's result for given ranges of its parameters."""
         names: Names = {}
         for (name, kind), value in zip(function.parameters, arguments, strict=True):
             self.keep(function, names, name, kind, value)

@@ -132,7 +132,7 @@ def without_condition(unit: str) -> str:
 
 
 def density(condition: Condition, molar_mass: float) -> float:
-    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; of air at ANR it is that of ISO 6358."""
+    """Return the density [kg/m^3] of an ideal gas, ``p M/(R T)``; for air at ANR, the density in ISO 6358."""
     if condition.is_humid and abs(molar_mass / MOLAR_MASSES["air"] - 1.0) < _AS_AIR:
         return STANDARD_REFERENCE_DENSITY_AIR
     return condition.pressure * molar_mass / (MOLAR_GAS_CONSTANT * condition.temperature)
@@ -145,7 +145,7 @@ _AS_AIR = 5.0e-3
 def condition_of(text: str, unit: str) -> Condition:
     """Return a condition by its name, or from a temperature and a pressure; UnitError, about a unit, for another text.
 
-    A pressure without a kind is absolute, as that of every reference condition.
+    A pressure without a kind is absolute, as in every reference condition.
     """
     name = re.sub(r"[\s_-]+", " ", text).upper()
     if name in CONDITIONS:

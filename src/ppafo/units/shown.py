@@ -1,4 +1,4 @@
-"""In which unit a person is shown a number: the one in which it was given, else the set's, else the catalogue's.
+"""Display units of numbers: the one in which a number was given, else the set's, else the catalogue's.
 
 ``QUANTITIES`` is the only table of shown units, and ``shown_text`` what writes a number in one. Files and data stay in
 SI. What says or draws something does so inside ``shown_in``, with the units in which the author of a parameter set and

@@ -1,4 +1,4 @@
-"""How people write units, brought to one spelling: ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``.
+"""Spellings of units in use, brought to one form: ``N m s/rad``, ``mm^2``, ``L/(s bar)``, ``psi_g``.
 
 Only what can mean one thing is brought to another spelling. What stays unknown is refused where the unit is looked up.
 """
@@ -91,7 +91,7 @@ _MEANT = {
 }
 _WORDS = {word: unit for unit, words in _MEANT.items() for word in words}
 _COLUMNS_OF = re.compile(r"\b(mm|cm|m|in) ?(?:H2O|h2o|WS|wc)(?![A-Za-fh-z0-9])")
-"""Columns of water: their unit is that of water column, WC."""
+"""Heads of water, whose unit is the water column, WC."""
 
 _SQUARE_OR_CUBIC = (
     (re.compile(r"\bsq\.? ?(mm|cm|m|in|ft)\b"), r"\1^2"),

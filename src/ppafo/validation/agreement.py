@@ -41,7 +41,7 @@ DEFAULT_LIMIT = 0.02
 """Largest delay [s] that is looked for; sensors, filters and valves are late by less, and a model by more is wrong."""
 
 ENGINE_ERROR = 3.0e-5
-"""What the engine is off, over the full range [-] (tests/convergence)."""
+"""Error of the engine over the full range [-] (tests/convergence)."""
 LEAST_NOISE = 1.0e-4
 """Noise of samples that is taken at least, over the full range [-]."""
 _UNMOVED = 1.0e-3
@@ -53,7 +53,7 @@ _SHIFTS = 81
 _MAXIMUM_SAMPLES = 4000
 """Samples of a channel by which a delay is sought."""
 _MINIMUM_GAIN = 25.0
-"""In variances of one sample: five standard deviations of white noise. Less is noise and no delay."""
+"""Least gain for a delay, in variances of one sample: five standard deviations of white noise."""
 _SMALLEST_GAIN = 1.0e-12
 """Gain below which two curves are the same to the accuracy of the engine."""
 _RESOLUTION = 0.02
@@ -136,7 +136,7 @@ _OTHER_SUPPLY = 0.05
 
 @dataclass(frozen=True, slots=True)
 class ReplaySettings:
-    """How recordings are replayed and judged.
+    """Settings of replay and verdict.
 
     ``motion`` ``free`` lets the vane move as the model demands, ``measured`` prescribes the recorded angle,
     ``locked`` keeps it where it starts, ``leg`` gives it the foot of ``leg``, else the one of figure 7's fixture. With

@@ -106,7 +106,7 @@ def _both_ways(*sizes: float) -> tuple[float, ...]:
 
 # Grids are so fine that two Gauss-Newton steps reach the least squares, and no likely fault lies at one of their ends.
 _ZEROS = _both_ways(0.003, 0.01, 0.03, 0.1, 0.3, 0.6)
-"""In radians, full openings and gauge pressures of the supply."""
+"""Zero offsets of sensors that are tried, in radians, full openings and gauge pressures of the supply."""
 _GAINS = (0.3, 0.6, 0.8, 0.95, 0.98, 1.02, 1.05, 1.25, 1.6, 3.0)
 """Gain [-] of a sensor."""
 _DELAYS = _both_ways(0.001, 0.003, 0.006, 0.012, 0.025)

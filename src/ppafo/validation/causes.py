@@ -1,4 +1,4 @@
-"""What single cause would explain recordings of which a model leaves more than noise.
+"""Single cause that would explain recordings with more than noise left by the model.
 
 A cause is a model of a sensor, y = h(model; a) + e, or another number of the set. Causes are tried in stages, from what
 the samples themselves show to what a device may have and the model has not; the first stage that explains all
@@ -34,7 +34,7 @@ _TIMES = {
 """Rate of a clock whose times were read in a wrong unit, and the right one."""
 
 _LESS = 0.5
-"""What is left of an error beyond its limit at most, where times in another unit explain it."""
+"""Largest fraction of an error beyond its limit that may remain if times in another unit explain it [-]."""
 
 _SHORT_INTERVAL = 2.0e-5
 """Interval of samples [s] up to which times may be seconds read as milliseconds: from fifty samples a second on."""
@@ -48,7 +48,7 @@ _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """One cause: its name, what it seems to be in words, and by how much G [-] it explains more than none.
+    """Cause: its name, its description in words, and its gain G [-] in explained error.
 
     ``left`` is the largest error over noise [-] of any channel with it. ``numbers`` are the numbers of the set that it
     changes, by path, each with its SI unit. ``same`` are those that the recordings cannot tell from it, ``is_usual``

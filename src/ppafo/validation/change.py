@@ -1,4 +1,4 @@
-"""What may be otherwise than the model has it, as values: a sensor, a change, and a candidate for a cause."""
+"""Changes of the model as values: a sensor, a change, and a candidate for a cause."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -16,7 +16,7 @@ SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """What a sensor makes of a true value: a gain [-] about a value, a zero in the channel's unit, a delay [s]."""
+    """Sensor model: gain [-] about a value, zero offset in the channel's unit, delay [s]."""
 
     gain: float = 1.0
     zero: float = 0.0
@@ -34,7 +34,7 @@ class Sensor:
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """How a recording and its device differ from the set: nothing, unless it says so.
+    """Difference between a recording with its device and the set; none by default.
 
     ``sensors`` are by channel, ``numbers`` of the set by path [SI], ``effects`` are settings by the name of an effect.
     Pressures 1 and 2 may be swapped, all sensors may be later than the command by a ``delay`` [s], the clock may

@@ -9,7 +9,7 @@ from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 _EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
 INITIAL_REMEDIES = {name: f'give its initial value, --initial "{example}"' for name, example in _EXAMPLES.items()}
-"""What to do about a channel that a replay would start from and that was not recorded."""
+"""Remedy for an initial channel of a replay that was not recorded."""
 
 
 def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:

@@ -63,7 +63,7 @@ class Record(NamedTuple):
 
 
 class Left(NamedTuple):
-    """What a change leaves, over the noise: the mean square in each channel of each recording, and all errors."""
+    """Residuals under a change, over the noise: mean square in each channel of each recording, and all errors."""
 
     squares: Floats
     errors: Floats
@@ -110,7 +110,7 @@ class _Channel(NamedTuple):
 
     @property
     def words(self) -> str:
-        """What is wrong with it, empty where nothing is."""
+        """Description of its fault; empty without one."""
         return "" if self.wrong is None else f"{self.agreement.channel} {self.wrong.words}"
 
     @property
@@ -121,7 +121,7 @@ class _Channel(NamedTuple):
 
 
 def _channel_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> _Channel:
-    """Return a channel with what is wrong with its samples; its noise is that of the others."""
+    """Return a channel with the fault of its samples; its noise is estimated from the other samples."""
     recording, model = agreement.measured, agreement.model
     values = measured_values(recording, channel.channel)
     assert values is not None
@@ -139,7 +139,7 @@ def _channel_of(channel: ChannelAgreement, agreement: RecordingAgreement) -> _Ch
 
 
 class _Wrong(NamedTuple):
-    """What is wrong with samples of a channel in words, with which, and whether each stands by itself."""
+    """Wrong samples of a channel: description, samples, and whether each is isolated."""
 
     words: str
     samples: Flags

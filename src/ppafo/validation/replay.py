@@ -26,7 +26,7 @@ from ppafo.validation.compared import ANGLE
 from ppafo.validation.measured import Measured
 
 Motion = Literal["free", "measured", "locked", "leg"]
-"""What the vane does: as the model demands, as the recorded angle says, nothing, or as with a foot on it."""
+"""Motion of the vane in a replay: free by the model, as recorded, locked, or with a foot."""
 MOTIONS: tuple[Motion, ...] = ("free", "measured", "locked", "leg")
 
 MAXIMUM_STEPS = 20_000_000
@@ -39,7 +39,7 @@ _ROUNDING = 1.0e-9
 
 @dataclass(frozen=True, slots=True)
 class Replayed:
-    """What the model did, at every step, on the clock of the recording; the step of the engine [s] and its inputs."""
+    """Result of a replay at every step, on the clock of the recording; step of the engine [s] and its inputs."""
 
     recording: Recording
     step: float
@@ -48,7 +48,7 @@ class Replayed:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What is to be replayed: a recording on a device, ``extra`` [s] longer with the last inputs.
+    """Replay to be run: a recording on a device, ``extra`` [s] longer with the last inputs.
 
     The motion ``leg`` is that with ``leg``, or on the fixture of figure 7.
     """

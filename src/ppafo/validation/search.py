@@ -37,7 +37,7 @@ _PARTING = 1.0e-4
 _UNUSUAL = 0.01
 """Chance [-] below which errors of sensors are together more than any bench has."""
 _SMALLEST = 1.0e-300
-"""What a sum of squares is at least where it divides."""
+"""Lower bound of a sum of squares used as a divisor."""
 
 
 class Tried(NamedTuple):
@@ -70,7 +70,7 @@ class Tried(NamedTuple):
 
 
 class Slope(NamedTuple):
-    """How the errors over noise (all samples,) grow with the size of a candidate."""
+    """Derivative of the errors over noise (all samples,) by the size of a candidate."""
 
     candidate: Candidate
     errors: Floats

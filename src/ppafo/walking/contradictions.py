@@ -32,7 +32,7 @@ COMPRESSION = 1.6
 class Pair:
     """Two numbers of a walk: the one at ``path`` must be below, above, at most or at least the ``other``.
 
-    ``unit`` is that of both in SI, ``words`` what is wrong where the bare relation would not say it.
+    ``unit`` is the SI unit of both, ``words`` what is wrong where the bare relation would not say it.
     """
 
     path: str
@@ -101,7 +101,7 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
 
 
 def rules(scenario: Scenario) -> tuple[Problem, ...]:
-    """What contradicts what in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
+    """Contradictions in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
     check_no_bottle(scenario)
     return tuple(
         (np.atleast_1d(contradiction.is_bad), contradiction.line) for contradiction in _contradictions(scenario)

@@ -39,7 +39,7 @@ from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
 
 SUMMARY = "the device on a leg that walks along a prescribed gait"
-"""What the motion of a walk is."""
+"""Description of the motion of a walk."""
 
 THRESHOLDS = next(iter(TIMINGS))
 """The estimator of the gait phase of a walk file that names none."""
@@ -85,7 +85,7 @@ FAULTY = tuple(_FAULTY)
 
 @dataclass(frozen=True, slots=True)
 class SensorFault:
-    """What a fault of a sensor is, and its numbers; a fault of the plant has both too."""
+    """Description of a sensor fault, and its numbers; a fault of the plant has both too."""
 
     summary: str
     quantities: tuple[Quantity, ...]
@@ -202,7 +202,7 @@ OF_A_WALK = Declared(
     appended={path: (BOTTLE, own) for path, own in BOTTLE_OVERRIDES.items()},
     check_motion=_check_motion,
 )
-"""What the file of a walk can hold. Gait and task sequence stand at its top or, as its motion, in [motion]."""
+"""Possible content of the file of a walk. Gait and task sequence are at top level or, as its motion, in [motion]."""
 
 
 def _fault(part: str) -> Any:

@@ -1,4 +1,4 @@
-"""What happens in a walk and when: events of the stride, true and known to the controller, and every loss of help.
+"""Events of a walk and their times: events of the stride, true and detected, and every loss of help.
 
 Less help, a pause, a stop or a return of help is listed with its fault flag, the readings and the settings.
 """
@@ -23,7 +23,7 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, law_of
 
 EVENTS = ("heel strike", "toes on", "heel off", "toes off")
-"""In the order of a stride; 'toes on' is the foot that has come down flat."""
+"""Events of a stride, in order; 'toes on' is the foot that has come down flat."""
 
 Samples = NDArray[np.intp]
 
@@ -31,33 +31,33 @@ TOO_FAR = 0.25
 """Fraction of a stride: what the controller takes for an event further from it than this is not that event."""
 
 _FAULT_SUFFIX = "_fault"
-"""How the fields of the sensors end in which their faults are."""
+"""Suffix of the sensor fields that hold faults."""
 _AFTER = {ground.HEEL: 0, ground.FLAT: 1, ground.TOE: 2, ground.SWING: 3}
 _STATE = "controller_state."
 EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
-"""How the rows end in which a controller that predicts keeps the last event and the fraction of the stride."""
+"""Suffixes of the rows for the last event and the phase in the stride, of a predicting controller."""
 
 
 PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.level"
-"""Where event-based controllers keep the phase that they see, and whether they help, pause or have stopped."""
+"""Row of an event-based controller for its level of help: full, paused or stopped."""
 
 SILENT_ROW = "unpowered.silent"
-"""For how long the controller has been silent, where a shut-off valve has a watchdog."""
+"""Row of the time for which the controller has been silent, with a shut-off valve that has a watchdog."""
 
 SILENT = FaultFlag(
     "silent_controller", STOPPED, "the controller takes no samples: the watchdog has shut the supply off", (), ()
 )
-"""What a watchdog sees, which no controller can."""
+"""Flag of the watchdog, which no controller can raise."""
 
 VENTINGS_ROW = "controller_state.safety.ventings"
-"""And how often they gave less help: lifted only, paused or stopped."""
+"""Row that counts reductions of help (lift-only, pause, stop)."""
 
 FINDING_ROW = "controller_state.safety.finding"
-"""And the last fault flag by which they did, with the readings then."""
+"""Row of the last fault flag that reduced the help, with the readings at that time."""
 
 REQUEST_ROW = "controller_state.request.torque"
-"""Where those that follow a torque keep the one they want."""
+"""Row of a torque-following controller for the requested torque."""
 
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}

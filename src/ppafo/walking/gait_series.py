@@ -207,7 +207,7 @@ def _above(toes_down: Floats, heel_down: Floats, swing: Floats) -> Floats:
 
 
 class RockerFit(NamedTuple):
-    """What a gait shows of its heel: lever [m] nearly flat, what it gains far up, the tilt [rad] half way up."""
+    """Heel rocker fitted to a gait: lever [m] nearly flat, its gain far up, and the tilt [rad] at half the gain."""
 
     flat: float
     rise: float

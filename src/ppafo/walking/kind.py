@@ -12,7 +12,7 @@ from ppafo.walking import contradictions, motion, planning, result
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WalkKind:
-    """A motion along a gait: each of its functions is that of ``walking`` of the same meaning."""
+    """Motion along a gait: each of its functions is the one of ``walking`` with the same meaning."""
 
     name: str
     section: ClassVar[None] = None

@@ -1,4 +1,4 @@
-"""From a name or a file to a scenario that is a walk; every mistake is one clear line."""
+"""Loading of a walk's scenario by name or file; every mistake is one clear line."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -229,7 +229,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
 
 
 class _Led(NamedTuple):
-    """What leads the leg: a gait, whether anybody named it, and what the wearer does one after the other, if so."""
+    """Lead of the leg: a gait, whether it was named by the user, and the task sequence, if any."""
 
     gait: Gait
     is_named: bool

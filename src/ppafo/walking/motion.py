@@ -143,7 +143,7 @@ def with_duration(scenario: Scenario, seconds: float) -> Scenario:
 
 
 def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
-    """What is wrong with the length of a walk [s], which may be an array (runs,)."""
+    """Faults of the duration of a walk [s], which may be an array (runs,)."""
     # The controller learns over the first strides, and means leave them out: a walk needs more than these.
     has_task_sequence = walk_of(scenario).task_sequence is not None
     shortest = SHORTEST_TASK_SEQUENCE if has_task_sequence else SHORTEST_STRIDES * walk_of(scenario).gait.stride_time

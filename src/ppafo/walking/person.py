@@ -1,4 +1,4 @@
-"""One person of the population by a number: build, strides, and how the controller was fitted to him or her.
+"""Person of the population, by number: build, strides, and individual fitting of the controller.
 
 Number 0 is the wearer of the file with the gait as it is. Every other whole number draws a person as the wearers of
 ``ppafo walk --wearers`` are drawn, so that a study may vary who walks as it varies any number. Gaits differ from one as
@@ -102,7 +102,7 @@ def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator
 
 
 def _events(shank: SeriesOfMany, ankle: SeriesOfMany, stance_share: Floats) -> dict[str, Floats]:
-    """What ``gait_events`` finds, by field of ``GaitTiming``; some people at a time, to need less memory."""
+    """Results of ``gait_events``, by field of ``GaitTiming``; in batches of people, to limit memory."""
     sine, cosine = sine_and_cosine(np.outer(np.arange(1, HARMONICS + 1), EVENT_PHASES))
     events = []
     for first in range(0, stance_share.size, _AT_ONCE):

@@ -1,4 +1,4 @@
-"""From a scenario that is a walk to a run of the engine. Any number of it may be an array (runs,), one for each run."""
+"""Plan of a walk as a run of the engine. Any number of it may be an array (runs,), one for each run."""
 
 import math
 from dataclasses import replace
@@ -117,7 +117,7 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
 
 
 def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
-    """What the run of a walk is made of, whoever walks."""
+    """Components of the run of a walk, for any wearer."""
     # An object in charge is asked between the steps, so the program has no controller of its own.
     is_outside = scenario.controller.is_outside
     return Components(
@@ -226,7 +226,7 @@ def gait_sensors_of(scenario: Scenario) -> GaitSensors:
 
 
 def failing_of(scenario: Scenario) -> tuple[PlantFaults, ShutOff] | None:
-    """What fails of the plant of a walk, and its shut-off valve; None without both."""
+    """Faults of the plant of a walk, and its shut-off valve; None without both."""
     motion, gas = walk_of(scenario), scenario.device.gas
     if not motion.broken and not motion.shut_off:
         return None
@@ -251,7 +251,7 @@ def sensor_numbers(scenario: Scenario) -> dict[str, Any]:
 
 
 def flaws(scenario: Scenario) -> tuple[Any, ...]:
-    """What makes the sensors of a walk worse than ideal ones beside faults, each 0 where it does not.
+    """Imperfections of the sensors of a walk beside faults, 0 for an ideal one.
 
     The bandwidth of the force sensors is no such flaw: every walk has it.
     """

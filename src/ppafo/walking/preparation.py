@@ -1,4 +1,4 @@
-"""From the settings of a walk in SI units to the numbers that it begins with.
+"""Initial numbers of a walk, computed from its settings in SI units.
 
 Pure functions of one run, as in ``simulation/plan.py``: Python plans with them, and an exported library has them
 in C. What a gait comes to (series, events, the fit of the heel) is data.
@@ -37,7 +37,7 @@ DISTORTING = ("time", "period", "gain", "offset", "drift", "crosstalk", "lag", "
 
 
 def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> HeelRocker:
-    """What was fitted to a gait, on a heel with a lever [m], which bounds it.
+    """Heel rocker fitted to a gait, bounded by the lever [m] of the heel.
 
     ``flat`` and ``rise`` [m] are the lever nearly flat and how much longer it is far up, ``half`` [rad] as there.
     """
@@ -47,7 +47,7 @@ def rocker_on_heel(flat: float, rise: float, half: float, heel_lever: float) -> 
 
 
 def device_share(plant: PlantParameters, gravity: float) -> DeviceShare:
-    """What a device, of which ``plant`` is the bare one under ``gravity`` [m/s^2], adds to a leg."""
+    """Contribution of a device to a leg; ``plant`` is the bare device under ``gravity`` [m/s^2]."""
     return DeviceShare(
         inertia=plant.inertia,
         viscous_damping=plant.viscous_damping,
@@ -165,7 +165,7 @@ def standing_on(
 
 
 def memory_of(bandwidth: float, period: float) -> float:
-    """What is left of a sensor's last value after a sample [s]; at a ``bandwidth`` [Hz] of 0 it follows at once."""
+    """Remaining weight of a sensor's last value after a sample [s]; 0 at a ``bandwidth`` [Hz] of 0."""
     return exponential(-_TURN * bandwidth * period) if bandwidth > 0.0 else 0.0
 
 

@@ -95,7 +95,7 @@ def valve_and_ground_channels(record: Mapping[str, Floats]) -> Channels:
 
 
 def controller_channels(record: Mapping[str, Floats]) -> Channels:
-    """What a controller keeps: phase of the gait, level of help, requested torque, where it is in the stride."""
+    """Channels of a controller: gait phase, level of help, requested torque, phase in the stride."""
     channels: Channels = {}
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
@@ -169,7 +169,7 @@ def with_cold_gas(run: Run, supply: SupplyCourse | None, time: Floats) -> Run:
 def _task_sequence_channels(
     configuration: Scenario, run: Run, path: AnklePath, time: Floats, record: Mapping[str, Any]
 ) -> dict[str, tuple[Any, str]]:
-    """What a task sequence adds to equal strides, and the toes over ground that may rise: stairs lift the ankle.
+    """Additional channels of a task sequence, and the toes over ground that may rise: stairs lift the ankle.
 
     The healthy toes are as high as the gait's, times the stride over the recorded one.
     """
@@ -222,7 +222,7 @@ def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floa
 
 
 WALK_FORMAT = "ppafo walk"
-"""What the results of walks say of themselves on the disk; analyses read them by it."""
+"""Format name in the results of walks on disk, by which analyses recognise them."""
 
 
 def _units_of(walked: "WalkResult | Scenario", *_: Any) -> Mapping[str, str]:
@@ -370,7 +370,7 @@ def _result(
 
 
 def _status(failed: float, too_many_parts: bool, states: Floats) -> Status:
-    """How a walk ended that failed at a time [s], or never, with its last states."""
+    """Status of a walk from its time of failure [s], if any, and its last states."""
     if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
         return Status("completed", None, "completed")
     # A number that is none at the end, which the run did not see itself, has no time: it counts from the start.

@@ -118,7 +118,7 @@ def walk_metrics(
 
 
 def torque_metrics(recording: Recording) -> dict[str, Metric]:
-    """How well the torque follows what is requested, how high it gets, and how often the command turns."""
+    """Metrics of the torque: tracking of the request, peak, and reversals of the command."""
     metrics: dict[str, float | None] = {
         "torque_error": torque_error(recording) if "reference" in recording else None,
         "requested_torque": requested_torque(recording) if "reference" in recording else None,
@@ -133,7 +133,7 @@ def torque_metrics(recording: Recording) -> dict[str, Metric]:
 
 
 def counts_of_strides(recording: Recording, helped: NDArray[np.bool_]) -> dict[str, Metric]:
-    """How many whole strides there are, and the gas of the whole walk; ``helped`` is (strides,)."""
+    """Number of whole strides, and the gas of the whole walk; ``helped`` is (strides,)."""
     gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
     less = "whole strides with less help (lifted only, paused or stopped) in at least a part of them"
     return {
@@ -228,7 +228,7 @@ def healthy_toe_height(configuration: Scenario) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class SegmentResult:
-    """One segment of a task sequence, from ``start`` to ``end`` [s], SI units.
+    """Result of one segment of a task sequence, from ``start`` to ``end`` [s], SI units.
 
     ``strides`` begin in it with a strike, ``helped`` are the ones in which the controller was not in its safe
     state up to the next strike, or to the end. ``gas`` [kg], ``net_push_off_work`` [J] of the strides that begin in it,

@@ -82,7 +82,7 @@ the forefoot is on the stair all the same."""
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """One segment of a task sequence; ``values`` in SI units by name, without those that were not given."""
+    """Segment of a task sequence; ``values`` in SI units by name, without those that were not given."""
 
     kind: str
     values: dict[str, float]
@@ -90,7 +90,7 @@ class Segment:
 
 @dataclass(frozen=True, slots=True)
 class TaskSequence:
-    """What the wearer does one after the other, who stands at the beginning; ``file`` is what messages call it."""
+    """Consecutive tasks of a wearer, who stands at the beginning; ``file`` is the name in messages."""
 
     name: str
     description: str
@@ -416,7 +416,7 @@ class PaceInTime:
 
 
 def pace_in_time(sequence: TimedSequence, time: Floats) -> PaceInTime:
-    """Where one wearer is in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays."""
+    """Pace of one wearer in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays."""
     table = np.array([leaves(part) for part in sequence.parts], dtype=np.float64)
     row = table[np.searchsorted(table[:, 0], time, side="right") - 1].T
     start, length, turns, frequency, frequency_gain, stride, stride_gain = row[:7]
@@ -442,7 +442,7 @@ def turns_walked(sequence: TimedSequence, time: float) -> Numbers:
 
 
 def standing_gait(leg: LegParameters, timing: GaitTiming, sequence: TimedSequence) -> GaitNow:
-    """Where a task sequence begins: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
+    """Start of a task sequence: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
     first = sequence.parts[0]
     sine, cosine = flat_foot(timing)
     return standing_on(leg, timing.ground_angle, sine, cosine, first.turns, first.load)

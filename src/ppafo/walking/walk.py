@@ -329,7 +329,7 @@ class Population:
 
     @property
     def message(self) -> str:
-        """How the walks ended."""
+        """End of the walks, in words."""
         if not self.diverged:
             return "completed"
         return f"{self.diverged} of {self.diverged + self.count} wearers diverged and are left out; {REMEDY}"

@@ -60,7 +60,7 @@ class HeelRocker(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Wearer:
-    """One leg of a person; what has no number here is declared with the foot of a leg alone.
+    """Leg of a person; fields without a number here are declared with the foot of a leg alone.
 
     Defaults: the paper's subject (after equation (12)); what it does not print is said in docs/decisions/0008.
     """
@@ -196,22 +196,22 @@ def shank_length_of(stature: float) -> float:
 
 
 def shank_mass_centre_of(stature: float) -> float:
-    """From the knee to the mass centre of the shank [m] of a stature [m]."""
+    """Distance from the knee to the mass centre of the shank [m], of a stature [m]."""
     return _SHANK_CENTRE * stature
 
 
 def foot_mass_centre_of(stature: float) -> float:
-    """From the ankle to the mass centre of the foot [m] of a stature [m]."""
+    """Distance from the ankle to the mass centre of the foot [m], of a stature [m]."""
     return _FOOT_CENTRE * stature
 
 
 def heel_lever_of(stature: float) -> float:
-    """From the ankle back to the heel [m] of a stature [m]."""
+    """Distance from the ankle back to the heel [m], of a stature [m]."""
     return _HEEL * stature
 
 
 def toe_lever_of(stature: float) -> float:
-    """From the ankle to the toes [m] of a stature [m]."""
+    """Distance from the ankle to the toes [m], of a stature [m]."""
     return _TOE * stature
 
 

@@ -24,6 +24,7 @@ FREE = (
     "torque-task-proportional",
     ("motion.kind=free", "run.duration=0.3 s", "reference.ramp_time=0.1 s", "motion.external_torque=3 N m"),
 )
+LED = ("torque-task-proportional", ())
 MOVED = ("torque-task-moving-ankle", ("run.duration=0.5 s",))
 
 
@@ -42,8 +43,8 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 @pytest.fixture(scope="module")
 def moved(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """A vane that is moved, FMI 3."""
-    return written(tmp_path_factory.mktemp("moved"), *MOVED, fmi=3)
+    """A locked vane, which inputs move, FMI 3."""
+    return written(tmp_path_factory.mktemp("moved"), *LED, fmi=3)
 
 
 def driven(instance: Instance, recording: Recording, channels: tuple[str, ...], seen: tuple[str, ...]) -> list[float]:
@@ -84,8 +85,9 @@ def test_tools_may_show_units_of_the_bench_and_know_the_limits_of_the_inputs(
 def test_an_ankle_that_is_led_point_by_point_follows_the_path_between_them(moved: str) -> None:
     recording = simulate(*MOVED).recording
     assert np.ptp(recording["angle"]) > 0.1
-    instance = Instance(moved)
-    (torque,) = driven(instance, recording, ("command", "angle", "angular_velocity"), ("torque",))
+    inputs = ("command", "angle", "angular_velocity")
+    instance = Instance(moved, {name: float(recording[name][0]) for name in inputs})
+    (torque,) = driven(instance, recording, inputs, ("torque",))
     assert 0.0 < torque < 1e-4
     instance.close()
 

@@ -1,1 +1,1 @@
-"""Which configuration is better, by how much, and how surely?"""
+"""Paired comparison of configurations: difference of each metric with its interval, and the better one."""

@@ -53,12 +53,12 @@ class Case:
 
     @property
     def word(self) -> str:
-        """How the nominal run ended, in words: one that does not follow its reference is not recommended."""
+        """End of the nominal run in words; a run that does not follow its reference is not recommended."""
         return self.tracking.kind if self.tracking is not None and not self.follows else self.status.kind
 
     @property
     def follows(self) -> bool:
-        """Whether the nominal run follows its reference, or only lacks what its scenario says that it will."""
+        """Tell whether the nominal run follows its reference, or misses it only as its scenario announces."""
         return self.tracking is None or not self.tracking.is_useless
 
     def value(self, metric: str) -> float:

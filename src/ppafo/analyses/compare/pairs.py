@@ -48,7 +48,7 @@ def compared_metrics(scenarios: Collection[Scenario]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True)
 class Paired:
-    """One metric of a configuration against the baseline's, over the pairs in which both have it.
+    """Metric of a configuration compared with the baseline's, over the pairs in which both have a value.
 
     ``difference`` is the mean of configuration less baseline [SI] with its confidence interval; ``change`` the median
     over the draws of the same as a fraction of the baseline (nan where that is 0), ``change_low`` and ``change_high``

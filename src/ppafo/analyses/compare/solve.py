@@ -25,7 +25,7 @@ from ppafo.studies.varying import value_at
 from ppafo.study.runs import Rows, Runs, Tally, failures_of, unvaried
 
 AS_WRITTEN = "as written"
-"""What the task of a configuration is called where no other is requested."""
+"""Name of a configuration's task where no other task is requested."""
 DEFAULT_SEED = 1
 """Seed of the draws of a comparison without a study."""
 _SAME = 1.0e-9
@@ -54,7 +54,7 @@ def baseline_of(configurations: Sequence[Configuration], name: str | None) -> st
 
 @dataclass(frozen=True, slots=True)
 class Draws:
-    """How many draws are made of the uncertain values, and what of their runs is accepted.
+    """Number of draws of the uncertain values, and acceptance rules for their runs.
 
     ``seed`` None is the study's own. More than the fraction ``maximum_failed`` of failed runs is an error.
     """

@@ -1,1 +1,1 @@
-"""Which device: for a wearer, for a torque profile, or beaten by no other in error, gas and mass?"""
+"""Design of a device: for a wearer, for a torque profile, or Pareto-optimal in error, gas and mass."""

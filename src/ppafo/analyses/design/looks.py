@@ -1,4 +1,4 @@
-"""How valves and a suggestion look in the figures of a design: one colour a valve, a ring around what is chosen."""
+"""Styles of the design figures: one colour per valve, a ring around the suggested device."""
 
 from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, VERMILION
 

@@ -1,1 +1,1 @@
-"""How long does one bottle of gas last, how cold does it get, and why does it end?"""
+"""Discharge of a gas bottle: duration, temperature, and the reason why it ends."""

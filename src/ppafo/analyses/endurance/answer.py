@@ -1,4 +1,4 @@
-"""How long a bottle lasts and why it ends, its values with their sources; several gas uses side by side."""
+"""Report of a bottle's duration and its end, of the values with their sources, and of several gas uses side by side."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field

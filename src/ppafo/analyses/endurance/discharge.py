@@ -31,14 +31,14 @@ from ppafo.walking.bottle.course import WALKED, SupplyBalance, SupplyCourse
 
 TIME_IS_UP = "time is up"
 Stop = Literal["supply", "frozen", "time"]
-"""What stopped a run: the supply pressure was not maintained, the table ended in the cold, the time was over."""
+"""Reason for the end of a run: supply pressure not maintained, fluid table left in the cold, time limit reached."""
 _NEXT_TO_NOTHING = 0.01
 """Fraction of a full bottle: less than this left to be had from a warm bottle is called empty."""
 
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """How a run ended: kind, a sentence, mass left [kg], and the part of it [kg] that a warm bottle would give."""
+    """End of a run: kind, sentence, mass left [kg], and the part of it [kg] that a warm bottle would still deliver."""
 
     kind: str
     message: str
@@ -129,7 +129,7 @@ class Stretch:
 
 
 class Balance(NamedTuple):
-    """What crossed the border of bottle and wall from start to end, and how much more there is inside.
+    """Mass and energy that crossed the border of bottle and wall during the run, and the change inside.
 
     Crossed: gas [kg], its enthalpy [J], heat from the room [J]. Inside: mass [kg], energy of content and wall [J].
     """

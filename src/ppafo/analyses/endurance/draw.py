@@ -1,4 +1,4 @@
-"""How much gas a device takes in a stride, and how fast: from numbers, or from a recording."""
+"""Gas demand of a device per stride and per time: from numbers, or from a recording."""
 
 import math
 from dataclasses import dataclass

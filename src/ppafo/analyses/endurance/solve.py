@@ -1,4 +1,4 @@
-"""How long one bottle lasts for a gas use; for several uses side by side."""
+"""Duration of one bottle for one gas use, or for several side by side."""
 
 from collections.abc import Iterable
 from pathlib import Path

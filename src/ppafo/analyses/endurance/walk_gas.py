@@ -93,7 +93,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
 
 @dataclass(frozen=True, slots=True)
 class _WalkFile:
-    """What stands in the file of a walk, as plain data by dotted names."""
+    """Walk-result file as flat data, keyed by dotted path."""
 
     path: Path
     content: Mapping[str, Any]

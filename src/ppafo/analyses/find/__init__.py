@@ -1,1 +1,1 @@
-"""How low, or how high, may a value be so that a condition on a metric holds?"""
+"""Search for the lowest or highest value of a setting at which a condition on a metric holds."""

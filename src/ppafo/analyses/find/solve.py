@@ -35,7 +35,7 @@ _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
 class Search:
-    """What was tried so far: values, of each the metric, by what it is judged, and the spread over the noise."""
+    """Values tried so far; of each the metric, its judged value, and its standard deviation over the noise."""
 
     def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
         self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
@@ -165,7 +165,7 @@ class Outcome:
 
     @property
     def changes(self) -> int:
-        """How often the condition begins or ceases to be met along the values."""
+        """Number of times that the condition starts or ceases to be met along the values."""
         return int(np.count_nonzero(np.diff(self.is_met)))
 
     @property

@@ -1,1 +1,1 @@
-"""What do bench recordings say about the device, and how surely?"""
+"""Identification of a device from bench recordings: estimates, intervals and verdicts."""

@@ -49,7 +49,7 @@ class Identification:
 
     @property
     def is_good(self) -> bool:
-        """Whether recordings agree on their numbers and the new set makes a device."""
+        """Tell whether all recordings agree on their numbers and the new set makes a device."""
         is_fitted = self.trajectory is None or self.trajectory.is_good
         return is_fitted and not self.new_set.problem and not any(result.conflict for result in self.results)
 

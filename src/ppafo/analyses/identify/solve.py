@@ -1,4 +1,4 @@
-"""From a problem to a parameter set: read the recordings, apply the procedures in order, put the values in."""
+"""Identification of a parameter set from a problem file: reading, procedures in order, insertion of the values."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

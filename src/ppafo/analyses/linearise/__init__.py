@@ -1,1 +1,1 @@
-"""What is a scenario's plant near one point, as a linear model: A, B, C and D with names and units?"""
+"""Linear model of a scenario's plant at an operating point: A, B, C and D with names and units."""

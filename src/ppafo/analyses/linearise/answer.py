@@ -1,4 +1,4 @@
-"""What is said of a linear model: the point, the sides taken, the poles, the matrices, and how far it holds."""
+"""Report of a linear model: operating point, side of each limit, poles, matrices and range of validity."""
 
 import io
 from dataclasses import dataclass, replace
@@ -108,11 +108,11 @@ def _torque(model: LinearModel, command: float) -> Floats:
 
 _POINTS = 400
 _LOWEST_SHARE = 0.1
-"""Lowest frequency that is shown, over that of the slowest pole."""
+"""Lowest frequency shown, as a fraction of the slowest pole's [-]."""
 _HIGHEST_FREQUENCY = 100.0
 """Highest frequency [Hz] that is shown."""
 _DRAWN_STEPS = (-5, -1)
-"""Which of the steps are drawn over time: one in the middle of the three decades, and the largest."""
+"""Indices of the steps plotted over time: the middle of the three decades, and the largest."""
 _REAL = 1.0e-6
 """Imaginary part of a pole, over its size, up to which it is real."""
 _FREQUENCY = Kind("Frequency", "Hz")

@@ -40,7 +40,7 @@ class Edge:
 
 @dataclass(frozen=True, slots=True)
 class Delays:
-    """What the linear model leaves out [s]: dead time of the valve, age of measurements, sample period."""
+    """Delays that the linear model omits [s]: dead time of the valve, age of measurements, sample period."""
 
     command: float
     signals: float

@@ -179,7 +179,7 @@ def opens_in_proportion(run: Run) -> bool:
 LONGEST = 1.0e-2
 """Longest difference over the size of a number [-]."""
 SHORTER, LENGTHS = 4.0, 8
-"""How much shorter each next difference is [-], and how many there are: the shortest is some 1e-6 of the size."""
+"""Ratio of successive step lengths of the differences [-], and their number: the last is about 1e-6 of the size."""
 ORDERS = 5
 """Powers of the length of a difference that are taken out of its error."""
 

@@ -37,7 +37,7 @@ Slopes by differences agree to some 1e-9 where the plant has no kink.
 
 
 def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
-    """Which side of each limit the point lies on, in words by place; ``joint`` names what moves."""
+    """Side of each limit that the operating point is on, in words, by component; ``joint`` names what moves."""
     at, plant = point.values, run.plant
     openings = valve_at(run, functions_in(run), at).openings
     room, first, second = plant.atmospheric_pressure, at["pressure_1"], at["pressure_2"]
@@ -67,7 +67,7 @@ def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
 
 
 def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: float) -> str:
-    """How gas flows between two pressures [Pa]."""
+    """Flow regime between two pressures [Pa], in words."""
     if opening == 0.0:
         return "closed"
     ratio = min(pressure_a, pressure_b) / max(pressure_a, pressure_b)

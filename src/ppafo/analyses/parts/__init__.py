@@ -1,1 +1,1 @@
-"""Which real parts are there, and where does each figure come from?"""
+"""Catalogue of real parts, and the source of each figure."""

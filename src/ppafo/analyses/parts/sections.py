@@ -1,4 +1,4 @@
-"""What the findings of other analyses say of the parts of a device: which they are, and which figures to check.
+"""Report sections on the parts of a device for other analyses: the parts, and the figures to check.
 
 A doubtful figure is a pair of a part and the name of a figure of it that is quoted or assumed.
 """

@@ -1,1 +1,1 @@
-"""Which of the paper's claims hold when its experiments are run again, and which of other publications?"""
+"""Reproduction of the paper's experiments and of other publications: verdict on each claim."""

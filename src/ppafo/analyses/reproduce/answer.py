@@ -53,7 +53,7 @@ PROPORTIONAL = "torque-task-proportional"
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """What came of it: claims in the order of the paper, what the text tells, runs, assumptions and audit findings."""
+    """Result of a reproduction: claims in the paper's order, observations, runs, assumptions and audit findings."""
 
     claims: tuple[Claim, ...]
     step_observations: tuple[Observation, ...]

@@ -1,4 +1,4 @@
-"""What the simulations rest on, and synthetic recordings of the same experiments for the figures.
+"""Basis of the simulations, and synthetic recordings of the same experiments for the figures.
 
 What a synthetic recording shows says nothing about the paper's device, so that no claim rests on one.
 """

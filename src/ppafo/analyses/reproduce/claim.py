@@ -62,12 +62,12 @@ class Claim:
 
     @property
     def published(self) -> str:
-        """What the paper says, as it is shown."""
+        """Published value as text for display."""
         return self.words if self.paper is None else format_reported_quantity(self.paper, self.unit)
 
     @property
     def ours(self) -> str:
-        """What is found here, as it is shown."""
+        """Value found here as text for display."""
         return self.found or quantity(self.value, self.unit, 3)
 
     @property
@@ -87,12 +87,12 @@ _DOCUMENT = (
     *("id", "statement", "paper", "words", "value", "found", "range", "unit"),
     *("verdict", "assumptions", "source", "note"),
 )
-"""What ``claims.json`` has of a claim, in its order."""
+"""Fields of a claim in ``claims.json``, in order."""
 
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What the text tells, whether the simulated recording shows it, and the numbers that decide it.
+    """Statement of the paper's text, whether the simulated recording shows it, and the numbers that decide it.
 
     ``difference`` says what the recording shows beyond the sentence, where that is not what the paper tells.
     """

@@ -25,7 +25,7 @@ _BRANCHES = (
 _BOX, _HALF = 0.42, 0.21
 """Side of a square of a symbol."""
 _REGULATED, _TO_ACTUATOR = 2.25, 4.75
-"""Where the lines between regulators and valves, and between valves and actuator, are coupled."""
+"""Horizontal positions of the couplings between regulators and valves, and between valves and actuator."""
 
 
 def device_figure() -> "Figure":

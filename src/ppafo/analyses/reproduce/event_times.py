@@ -1,4 +1,4 @@
-"""How far a walking controller is off in time: the errors of event times on strides of uneven time."""
+"""Timing errors of a walking controller: detected gait events on strides of varying duration."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

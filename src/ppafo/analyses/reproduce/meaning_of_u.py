@@ -1,4 +1,4 @@
-"""What U of equation (13), the command of the proportional valve, may mean, and what each meaning makes of the task."""
+"""Interpretations of U in equation (13), the command of the proportional valve, and their effect on the task."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -8,7 +8,7 @@ from ppafo.metrics import Metric
 from ppafo.simulation.simulate import Result, simulate
 
 READINGS_OF_U = (("the opening, -1 to 1", 1.0), ("volts, 5 open the valve", 5.0), ("volts, 10 open the valve", 10.0))
-"""What U of equation (13) may be, and the U that opens the proportional valve fully."""
+"""Interpretations of U of equation (13), each with the U that opens the proportional valve fully."""
 WITHIN_REACH = 4.0
 """A level [N m] that the supply can hold."""
 _GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
@@ -16,7 +16,7 @@ _GAINS = ("proportional_gain", "integral_gain", "derivative_gain")
 
 @dataclass(frozen=True, slots=True)
 class InterpretationOfU:
-    """One meaning of U: by how much the proportional valve lowers RMS error and gas [%], and the error within reach."""
+    """Interpretation of U: reduction of RMS error and gas by the proportional valve [%], and the smallest error."""
 
     name: str
     error: float

@@ -36,7 +36,7 @@ Values = Mapping[str, str | float]
 
 @dataclass(frozen=True, slots=True)
 class Computation:
-    """How a number comes about: its SI unit, its arguments with their SI units, and the function."""
+    """Computation of a number: its SI unit, its arguments with their SI units, and the function."""
 
     unit: str
     arguments: Mapping[str, str]
@@ -218,7 +218,7 @@ class JudgedClaim:
 
     @property
     def published(self) -> str:
-        """What is published as it is shown, with its direction; empty where only own arithmetic is."""
+        """Published value as text with its direction; empty for a computation of our own."""
         entry = self.claim.entry
         number = "" if entry.published is None else format_reported_quantity(entry.published, entry.unit or "-")
         return f"up to {number}" if number and entry.direction == "maximum" else entry.words or number

@@ -1,4 +1,4 @@
-"""What the text tells of the step response, looked for in a recording. Works on measured recordings too.
+"""Statements of the paper's text on the step response, tested on a simulated or measured recording.
 
 The text (section 'PPAFO Model Validation', figure 7): pressure 1 rises until the vane breaks away, falls while the vane
 moves, then goes to the supply; pressure 2 falls, slows while chamber 2 is compressed, then goes to the atmosphere.
@@ -18,7 +18,7 @@ RESOLUTION = 1.0e-6
 """Smallest part of the travel that counts as motion in a simulated recording; a measured one needs more."""
 _SMALLEST_TRAVEL = 1.0e-3
 _FIRST_ANGLE, _LAST_ANGLE, _SAME_ANGLE = 20.0, 130.0, 0.5
-"""What figure 7 says [deg], and how near to it counts."""
+"""First and last angle of figure 7, and the tolerance for the same angle [deg]."""
 _CLEAR = 0.05
 _SAME = 0.01
 _NOTABLE_TIME = 2.0e-3
@@ -220,4 +220,4 @@ _SAID: dict[str, Callable[[_Step], tuple[bool, str] | tuple[bool, str, str]]] = 
     "pressure_2_goes_to_atmosphere": _to_atmosphere,
     "difference_builds_up": _builds_up,
 }
-"""What the text says, by its entry, and what judges it: whether it holds, the numbers, and what is seen beyond it."""
+"""Test of each statement of the text, by its entry: returns the verdict, the numbers, and further observations."""

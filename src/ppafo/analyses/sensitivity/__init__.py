@@ -1,1 +1,1 @@
-"""Which uncertain value matters? Sobol indices, Shapley effects, and the signed change of a metric."""
+"""Sensitivity of a metric to uncertain values: Sobol indices, Shapley effects and signed changes."""

@@ -20,7 +20,7 @@ SCRAMBLES = 8
 _INNER = 3
 """Draws of some values with the others held, for the variance that they leave (Song, Nelson and Staum, 2016)."""
 _SMALLEST = 2.0**-53
-"""Smallest fraction of a draw, whose normal score is finite, and so is that of the largest, 1 less it."""
+"""Smallest fraction of a draw: its normal score is finite, as is the score of 1 less it."""
 _ONE = 0.6827
 """Confidence of one standard deviation."""
 _NEAREST = 0.2
@@ -216,7 +216,7 @@ them (Owen, 2014). By random orders: each value gets what it adds to the varianc
 when all after it are held (Song, Nelson and Staum, 2016). Held values are drawn from the Gaussian copula.
 """
 METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
-"""To add a method: its design, its indices, and its value here."""
+"""Methods by name. To add a method: its design, its indices, and its value here."""
 
 
 def changes(evaluated: Evaluated, confidence: float) -> tuple[Floats, Floats]:

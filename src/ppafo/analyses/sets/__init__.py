@@ -1,1 +1,1 @@
-"""What a parameter set says of itself: its values with their sources, and where it contradicts itself."""
+"""Contents of a parameter set: values with their sources, and contradictions between them."""

@@ -1,4 +1,4 @@
-"""What parameter sets changed against their parents, and where they contradict themselves, in words and as data."""
+"""Audit of parameter sets: changes against their parents and contradictions, in words and as data."""
 
 import textwrap
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""What is in a parameter set, value by value."""
+"""Values of a parameter set, with unit, interval and source."""
 
 import textwrap
 from dataclasses import asdict

@@ -1,1 +1,1 @@
-"""How are the metrics of a study distributed over many runs, and how do they depend on what varies?"""
+"""Distributions of the metrics of a study over many runs, and their dependence on the varied values."""

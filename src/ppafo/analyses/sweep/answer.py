@@ -59,7 +59,7 @@ class _Failure(_Table):
 
 
 class _Summary(_Table):
-    """What everybody may rely on in a summary."""
+    """Guaranteed fields of a study summary."""
 
     completed: _Count
     diverged: _Count

@@ -19,9 +19,9 @@ _TASKS_PER_THREAD = 3
 _FEWEST_TASKS = 4
 """Tasks that wait there before the first worker has come."""
 _SECONDS_TO_ANSWER = 5
-"""How long a computer has to say that something listens there."""
+"""Time limit for a computer to accept a connection [s]."""
 _SECONDS_TO_CONNECT = 30
-"""How long a scheduler has to greet a client."""
+"""Time limit for a scheduler to greet a client [s]."""
 _OVER_SOCKETS = ("tcp://", "tls://", "ws://", "wss://")
 """Beginnings of addresses behind which something must listen; an address without any is one of TCP."""
 

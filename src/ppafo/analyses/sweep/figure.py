@@ -38,7 +38,7 @@ _MAXIMUM_POINTS = 3000
 """Runs of which a curve or the points of a panel are made."""
 _MEDIAN = 0.5
 _OPACITIES = (0.18, 0.32, 0.45)
-"""Of the bands of one channel, from the outermost to the innermost."""
+"""Opacities of the bands of one channel, from the outermost to the innermost."""
 _GRIDDED = ("grid", "list")
 """Kinds of ``[[vary]]`` that are crossed with each other."""
 _NAMED = 3
@@ -50,7 +50,7 @@ _CAPTION = (
 
 @dataclass(frozen=True, slots=True)
 class _Content:
-    """What a figure shows: metrics, channels with bands, configurations, and the paths that varied.
+    """Content of a figure: metrics, channels with bands, configurations, and the varied paths.
 
     ``varied`` are those whose size says something, without a seed; ``grid`` are those of a grid or a list.
     """
@@ -227,12 +227,12 @@ class _MapAxis:
 
     @property
     def shown_kind(self) -> Kind:
-        """What the places on the axis are: words alone for a list."""
+        """Kind of the tick values; for a list, words alone."""
         return Kind(self.kind.axis) if self.is_listed else self.kind
 
     @property
     def places(self) -> Floats:
-        """Where the cells of the values are."""
+        """Positions of the cells along the axis."""
         return np.arange(float(self.levels.size)) if self.is_listed else self.levels
 
     def mark(self, axis: "Axis", set_scale: "Callable[[str], None]") -> None:

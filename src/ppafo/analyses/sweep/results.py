@@ -67,7 +67,7 @@ class StudyResults:
 
     @property
     def metrics(self) -> Mapping[str, Mapping[str, Mapping[str, Any]]]:
-        """For each configuration and metric: unit, count, mean, standard deviation, extremes and quantiles."""
+        """Statistics by configuration and metric: unit, count, mean, standard deviation, extremes and quantiles."""
         metrics: Mapping[str, Mapping[str, Mapping[str, Any]]] = self.summary["configurations"]
         return metrics
 

@@ -94,9 +94,8 @@ def draw_until(
 ) -> Finding[Estimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
-    An interval that few draws determine is not trusted, however narrow it is: drawing continues. So does that of a mean
-    until what happens once in a thousand runs would have come, or there are no more draws: no interval from draws that
-    lack it could bound it.
+    A narrow interval from few draws is not trusted: drawing continues. For a mean it continues until an event of one
+    run in a thousand would have been drawn, or no draws are left: draws without it cannot bound its effect.
 
     Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
     StudyError.

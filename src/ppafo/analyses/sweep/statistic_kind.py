@@ -1,4 +1,4 @@
-"""What may be estimated of a metric: its mean, a quantile, a probability; each with its draws and its interval.
+"""Statistics of a metric: mean, quantile or probability, each with its draws and its confidence interval.
 
 A mean is estimated from randomised Sobol replicates, which know the mean of a smooth function far better than as many
 independent draws; its interval is never narrower than theirs, as nobody knows beforehand that no rare value decides.

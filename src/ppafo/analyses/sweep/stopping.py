@@ -81,7 +81,7 @@ def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingR
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What was seen after some draws: how many, how many of them without a value, and the interval [SI].
+    """Interim estimate: number of draws, number without a value, and the interval [SI].
 
     ``effective_size`` is how many of them determine the estimate: fewer than there are where a few large values decide.
     """

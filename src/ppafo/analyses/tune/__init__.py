@@ -1,1 +1,1 @@
-"""Which gains are best? A search over bounds, for a weighted objective with constraints, robust where requested."""
+"""Tuning of gains: bounded search for a weighted objective with constraints, robust where requested."""

@@ -80,7 +80,7 @@ class Robust(StrictTable):
 
 
 class Effort(StrictTable):
-    """How long is searched: independent starts, generations of each at most, candidates of a generation per gain."""
+    """Effort of the search: independent starts, most generations of each, candidates of a generation per gain."""
 
     starts: Annotated[int, Field(ge=1, le=100)] = 3
     generations: Annotated[int, Field(ge=1, le=100_000)] = 100
@@ -190,7 +190,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Problem:
-    """What is searched in a scenario, for what, and how long.
+    """Tuning problem: gains with bounds, objective, constraints and effort for one scenario.
 
     ``spread`` is None for the device as it is said to be, with sensors without noise.
     """

@@ -1,4 +1,4 @@
-"""What a tuning comes to: the gains before and after with their metrics, and where each start of the search ended."""
+"""Result of a tuning: gains and metrics before and after, and the end of each start of the search."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -13,7 +13,7 @@ from ppafo.simulation.simulate import Result
 from ppafo.studies.draws import Limit
 
 INFEASIBLE = 1.0e6
-"""Where the costs of candidates begin that break a constraint."""
+"""Lowest cost of a candidate that violates a constraint."""
 FRESH_DRAWS = 1024
 """Draws that the search never saw, over which the result is judged in the end."""
 _AS_GOOD = 0.01
@@ -22,7 +22,7 @@ _AS_GOOD = 0.01
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where one start ended: fractions of the way (gains,), cost, candidates tried, best cost of each generation.
+    """End of one start: fractions of the bounds (gains,), cost, candidates tried, best cost of each generation.
 
     ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
     """
@@ -102,7 +102,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Tuned:
-    """What a search came to; numbers in SI. ``starts`` are best first; ``runs`` counts all simulated runs.
+    """Result of a search, in SI units. ``starts`` are best first; ``runs`` counts all simulated runs.
 
     ``overrides`` make the tuned scenario of its file; ``bounds_reached`` are the gains that ended at a bound, and at
     which: a better one may lie beyond.

@@ -35,7 +35,7 @@ from ppafo.study.runs import FAILED, Runs, oscillating, settled
 _ANGLES = 9
 """Angles between the stops at which the torque of a joint that moves is looked for."""
 UNUSABLE = 1.0e12
-"""Where the costs of candidates begin of which a run fails; the fraction of such runs is added."""
+"""Lowest cost of a candidate with a failed run; the fraction of failed runs is added."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ class Judgement:
 
     @property
     def cost(self) -> Floats:
-        """One number by which candidates are compared."""
+        """Cost by which candidates are ranked."""
         # Deb's rules in one number, since SciPy compares nothing else.
         usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)

@@ -24,7 +24,7 @@ from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 # Panels of a validation: each channel of a recording with the model, and its residual below.
 
 KIND_WORDS = {"measured": "measured", "synthetic": "synthetic measurement", "simulated": "simulated, not measured"}
-"""What the recording is called beside the model: nobody may take a model's output for a measurement."""
+"""Name of the recording in the report: output of a model must not pass for a measurement."""
 MILLISECONDS = 1.0e3
 """Milliseconds of a second."""
 _LOOKS = {PRESSURE_1: CHAMBER_1, PRESSURE_2: CHAMBER_2}
@@ -137,7 +137,7 @@ def recording_names(files: Sequence[str]) -> list[str]:
 
 
 def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> Part:
-    """Return the errors of a recording in a table, with its panels; ``name`` is that of its files."""
+    """Section with the errors of one recording in a table, and its panels; ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
     late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
     replayed = (

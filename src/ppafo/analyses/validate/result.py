@@ -1,4 +1,4 @@
-"""What a validation comes to: agreement of each recording, causes of what is left, and the verdict in a sentence."""
+"""Result of a validation: agreement of each recording, causes of the remaining error, and the verdict in a sentence."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,1 +1,1 @@
-"""What does the device do for a wearer who walks: with it, without it, and as the healthy gait would have it?"""
+"""Effect of the device on a walking wearer: with it, without it, and against the healthy gait."""

@@ -1,4 +1,4 @@
-"""What a bottle adds to a walk: its facts, a remark, data, the file over the walk and its figure."""
+"""Bottle in the report of a walk: facts, remark, data, file over time and figure."""
 
 from collections.abc import Callable
 from functools import partial

@@ -1,4 +1,4 @@
-"""What the command ``ppafo walk`` has beside its question: the files to list, and where it writes by default."""
+"""Additions of the command ``ppafo walk`` to its question: list of walks, and default output folder."""
 
 from collections.abc import Mapping
 from pathlib import Path

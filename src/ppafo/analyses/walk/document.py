@@ -71,7 +71,7 @@ def walk_document(scenario: Scenario) -> dict[str, Any]:
 
 
 class ShownNumber(NamedTuple):
-    """How a table of a walk shows a number: its name, title, kind of quantity and digits behind the point."""
+    """Number in the table of a walk: name, title, kind of quantity and decimals."""
 
     name: str
     title: str
@@ -80,7 +80,7 @@ class ShownNumber(NamedTuple):
 
 
 WOULD_DRAG = "would drag"
-"""What is said of toes that would be in the ground."""
+"""Remark on toes that would penetrate the ground."""
 
 
 def number_texts(shown: ShownNumber, values: Iterable[float | str | None]) -> tuple[str | None, ...]:

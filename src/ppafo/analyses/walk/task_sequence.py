@@ -1,4 +1,4 @@
-"""What a task sequence adds to a walk: the table of its segments, remarks, data, files and pictures."""
+"""Task sequence in the report of a walk: table of its segments, remarks, data, files and pictures."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, fields

@@ -1,4 +1,4 @@
-"""From bench to model: recordings of a bench, real or simulated, a parameter set from them, and how well it agrees."""
+"""Bench commands: recordings of a bench, real or simulated, a parameter set from them, and its agreement with them."""
 
 from __future__ import annotations
 

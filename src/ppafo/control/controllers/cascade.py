@@ -111,7 +111,7 @@ class CascadeState(NamedTuple):
 
 
 SMOOTHING = 8.0
-"""How much slower the filter on the reference's acceleration is than the one on the measured rate: it may jump."""
+"""Time constant of the filter on the reference's acceleration over the rate filter's [-]: the reference may jump."""
 SLOW = 0.05
 """rad/s: rate of the joint that is asked for from which on all of the friction is made up for."""
 SHARE_OF_FRICTION = 0.7

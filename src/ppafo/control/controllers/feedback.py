@@ -113,7 +113,7 @@ class SlidingModeParameters(NamedTuple):
 
 
 class SlidingModeState(NamedTuple):
-    """What a sliding mode law remembers: the integral of the torque error [N m s]."""
+    """State of a sliding-mode law: integral of the torque error [N m s]."""
 
     integral: float
 

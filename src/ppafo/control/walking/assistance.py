@@ -116,11 +116,11 @@ class TorqueRequest(NamedTuple):
 
 
 class Assessment(NamedTuple):
-    """What a controller makes of one sample, before its law answers."""
+    """Assessment of one sample by a walking controller, before its law computes the command."""
 
     phase: PhaseState
     clock: Any
-    """What the timing remembers, by its kind."""
+    """State of the timing, by its kind."""
     time: GaitTime
     """The gait phase as a time."""
     safety: SafetyState
@@ -132,11 +132,11 @@ class Assessment(NamedTuple):
 
 
 class AssistingParameters(Protocol):
-    """What the parameters of every law of walking have in which a torque is requested by phases."""
+    """Parameters common to all walking laws that request a torque by gait phase."""
 
     @property
     def assistance(self) -> Assistance:
-        """What torque is requested."""
+        """Requested torque by gait phase."""
 
     @property
     def phases(self) -> PhaseRules:
@@ -148,11 +148,11 @@ class AssistingParameters(Protocol):
 
     @property
     def timing(self) -> Any:
-        """How the gait phase is known."""
+        """Parameters of the gait-phase estimation."""
 
 
 class AssistingState(Protocol):
-    """What the state of every law of walking has in which a torque is requested by phases."""
+    """State common to all walking laws that request a torque by gait phase."""
 
     @property
     def phase(self) -> PhaseState:
@@ -164,7 +164,7 @@ class AssistingState(Protocol):
 
     @property
     def clock(self) -> Any:
-        """What the timing remembers."""
+        """State of the timing."""
 
     @property
     def request(self) -> TorqueRequest:

@@ -36,7 +36,7 @@ EVEN = 0.05
 
 
 KEEPS = 0.2
-"""How far a detected strike moves the clock once a stride is learnt: so both cannot drift away together."""
+"""Correction of the clock per detected strike once a stride is learnt [-]: the two cannot drift apart."""
 
 
 class EstimationRules(NamedTuple):

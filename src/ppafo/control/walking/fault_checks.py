@@ -1,4 +1,4 @@
-"""What readings of a walk can be, what is remembered of them, and the fault flags that they raise by themselves.
+"""Plausible ranges of a walk's readings, the state of their checks, and the fault flags that they raise.
 
 A reading raises a flag where it is out of range, lost, frozen while others change, or late. That forces are late is
 seen at the ankle: a foot on its heel turns down until it is flat, and up from then on. A foot that has turned up before
@@ -31,7 +31,7 @@ from ppafo.model.sensors import GaitMeasurement
 
 
 class SafetyRules(NamedTuple):
-    """What readings can be, and how long a contradiction may last.
+    """Plausible ranges of readings, and the longest duration of a contradiction.
 
     Force [N], angles [rad], times in stride times (``longest_phase``, ``flat_from``, ``flat_to``, ``shortest_swing``)
     or [s], strides, and absolute pressures [Pa]. ``fill_time`` holds for a valve fully open; half open it takes twice
@@ -95,7 +95,7 @@ class SafetyRules(NamedTuple):
 
 
 SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *NOMINAL_QUANTITIES)
-"""What a walk says of the checks, and then of the device that the observer believes."""
+"""Settings of the checks in a walk file, followed by the nominal device of the observer."""
 
 
 class LastReadings(NamedTuple):
@@ -169,7 +169,7 @@ IN_TIME = 0.06
 time: between both nothing is known. A dropped foot that nobody pushes turns down in the air too, but more slowly."""
 
 GONE = 0.1
-"""What is left of a force that is gone, as a fraction of ``largest_drop``."""
+"""Residual of a force that is lost, as a fraction of ``largest_drop``."""
 
 QUICK_PERIOD = 0.005
 """Sample period [s] above which a force may be gone within a sample: toes leave the ground in some 0.1 s."""
@@ -230,7 +230,7 @@ HALF = 0.5
 
 
 def time_unchanged(last: float, reading: float, since: float, moves: bool, period: float) -> float:
-    """How long a reading has been the same to the last bit [s] while something else ``moves``."""
+    """Time for which a reading has been bitwise constant [s] while another quantity ``moves``."""
     # Equal to the last bit: a live sensor has noise, or at least moves by a step.
     kept = since + period if moves else since
     return kept if reading == last else 0.0
@@ -286,7 +286,7 @@ def next_readings(
 
 
 def next_thin(last: float, measurement: GaitMeasurement, period: float) -> float:
-    """How long the lower pressure has been below ``THIN`` [s]."""
+    """Time for which the lower pressure has been below ``THIN`` [s]."""
     return last + period if min(measurement.pressure_1, measurement.pressure_2) < THIN else 0.0
 
 

@@ -1,4 +1,4 @@
-"""What each chamber should hold, by command, measured angle and the nominal device; and what contradicts it.
+"""Observer of the chamber contents from command, measured angle and nominal device, and the contradictions it finds.
 
 The gas content of a chamber is p V, its mass times R T, which no movement of the ankle changes: a residual in pressure
 would grow without bounds where a foot squeezes a chamber at its stop, the gas content stays. So from sample to sample
@@ -70,7 +70,7 @@ _CHAMBERS = {
     "dead_volume_1": "chamber_rest_1",
     "dead_volume_2": "chamber_rest_2",
 }
-"""Of the chambers the observer believes more than a law does, which knows a vane of their mean size only."""
+"""Settings of both chambers for the observer; a torque law knows a vane by its mean chamber only."""
 
 
 def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
@@ -125,7 +125,7 @@ NOMINAL_QUANTITIES = (
 
 
 class Coil(NamedTuple):
-    """One on/off valve: where the flow is (0 or 1) and where it goes, since when, and in what time [s] it is there."""
+    """On/off valve: present flow (0 or 1), commanded flow, time since the command, and switching time [s]."""
 
     position: float
     target: float
@@ -206,8 +206,7 @@ A chamber that does not vent at all keeps 0.6 of what passed lately, for what is
 """
 
 OFFSET, OF_PRESSURE, OF_ANGLE = 1.2e4, 0.05, 0.035
-"""Errors of a pressure that offset, step and noise explain [Pa], that a regulator explains [fraction of it], and of an
-angle [rad], 2 deg, which is one of the volume."""
+"""Tolerances: pressure by offset and noise [Pa], by a regulator [fraction], angle for the volume [rad], 2 deg."""
 
 ALARM_TIME, ALARM_SAMPLES = 5.0e-3, 5.0
 """Time [s], and samples, that a residual lasts before it counts."""
@@ -331,8 +330,8 @@ def contradiction(
 ) -> float:
     """Residual of a chamber over what devices, sensors and heat explain [-]: above 1 too much gas, below -1 too little.
 
-    Gas that has ``passed`` lately [J], volumes now and in the mean [m^3], pressures [Pa]: read, expected, and that of
-    the ``supply``, which counts where the chamber is ``fed``.
+    ``passed`` is the gas of the last seconds [J]; volumes [m^3] are present and mean ones, pressures [Pa] are measured,
+    expected, and of the ``supply``, which counts where the chamber is ``fed``.
     """
     at_rest = mean_volume * (OFFSET + OF_PRESSURE * abs(measured))
     at_rest = at_rest + OF_ANGLE * nominal.nominal_displacement_per_radian * abs(measured)
@@ -588,5 +587,5 @@ def found_cause(
 
 
 def pressure_above(nominal: NominalDevice, expected: float) -> float:
-    """By how much [Pa] a chamber may show more than the atmosphere, by the gas expected in it; 0 when off."""
+    """Largest expected gauge pressure of a chamber [Pa], by its expected gas; 0 when off."""
     return max(expected - nominal.nominal_atmospheric_pressure, 0.0) if nominal.nominal_flow > 0.0 else 0.0

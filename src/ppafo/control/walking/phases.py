@@ -1,4 +1,4 @@
-"""Where a controller believes the wearer to be: heel strike, mid-stance, push-off or swing, from two force sensors.
+"""Detection of the gait phase from two force sensors: heel strike, mid-stance, push-off or swing.
 
 Each sensor is loaded above one threshold and unloaded below another (hysteresis), and a change counts only when it has
 lasted (debounce). The time between two heel strikes is followed by a moving average. The push-off begins at a fraction

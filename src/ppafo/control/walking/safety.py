@@ -24,7 +24,7 @@ from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 
 
 class ValveTimes(NamedTuple):
-    """How long the valve has been commanded to fill chambers 1 and 2, by its opening, and to vent both [s]."""
+    """Times for which the valve is commanded to fill chambers 1 and 2, weighted by opening, and to vent both [s]."""
 
     filling_1: float
     filling_2: float
@@ -32,7 +32,7 @@ class ValveTimes(NamedTuple):
 
 
 class Stance(NamedTuple):
-    """Whether heel and toes were loaded (1) since the strike, how long [s] both have been, and only one on the ground.
+    """Loading of heel and toes since the strike (1 if loaded), time with both on the ground, and with only one [s].
 
     Both times end where the other one begins; the second one ends in the swing too. ``flat_angle`` [rad] is the ankle
     angle while the heel carried last, 0 before the first sample; ``turned`` is 1 once the ankle has left it.
@@ -123,7 +123,7 @@ RESTS = 0.05
 that steps has turned by more before its toes leave the ground."""
 
 ROLLS = 0.33
-"""Of the largest force in a stance, that toes carry more than the heel before they leave the ground: 0.98 and more on
+"""Fraction of the largest force by which toes carry more than the heel before they leave the ground: 0.98 and more on
 recorded gaits, for the heel is off the ground by then. Two channels that read one sensor have 0, swapped ones less
 than 0, toes that show 0.8 of the heel 0.3."""
 
@@ -353,7 +353,7 @@ def monitor(
 
 
 def feed_time(since: float, opening: float, period: float) -> float:
-    """How long a chamber has been fed [s], weighted by the opening towards it; 0 where the valve does not feed it."""
+    """Time for which a chamber has been supplied [s], weighted by its opening; 0 if the valve does not supply it."""
     return since + opening * period if opening > MINIMUM_OPENING else 0.0
 
 

@@ -55,7 +55,7 @@ class ThresholdRules(NamedTuple):
 
 
 class ThresholdClock(NamedTuple):
-    """What a timing by thresholds of the forces remembers beside the phases: nothing."""
+    """State of a timing by force thresholds beside the phases: empty."""
 
 
 def follow_thresholds(
@@ -123,7 +123,7 @@ TOES_OFF = 3.0
 
 
 class Delays(NamedTuple):
-    """How fast the force grows or fades at each event [N/s], and lags of force sensor and valve [s]."""
+    """Rates at which the force rises or falls at each event [N/s], and lags of force sensor and valve [s]."""
 
     heel_loading_rate: Annotated[
         float, Number("N/s", "how fast the heel is loaded after its strike", 5.6e3, 100.0, 1.0e6)
@@ -153,7 +153,7 @@ class Delays(NamedTuple):
 
 
 class Events(NamedTuple):
-    """One number for each event of a stride: heel strike, toes on the ground, heel off, toes off."""
+    """Number for each event of a stride: heel strike, toes on the ground, heel off, toes off."""
 
     strike: float
     toes_on: float
@@ -196,7 +196,7 @@ CLOCK_START = GaitClock(
 
 
 def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> Events:
-    """How long after each event it is detected [s]; below 0 where the force fades below its threshold before.
+    """Delay of the detection of each event [s]; negative if the force falls below its threshold before the event.
 
     A first-order sensor follows a ramp late by its time constant; an event falls half a sample before its sample.
     """
@@ -328,7 +328,7 @@ def next_strides(
 
 
 def paced(strides: Strides, seen: Events, found: Events, come: Events, weight: float) -> Strides:
-    """What the stride that has begun will take, after its heel or its toes have left the ground early or late.
+    """Predicted duration of the present stride, corrected by an early or late heel-off or toe-off.
 
     ``found`` are the fractions of the mean stride at which they did, ``come`` the fractions of recent strides.
     """

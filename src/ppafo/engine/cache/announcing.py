@@ -1,4 +1,4 @@
-"""What a user hears of compiling: that it takes long, about how long, and how it ended."""
+"""Progress messages of compilation: that it is slow, its expected duration, and its end."""
 
 import contextlib
 import logging

@@ -1,4 +1,4 @@
-"""Where compiled programs are kept, and whether another user could put something there that would run."""
+"""Cache folder of compiled programs, and protection against code that another user could put into it."""
 
 import contextlib
 import os

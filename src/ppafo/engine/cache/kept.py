@@ -37,7 +37,7 @@ class Wanted:
         return f"ppafo_{self.compiler.name}_{self.compiler.effort.name.lower()}_{digest}"
 
     def place(self, folder: Path) -> Path:
-        """Where it is kept."""
+        """Path of the cached file in ``folder``."""
         return folder / f"{self.name}-{short_hash(self.compiler.identity())}"
 
     def compile(self, path: Path) -> ModuleType:

@@ -1,4 +1,4 @@
-"""How a program is compiled and kept: aside, by one process while others wait, with a word where it takes long."""
+"""Compilation into the cache: into a temporary file, by one process while others wait, announced where it is slow."""
 
 import contextlib
 import hashlib

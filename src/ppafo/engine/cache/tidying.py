@@ -1,4 +1,4 @@
-"""What lies in the cache folder, and how it goes again: by itself, or when a user clears it."""
+"""Contents of the cache folder, and their removal: automatic, or when a user clears it."""
 
 import contextlib
 import os

@@ -1,1 +1,1 @@
-"""One step of the lane scheme, as pure functions: every choice a select, no power, no library function but sqrt."""
+"""Formulas of one step of the lane scheme: pure functions with selections only, no powers, no library call but sqrt."""

@@ -89,7 +89,7 @@ def begin_shaped_gas(
 
 
 def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
-    """What a program with this actuator calls in place of the vane's functions; nothing for the vane."""
+    """Replacements of the vane's functions in a program with this actuator; empty for the vane."""
     if actuator is VANE:
         return {}
     return {
@@ -145,5 +145,5 @@ Seen = TypeVar("Seen", Measurement, GaitMeasurement)
 
 
 def measurement_of(actuator: ActuatorModel, plant: Any, seen: Seen) -> Seen:
-    """What the sensors show, with the torque that the actuator would have at the angle and pressures shown."""
+    """Sensor readings with the torque of the actuator at the measured angle and pressures."""
     return seen._replace(torque=actuator.torque(plant, seen.angle, seen.pressure_1, seen.pressure_2))

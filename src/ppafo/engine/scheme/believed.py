@@ -1,4 +1,4 @@
-"""What the observer of a walk believes of the chambers of an actuator that is no vane: those of its kind.
+"""Chamber volumes that a walking observer assumes for an actuator other than the vane: those of its kind.
 
 Its settings say how far they are from the device's: by the dead volumes, and by the mean growth with the angle.
 """
@@ -41,7 +41,7 @@ def kind_mean_volumes(
 
 
 def links_of_observer(actuator: ActuatorModel) -> dict[Any, Any]:
-    """What an observer calls in place of its own functions; nothing for the vane."""
+    """Replacements of an observer's functions; empty for the vane."""
     return {} if actuator is VANE else {believed_volumes: kind_volumes, mean_volumes: kind_mean_volumes}
 
 

@@ -1,4 +1,4 @@
-"""One step of the vane, unconstrained between its stops or with a prescribed angle, with the gas in the chambers.
+"""Step of the vane, unconstrained between its stops or with a prescribed angle, with the gas in the chambers.
 
 Order of a free step: the angle is predicted with the present acceleration; the gas runs with volumes that lead to the
 predicted angle; the angular velocity follows from the trapezoidal rule with the new pressures. What ends or starts
@@ -86,7 +86,7 @@ LOWEST_REBOUND = 1.0e-7
 """Height over the range of the angle below which a rebound is none."""
 
 
-class Friction(NamedTuple):
+class FrictionTorques(NamedTuple):
     """Sizes of the friction torque [N m]: the largest at rest, and in motion."""
 
     at_rest: float
@@ -102,7 +102,7 @@ class Departure(NamedTuple):
 
 
 class FreeStep(NamedTuple):
-    """Where a free step would lead: angle without stops [rad], acceleration [rad/s^2], driving torque now [N m]."""
+    """Predicted free step: angle without stops [rad], acceleration [rad/s^2], driving torque now [N m]."""
 
     free_angle: float
     acceleration: float
@@ -142,7 +142,7 @@ class PartSlide(NamedTuple):
     """
 
     torque: float
-    friction: Friction
+    friction: FrictionTorques
     angular_velocity: float
     departs: float
 
@@ -189,16 +189,23 @@ def time_to_stop(distance: float, angular_velocity: float, acceleration: float) 
     return 2.0 * distance / max(angular_velocity + math.sqrt(reach), 1.0e-30)
 
 
-def friction_now(plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float) -> Friction:
+def friction_now(
+    plant: PlantParameters, angular_velocity: float, pressure_1: float, pressure_2: float
+) -> FrictionTorques:
     """Sizes of friction [N m] at an angular velocity [rad/s] and two absolute pressures [Pa]. Equation (10)."""
-    return Friction(
+    return FrictionTorques(
         at_rest=friction_at_rest(plant.static_torque, pressure_1, pressure_2),
         in_motion=friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2),
     )
 
 
 def depart(
-    plant: PlantParameters, departure: Departure, torque: float, next_torque: float, friction: Friction, step: float
+    plant: PlantParameters,
+    departure: Departure,
+    torque: float,
+    next_torque: float,
+    friction: FrictionTorques,
+    step: float,
 ) -> tuple[float, float]:
     """Angle and angular velocity at the end of a step whose last part begins with ``departure``.
 
@@ -239,7 +246,7 @@ def depart(
 def begin_part(
     plant: PlantParameters, state: PlantState, added_torque: float, longest: float
 ) -> tuple[FreePart, float]:
-    """Where a part of a step of at most ``longest`` [s] leads an unconstrained vane, and its length [s], up to a stop.
+    """Predicted part of a step of an unconstrained vane, up to ``longest`` [s] or to a stop, and its length [s].
 
     So the gas works against the motion that happens. A vane at rest whose torque is above static friction slides.
     ``added_torque`` [N m] is the leg's at the beginning, beside the plant's own.
@@ -272,7 +279,7 @@ def begin_part(
 def slide_part(
     plant: PlantParameters, state: PlantState, begun: FreePart, added_torque: float, length: float
 ) -> tuple[PartSlide, PartEnd]:
-    """Where a part leads an unconstrained vane that slides on or stays at rest.
+    """End of a part of a step for an unconstrained vane that slides on or stays at rest.
 
     ``state`` has the new gas and the motion of the begin; ``added_torque`` [N m] is the leg's at the end, where the
     part would lead without reversal.
@@ -360,7 +367,7 @@ def first_event(
     full_velocity: float,
     step: float,
 ) -> Departure:
-    """Where the rest of a step begins: at a stop, at a reversal, or, for a vane at rest, at once.
+    """Start of the remainder of a step: at a stop, at a reversal, or, for a vane at rest, at once.
 
     ``free_angle`` [rad] and ``full_velocity`` [rad/s] are what the whole step would lead to without the event.
     """
@@ -384,7 +391,7 @@ def first_event(
 def begin_free(
     plant: PlantParameters, state: PlantState, held: HeldChambers, added_torque: float, step: float
 ) -> FreeStep:
-    """Where one step [s] would lead a vane that is unconstrained between its stops. Equations (1), (2), (10).
+    """Predicted step [s] of a vane that is unconstrained between its stops. Equations (1), (2), (10).
 
     ``added_torque`` [N m] drives the vane beside the actuator at the beginning of the step, gravity in it.
     """

@@ -1,4 +1,4 @@
-"""One step of both chambers: two-stage L-stable Rosenbrock method on the two masses.
+"""Step of both chambers: two-stage L-stable Rosenbrock method on the two masses.
 
 The method is ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), gamma = 1 - 1/sqrt(2), with
 the exact Jacobian and the time derivative that comes from the moving volumes, which run linearly through the step.
@@ -138,7 +138,7 @@ MINIMUM_PRESSURE = 0.02
 
 
 class GasChange(NamedTuple):
-    """What one step adds to both chambers, to the gas drawn from the source and to the vane leak (1 to 2) [kg]."""
+    """Change over one step of both chambers, of the gas drawn from the source and of the vane leak (1 to 2) [kg]."""
 
     mass_1: float
     mass_2: float

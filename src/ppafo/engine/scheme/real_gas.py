@@ -32,7 +32,7 @@ class RealGas(NamedTuple):
 
 
 class RealChange(NamedTuple):
-    """What one step adds: as ``GasChange`` [kg], and to the gas contents of both chambers [kg]."""
+    """Change over one step: fields of ``GasChange`` [kg], and of the gas contents of both chambers [kg]."""
 
     gas: GasChange
     content_1: float

@@ -1,4 +1,4 @@
-"""One step of both chambers with the lines that feed them: both gas schemes with supply pressures that change.
+"""Step of both chambers with their supply lines: both gas schemes with supply pressures that change.
 
 The stages of ``pneumatics`` keep their second order with any matrix: this one says that a line loses
 what its chamber gains, so that a chamber that has come to the pressure of a small line asks for no small step. The

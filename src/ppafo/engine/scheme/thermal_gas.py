@@ -1,4 +1,4 @@
-"""One step of both chambers with an energy balance: the Rosenbrock method of ``pneumatics`` on energies and masses.
+"""Step of both chambers with an energy balance: the Rosenbrock method of ``pneumatics`` on energies and masses.
 
 The energy of a chamber is counted as its gas content, ``P V M / (R T_0)`` [kg]: the mass that would give its pressure
 at the reference temperature. Content over true mass is ``T / T_0``. Gas comes from the source and from the atmosphere
@@ -109,7 +109,7 @@ class Transport(NamedTuple):
 
 
 def transport(thermal: ThermalParameters, flow: float, root_from: float, root_to: float) -> Transport:
-    """What a flow carries, by the sign of its direction; roots of ``T / T_0`` on both sides [-]."""
+    """Mass and enthalpy carried by a flow, by its direction; roots of ``T / T_0`` on both sides [-]."""
     root = root_from if flow >= 0.0 else root_to
     return Transport(mass_flow_ratio(root), enthalpy_flow_ratio(root, thermal.heat_capacity_ratio))
 
@@ -123,7 +123,7 @@ NEARLY_EQUAL = 1.0e-4
 def steeper_transport(
     thermal: ThermalParameters, flow: float, turns: float, root_from: float, root_to: float
 ) -> Transport:
-    """What a flow [kg/s] carries; of the side that carries more, where it is below the one at which it may turn.
+    """Transport of a flow [kg/s]; below ``turns``, where it may reverse, the larger value of both sides.
 
     Cold gas that leaves a settled chamber would turn into warm gas that enters, more of it than the matrix knows: a
     matrix that is too steep damps that, one that is too flat makes it grow from step to step.
@@ -208,7 +208,7 @@ def flow_slopes(
     near_2: float,
     at: WarmChambers,
 ) -> FlowSlopes:
-    """How all flows respond to both contents; weights are gamma h times how pressure follows content [Pa s/kg].
+    """Derivatives of all flows by both contents; weights are gamma h times pressure per content [Pa s/kg].
 
     ``near_1`` and ``near_2`` [Pa] are differences of pressure below which a flow may turn.
     """

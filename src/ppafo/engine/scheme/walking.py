@@ -1,4 +1,4 @@
-"""One step of a leg that walks with the device: the free foot, the foot on the ground, and the change between them.
+"""Step of a leg that walks with the device: foot free or on the ground, and the transition between them.
 
 First the torques on the ankle beside actuator, friction and damping: wearer, ground, foot and foot plate.
 """
@@ -27,7 +27,7 @@ from ppafo.model.ports import friction_in_motion
 
 
 class DeviceShare(NamedTuple):
-    """What the foot plate and the vane add to the leg: inertia [kg m^2], damping [N m s/rad], mass moment [kg m].
+    """Contribution of foot plate and vane to the leg: inertia [kg m^2], damping [N m s/rad], mass moment [kg m].
 
     The last is mass times distance from the ankle. They turn with the foot, so the shank's motion moves them too:
     equation (1) holds for a shank at rest. The plant of a walking leg carries the sums of leg and device, and no
@@ -107,7 +107,7 @@ def torque_of_body_on_foot(
 
 
 class WalkState(NamedTuple):
-    """Where the foot stands, the gait and the foot's direction now, what the wearer gets, and totals since the start.
+    """State of the walk: ground contact, gait and foot direction now, assistance, and totals since the start.
 
     ``contact`` as in ``model.contact``; ``offset`` [rad] of the ankle to what the ground prescribes;
     ``external_torque`` T_ex [N m]; forces that the sensors show [N]; ``toes_first`` 1 in a stride that began with the
@@ -165,7 +165,7 @@ def begin_walk(
     next_gait: GaitNow,
     step: float,
 ) -> WalkStep:
-    """Where one step [s] leads the foot, by its own dynamics and by the ground; ``carried`` is at its beginning."""
+    """Predicted step [s] of the foot, free and on the ground; ``carried`` is its load at the start of the step."""
     torque = torque_with_carried(leg, walk.contact, walk.now, timing.ground_angle, state.angle, carried)
     free = begin_free(plant, state, held, torque, step)
     # The difference fades implicitly, so that a step longer than the fading time does not overshoot.
@@ -226,7 +226,7 @@ def reach_end(
     ahead: HeldChambers,
     step: float,
 ) -> tuple[WalkEnd, CarriedFoot]:
-    """Where the step [s] ends, unless an event inside it leads elsewhere; arguments as ``end_walk`` has them.
+    """End of a step [s] without an event inside it; arguments as in ``end_walk``.
 
     ``ahead`` is of the chambers where the gas took the vane to be then.
     """

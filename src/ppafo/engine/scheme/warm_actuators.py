@@ -1,6 +1,6 @@
 """Gas with an energy balance in chambers of any actuator: what a program calls in place of the vane's functions.
 
-A chamber's volume follows angle and pressure, and the energy balance is that of ``thermal_gas``.
+A chamber's volume follows angle and pressure, and the energy balance is the one of ``thermal_gas``.
 """
 
 from ppafo.engine.scheme.pneumatics import SHORTEST

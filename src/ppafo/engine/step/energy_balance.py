@@ -39,7 +39,7 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
 
 
 def chambers(parts: Program, lane: Lane) -> ThermalGas:
-    """What the first stage found of both chambers; lines have more around it."""
+    """First stage of both chambers, with or without supply lines."""
     return lane.thermal_gas if parts.feed is None else lane.fed_thermal_gas.chambers
 
 

@@ -10,7 +10,7 @@ from ppafo.model.regulator import LineState, SupplyLines
 
 
 def groups(parts: Program) -> Groups:
-    """Groups of a lane: lines and regulators, the first stage with that of the gas, and lines at the end of a part."""
+    """Groups of a lane: supply lines with their regulators, first stage with the gas, lines at the end of a part."""
     return {
         "lines": given(SupplyLines),
         "line_state": kept(LineState),

@@ -29,10 +29,10 @@ class Lanes(Protocol):
         """Give it to those that had nothing left of their step."""
 
     def traces(self, index: int, trace_every: int) -> bool:
-        """Whether a sample is traced."""
+        """Tell whether a sample is traced."""
 
     def slot(self, index: int, trace_every: int) -> int:
-        """Where its trace is kept: one with less room than samples keeps the last."""
+        """Index of a sample in the trace, a ring that keeps the last samples."""
 
 
 def advance(

@@ -1,4 +1,4 @@
-"""What a recording would have at a sample, for meters and traces, which stand where nothing is recorded."""
+"""Samples for meters and traces: the channels of a recording, where nothing is recorded."""
 
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane
@@ -22,7 +22,7 @@ from ppafo.signals.meter import (
 
 NO_FOOT = FootSample(**dict.fromkeys(FootSample._fields, 0.0))
 NO_STRIDE = StrideSample(**dict.fromkeys(StrideSample._fields, 0.0))
-"""What a sample has where there is no foot on the shank of a gait, or nothing walks."""
+"""Stride of a sample without a foot on the shank of a gait, or without a walk."""
 
 
 def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval: float) -> None:
@@ -92,7 +92,7 @@ def foot_of(parts: Program, lane: Lane, time: float) -> FootSample:
 
 
 def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> StrideSample:
-    """Where a walk is in its stride; zeros where nothing walks."""
+    """Stride of a walk at a sample; zeros without a walk."""
     if parts.leg is None:
         return NO_STRIDE
     return StrideSample(
@@ -112,7 +112,7 @@ def stride_of(parts: Program, lane: Lane, number: int, interval: float) -> Strid
 
 
 def origin_of(parts: Program, lane: Lane) -> float:
-    """Where the size of a reference counts from: no torque, or where the run begins with what else is controlled."""
+    """Origin of the reference's size: zero torque, or the initial value of another controlled quantity."""
     if parts.controlled == TORQUE:
         return 0.0
     pressure_1, pressure_2 = present_pressures(parts, lane)
@@ -135,7 +135,7 @@ def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> No
 
 
 def look_for_hold(parts: Program, lane: Lane, interval: float, index: int) -> None:
-    """Where the hold begins, looked for from the end."""
+    """Search for the start of the hold, backwards from the end."""
     value = reference_at(parts, lane, index * interval * lane.timing.step)
     is_last_away = lane.course.hold_start == 0.0 and is_away(value, lane.course.last, lane.course.tolerance)
     hold_start = index + 1.0 if is_last_away else lane.course.hold_start

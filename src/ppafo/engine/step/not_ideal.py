@@ -18,7 +18,7 @@ IN_SHAPES: Mapping[Any, Any] = {}
 
 ends, first_flows = isothermal.ends, isothermal.first_flows
 error, shift_error = isothermal.error, isothermal.shift_error
-"""What the first stage leads to, and its errors, are as in an ideal gas."""
+"""Error estimates of the first stage, as for an ideal gas."""
 
 
 def groups(parts: Program) -> Groups:

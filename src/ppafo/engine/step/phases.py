@@ -12,6 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.step import stated
 from ppafo.engine.step.lane import Lane, Now
+from ppafo.model.actuators.vane import chambers
 from ppafo.model.plant import PlantParameters, chamber_pressures
 from ppafo.model.ports import at_valve, shown_signals
 
@@ -55,7 +56,7 @@ def command_of(parts: Program, lane: Lane, now: Now) -> float:
 
 
 def hold_chambers(parts: Program, lane: Lane) -> None:
-    """What a step is handed by the one before, where there was none; for a locked vane it lasts for all steps."""
+    """Chamber factors (pressure per mass) before the first step; constant for a locked vane."""
     lane.held = pneumatics.held_chambers(lane.plant, lane.state.angle)
 
 
@@ -218,7 +219,7 @@ def torque_of_leg(parts: Program, lane: Lane, time: float, angle: float) -> floa
 
 
 def slide(parts: Program, lane: Lane, now: Now) -> None:
-    """Where the vane comes if it slides on or stays at rest."""
+    """End of the part if the vane slides on or stays at rest."""
     length = length_of(parts, lane)
     parts.gas.add(parts, lane)
     end = time_of(parts, lane, now) + length
@@ -229,7 +230,7 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def depart(parts: Program, lane: Lane) -> None:
-    """Where it comes if it turns or begins to move: few do."""
+    """End of the part if the vane reverses or starts to move: rare."""
     parts.gas.add(parts, lane)
     length = length_of(parts, lane)
     lane.moved = motion.depart_part(lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length)
@@ -251,7 +252,7 @@ def finish(parts: Program, lane: Lane, now: Now) -> None:
         stated.advance(parts, lane, command_of(parts, lane, now), length)
     taken, follows = True, True
     if parts.is_adaptive:
-        missed = error_of(parts, lane, now)
+        missed = 0.0 if parts.rests_whole and rests(parts, lane) else error_of(parts, lane, now)
         # A part with a mass below 0 or NaN counts as the worst error, and is done again, shorter.
         error = missed / lane.timing.tolerance if has_gas(parts, lane) else motion.MAXIMUM_ERROR
         # A run that has failed is carried to its end without more parts, so that its lane holds nobody up.
@@ -306,6 +307,17 @@ def error_of(parts: Program, lane: Lane, now: Now) -> float:
     return missed
 
 
+def rests(parts: Program, lane: Lane) -> bool:
+    """True where a joint that is led stands still in a step, and its chambers are slow enough for a whole one."""
+    room = lane.plant.atmospheric_pressure
+    still = chambers(lane.plant, lane.state.angle, room, room)
+    # A stricter tolerance counts as a longer step, as where a run is planned.
+    length = lane.timing.step / min(1.0, lane.timing.tolerance)
+    stiffness = lane.thermal.heat_capacity_ratio if parts.is_thermal else 1.0
+    is_slow = pneumatics.is_slow(lane.plant, length, still.volume_1, still.volume_2, stiffness)
+    return is_slow and lane.prescribed.next_angle == lane.state.angle and lane.state.angular_velocity == 0.0
+
+
 def has_gas(parts: Program, lane: Lane) -> bool:
     """True where all masses at the end of the step are above 0."""
     found = lane.after.mass_1 > 0.0 and lane.after.mass_2 > 0.0
@@ -343,7 +355,7 @@ def keep_state(parts: Program, lane: Lane, waits: bool) -> None:
 
 
 def sense_end(parts: Program, lane: Lane, now: Now, length: float, taken: bool) -> None:
-    """What late sensors look at in a step or part, at its end, with the states that effects have then.
+    """Delayed sensor readings at the end of a step or part, with the states of the effects.
 
     A signal that is late by a fraction of a step is looked at by that much before its end.
     """

@@ -1,4 +1,4 @@
-"""What is done at a sample of the controller: sense, decide, and keep what comes late."""
+"""Sample of the controller: read sensors, compute the command, and store delayed readings."""
 
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
@@ -54,7 +54,7 @@ def sense(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
-    """What the sensors of a vane show."""
+    """Sensor readings of an actuator."""
     if parts.late_signals:
         angle = lane.signal_history[0, now.late_signal]
         pressure_1, pressure_2 = lane.signal_history[1, now.late_signal], lane.signal_history[2, now.late_signal]
@@ -91,7 +91,7 @@ def remember_command(parts: Program, lane: Lane, slot: int) -> None:
 
 
 def gait(parts: Program, lane: Lane) -> GaitMeasurement:
-    """What perfect sensors of a walk show."""
+    """Readings of ideal sensors in a walk."""
     pressure_1, pressure_2 = present_pressures(parts, lane)
     return GaitMeasurement(
         angle=lane.state.angle,
@@ -145,6 +145,6 @@ def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
 
 
 def place_of_late(parts: Program, lane: Lane, now: Now, fault: Fault) -> int:
-    """Where in its ring the reading is that arrives now."""
+    """Index in the ring of the delayed reading that arrives now."""
     place = now.reading - samples_late(fault, now.step * lane.timing.step, now.sample)
     return place + now.readings if place < 0 else place

@@ -11,7 +11,7 @@ LARGEST = 1.0e300
 
 
 def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float) -> Moment:
-    """What effects see of the plant in some state, with mean flows [kg/s]."""
+    """State of the plant that effects depend on, with mean flows [kg/s]."""
     pressure_1, pressure_2 = chamber_pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
     return Moment(
         angle=state.angle,
@@ -25,7 +25,7 @@ def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vente
 
 
 def begun_moment(parts: Program, lane: Lane, command: float) -> Moment:
-    """What effects see of the plant at the begin of a step, with the flows of its first stage."""
+    """State of the plant that effects depend on, at the start of a step, with the flows of its first stage."""
     supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
     return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)
 

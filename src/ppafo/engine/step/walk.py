@@ -57,7 +57,7 @@ ASKED: Mapping[Any, tuple[str, ...]] = believed.ASKED
 
 
 def links(parts: Program) -> Mapping[Any, Any]:
-    """What stands for functions of the controller: its observer believes the chambers of the actuator that walks."""
+    """Replacements of functions of the controller: its observer assumes the chambers of the actuator that walks."""
     return believed.links_of_observer(parts.actuator)
 
 
@@ -65,12 +65,12 @@ def links(parts: Program) -> Mapping[Any, Any]:
 
 
 def carry(parts: Program, lane: Lane) -> None:
-    """What a step is handed by the one before, where there was none."""
+    """Load of the foot before the first step."""
     lane.carried = walking.carried_foot(lane.leg, lane.share, lane.walk.now, lane.walk.foot)
 
 
 def find_place(parts: Program, lane: Lane, now: Now) -> None:
-    """Where the gait is at the end of the step, stride after equal stride."""
+    """Gait phase at the end of the step, for repeated equal strides."""
     lane.place = place_at(lane.gait_timing, time_of(parts, lane, now) + length_of(parts, lane))
 
 
@@ -91,7 +91,7 @@ def find_gait_of_task(parts: Program, lane: Lane, now: Now) -> None:
 
 
 def begin(parts: Program, lane: Lane) -> None:
-    """Where the step would lead the foot, free and on the ground."""
+    """Predicted step of the foot, free and on the ground."""
     lane.walk_begun = walking.begin_walk(
         lane.plant,
         lane.leg,
@@ -119,7 +119,7 @@ def hold_ahead(parts: Program, lane: Lane) -> None:
 
 
 def reach(parts: Program, lane: Lane) -> None:
-    """Where the step ends, unless an event leads elsewhere."""
+    """End of the step without an event."""
     parts.gas.add(parts, lane)
     lane.ended, lane.carried = walking.reach_end(
         lane.plant,
@@ -136,7 +136,7 @@ def reach(parts: Program, lane: Lane) -> None:
 
 
 def depart(parts: Program, lane: Lane) -> None:
-    """Where it ends then: few feet depart from where they slide."""
+    """End of a step in which the foot reverses or starts to move: rare."""
     parts.gas.add(parts, lane)
     lane.ended, lane.ahead = walking.depart_in_walk(
         lane.plant, lane.fed, lane.walk_begun, lane.ended, lane.ahead, length_of(parts, lane)

@@ -6,6 +6,7 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
+from ppafo.exports.c_library.entries import follow_entry, prepare_entry
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import (
@@ -18,7 +19,8 @@ from ppafo.exports.c_library.files import (
     words_of,
     words_of_walk,
 )
-from ppafo.exports.c_library.preparation import following_text, preparation_of, relations_of, settings_of
+from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation
+from ppafo.exports.c_library.settings import relations_of, settings_of
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import effects_of
@@ -79,8 +81,8 @@ def scenario_library(scenario: Scenario) -> Library:
         switches=_switches(scenario.device, of_sensors),
         other_program=((f"({interval} != (double)(int64_t){interval}) != {was_inside}", "run_output_interval"),),
         words=words_of(scenario, links),
-        further=partial(preparation_of, scenario, program.program),
-        following=partial(following_text, settings, links) if links else None,
+        further=partial(prepare_entry, Preparation(scenario, program.program), VANE_PREPARATION, settings),
+        following=partial(follow_entry, settings, links) if links else None,
         links=links,
         rules=RULES_OF_TIMES,
     )
@@ -89,9 +91,9 @@ def scenario_library(scenario: Scenario) -> Library:
 def walk_library(configuration: Scenario) -> Library:
     """A library whose settings are all numbers of a walk; ScenarioError for one that cannot be exported."""
     from ppafo.exports.c_library.walk_preparation import (
+        WALK_PREPARATION,
         check_can_leave,
         links_of_walk,
-        preparation_of_walk,
         relations_of_walk,
         settings_of_walk,
     )
@@ -115,8 +117,8 @@ def walk_library(configuration: Scenario) -> Library:
         switches=_switches(configuration.device, of_readings),
         other_program=((f"(prepared->counts.signal_delay > 0.0) != {was_late}", "controller_period"),),
         words=words_of_walk(configuration, links, failing),
-        further=partial(preparation_of_walk, configuration, program.program),
-        following=partial(following_text, settings, links) if links else None,
+        further=partial(prepare_entry, Preparation(configuration, program.program), WALK_PREPARATION, settings),
+        following=partial(follow_entry, settings, links) if links else None,
         links=links,
         defaults=frozenset(c_identifier(path) for path in links if not path.startswith("supply.")),
     )

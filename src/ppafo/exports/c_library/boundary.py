@@ -4,8 +4,7 @@ A library that people read hands over structs. Where runs go on side by side, as
 row for each; the composed functions are the same but for their first and last lines.
 """
 
-import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 
 from ppafo.engine.rows import is_number, is_row, leaf_paths, members, row_expression
 from ppafo.translation.value_types import FLOAT, Items, Row, Shared, Type
@@ -17,12 +16,8 @@ class Arrays:
     """Arrays of all numbers, one after another; ``array`` is the name of a parameter."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
-        """One number of many, by its place."""
+        """Element of an array, by its index."""
         return f"{array}[{place}]"
-
-    def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
-        """Lines that give the numbers their names, then ``body``."""
-        return [*(f"{name} = {array}[{index}]" for index, name in enumerate(names)), *body]
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:
         """Expression for the row of one of several groups, from the numbers of all."""
@@ -42,14 +37,8 @@ class Structs:
     """Structs of groups of numbers, or of numbers."""
 
     def cell(self, array: str, place: int, name: str) -> str:  # noqa: ARG002
-        """One number of many, by its name."""
+        """Field of a struct, by its name."""
         return f"{array}.{name}"
-
-    def named(self, array: str, names: Sequence[str], body: Sequence[str]) -> list[str]:
-        """Lines with what the numbers are in before their names; names of arguments stay as they are."""
-        # Not after a dot, where it is a field, and not before '=' or '(', where it is an argument or a function.
-        words = re.compile(rf"(?<![.\w])({'|'.join(names)})\b(?!=|\()")
-        return [words.sub(rf"{array}.\1", line) for line in body]
 
     def taken(self, array: str, group: str, groups: Mapping[str, type], name_of: NameOf) -> str:  # noqa: ARG002
         """The row of a group."""

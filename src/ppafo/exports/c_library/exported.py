@@ -1,4 +1,4 @@
-"""What of a program is exported: its lane loops, metrics and outputs, and the names that these have in C."""
+"""Exported part of a program: lane loops, metrics and outputs, with their names in C."""
 
 import re
 from collections.abc import Callable, Mapping

@@ -123,7 +123,7 @@ class Switch:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """How a library is called: templates of header, example, page and of the end of the source; ``words`` fill them.
+    """API variant of an exported library: header, example, README and source templates; ``words`` fill them.
 
     The settings ``as_step`` are ``step`` whatever they are.
     """
@@ -143,7 +143,7 @@ LOOP = Surface("interface.h", "main.c", "README.md", "loop.c")
 
 @dataclass(frozen=True, slots=True)
 class Library:
-    """What is to be written.
+    """Library to be written: program, parameters, outputs, metrics and texts.
 
     ``further`` adds the function that makes the numbers of a run from the settings. ``switches`` choose the program,
     ``other_program`` has further conditions in C under which another would be needed, with the setting that is named;
@@ -169,7 +169,7 @@ class Library:
 
     @property
     def name(self) -> str:
-        """Its name in C, which its files have too."""
+        """Name of the library in C, and of its files."""
         name = c_identifier(self.title)
         # A scenario may be called "main" or "math"; C, make and the board's files already are.
         return f"run_{name}" if name in _TAKEN else name
@@ -240,7 +240,7 @@ def _words(library: Library, name: str) -> dict[str, str]:
 
 
 def _title_words(library: Library, name: str) -> dict[str, str]:
-    """What a library is, as comments and pages say it."""
+    """Title and description of a library for comments and pages."""
     return {
         "name": name,
         "NAME": name.upper(),
@@ -287,7 +287,7 @@ def _returning(conditions: Iterable[tuple[str, str]]) -> str:
 
 
 def _example_words(library: Library) -> dict[str, str]:
-    """What the example prints of outputs and metrics, and the setting that it changes."""
+    """Outputs and metrics that the example prints, and the parameter that it changes."""
     outputs = ["time", *library.program.outputs]
     # Every scenario has a supply pressure, which is what a user would try first.
     (pressure,) = [setting for setting in library.settings if setting.name == "supply_pressure"]
@@ -325,7 +325,7 @@ def _members(items: Iterable[tuple[str, str, str]]) -> str:
 
 
 def _said(quantity: Quantity) -> str:
-    """What a setting is, and its range."""
+    """Meaning and range of a parameter."""
     low, high = (limit if abs(limit) < math.inf else None for limit in (quantity.minimum, quantity.maximum))
     beyond = "from" if quantity.minimum_allowed else "above"
     above = "" if low is None else f"{beyond} {low:g}"
@@ -416,7 +416,7 @@ _TRAPS_OF_WALK = """\
 
 
 def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
-    """What the page of the library says of this scenario, in which settings follow others by ``links``."""
+    """Texts about this scenario on the page of the library; ``links`` has the parameters that follow others."""
     fixed = [
         f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
         f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
@@ -446,7 +446,7 @@ def _followers(links: Graph) -> str:
 
 
 def _fixed_of_walk(gait: "Gait", sequence: "TaskSequence | None") -> tuple[tuple[str, ...], str]:
-    """What of a walk is fixed in the source, in words, and of what a library has precomputed numbers."""
+    """Fixed properties of an exported walk, in words, and the source of its precomputed numbers."""
     way = "stride after equal stride"
     if sequence is not None:
         way = f"the task sequence `{sequence.name}`, which stays as it is"
@@ -459,7 +459,7 @@ def _fixed_of_walk(gait: "Gait", sequence: "TaskSequence | None") -> tuple[tuple
 
 
 def words_of_walk(configuration: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
-    """What the page of the library says of this walk: settings follow others by ``links``, some sensors ``failing``."""
+    """Texts about this walk on the library's page, with linked parameters (``links``) and ``failing`` sensors."""
     faults = [f"{sensor} `{fault.kind}`" for sensor, fault in failing.items()]
     from ppafo.walking.motion import walk_of
     from ppafo.walking.planning import has_ideal_sensors
@@ -503,7 +503,7 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
 
 
 def _at_zero(device: Device, flaws: Sequence[float]) -> str:
-    """Which settings that choose functions are 0."""
+    """Parameters that select functions and are 0."""
     zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
     flawless = [] if any(flaws) else ["what makes a sensor of `sensors_` less than ideal"]
     here = ", ".join([*zero, *flawless]) or "none"

@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from functools import singledispatch
 from typing import NamedTuple
 
-from ppafo.control.catalog import PROFILES
 from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.expected import expected_csv
@@ -17,7 +16,6 @@ from ppafo.model.valves.kind import VENT
 from ppafo.parameters.graph import outside
 from ppafo.simulation.numbers import declared_numbers
 from ppafo.simulation.plan import step_counts
-from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Control, FreeMotion, Motion, PrescribedMotion, ProfileChoice, Scenario, Sensors
 from ppafo.walking.declaration import FORCES
 from ppafo.walking.motion import WalkMotion
@@ -26,7 +24,7 @@ from ppafo.walking.preparation import FaultSettings
 
 @dataclass(frozen=True, slots=True)
 class Input:
-    """What a plant is given at each step: name, unit, meaning, first value and limits, None for none."""
+    """Input of a plant at each step: name, unit, meaning, initial value and limits, None for none."""
 
     name: str
     unit: str
@@ -59,7 +57,7 @@ class Assignment(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """How a plant is driven from outside: its command, its further inputs, and how its joint moves between two steps.
+    """External drive of a plant: its command, its other inputs, and the motion of its joint within a step.
 
     ``motion`` says the latter in words. ``settings`` of a run become what the first inputs are, ``parameters`` of the
     engine what they are in each step, from ``time`` on for a ``length`` of it [s].
@@ -74,58 +72,70 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class PlantAlone:
-    """A plant that is driven from outside: its library, its drive, and the step [s] of the engine and of the inputs.
+    """A plant that is driven from outside: its library, its drive, and the step [s] of the inputs.
 
-    ``hidden`` are the paths of the settings without effect, because inputs replace them.
+    ``clock`` is the path of the setting that is this step: that of the engine, or where the plant has parts that go by
+    the samples of a controller, the time between these. ``hidden`` are the paths of the settings without effect,
+    because inputs replace them.
     """
 
     library: Library
     drive: Drive
     hidden: frozenset[str]
     step: float
+    clock: str
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        """What it is given at each step, the command first."""
+        """Inputs at each step, the command first."""
         return (self.drive.command, *self.drive.inputs)
 
     @property
     def motion(self) -> str:
-        """How the joint moves between two steps, in words."""
+        """Motion of the joint within a step, in words."""
         return self.drive.motion
 
 
-_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.period", "controller.command")
-"""Times of a run and of a controller mean nothing to a plant that is stepped from outside."""
-_REPLACED = ("sensors.", "motion.profile.", "motion.external_torque", "motion.ankle_torque")
-"""Beginnings of the paths of what inputs replace."""
+STEPS, SAMPLES = "run.step", "controller.period"
+"""Settings that may be the step of the inputs."""
+_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command")
+"""Times of a run mean nothing to a plant that is stepped from outside."""
+_REPLACED = ("sensors.", "motion.external_torque", "motion.ankle_torque")
+_PATH = "motion.profile."
+"""Beginnings of the paths of what inputs replace: of any plant, and of one whose ankle they lead."""
 
 
 def plant_of(scenario: Scenario) -> PlantAlone:
-    """Return the plant; a free joint takes a torque, one with a prescribed angle takes angle and rate.
+    """Return the plant; a free joint takes a torque, a locked one angle and rate, by which it is led.
 
-    For a walk it is the device on its walking leg, which takes the command alone.
+    A joint on a path of the scenario's own takes the command alone, and so does the device on a leg that walks.
     """
-    plant = _commanded(scenario.motion, scenario)
+    plant = _led(_commanded(scenario.motion, scenario))
     library = library_of(plant)
-    drive = _drive_of(plant.motion, {setting.path: setting for setting in library.settings})
+    drive = _drive_of(scenario.motion, {setting.path: setting for setting in library.settings})
     taken = {variable.name for variable in (drive.command, *drive.inputs)}
     references = {kind.reference for kind in CONTROLLED.values()}
     outputs = tuple(name for name in library.program.outputs if name not in taken | references)
     # Metrics need a whole run, which only the caller sees.
-    program = replace(library.program.program, meters=(), traced=outputs)
-    replaced = {setting.path for setting in library.settings if setting.path.startswith(_REPLACED)}
+    whole = replace(library.program.program, meters=(), traced=outputs)
+    # Where a locked joint may take its steps whole, this one does as long as it stands still.
+    rests = "angle" in taken and whole.feed is None and not whole.actuator.gives
+    program = replace(whole, rests_whole=rests)
+    beginnings = (*_REPLACED, _PATH) if "angle" in taken else _REPLACED
+    replaced = {setting.path for setting in library.settings if setting.path.startswith(beginnings)}
+    clock = SAMPLES if plant.controller.period > plant.run.step else STEPS
     return PlantAlone(
         library=replace(library, program=ExportedProgram(program, ()), rules=()),
         drive=drive,
-        hidden=frozenset(replaced.union(_WITHOUT_EFFECT)),
-        step=plant.run.step,
+        hidden=frozenset(replaced.union(_WITHOUT_EFFECT, {SAMPLES} - {clock})),
+        step=plant.controller.period,
+        clock=clock,
     )
 
 
 @singledispatch
 def _drive_of(_motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
-    """Return how a plant that moves so is driven, within the ranges of its settings by path: here that of a walk."""
+    """External drive of a plant with this motion, within the ranges of its settings by path: here a walk."""
     return Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
 
 
@@ -135,11 +145,13 @@ _FIRST_RAMP = 0.0078125
 
 @_drive_of.register
 def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> Drive:
-    """Return the drive of a joint whose angle and rate come from outside: a ramp, which the profile already is."""
+    """Return the drive of a joint: one that is locked is led by angle and rate, one on a path goes along that."""
+    if motion.locked_angle is None:
+        return Drive(motion="The ankle goes along the path that the scenario has.")
     stop_1, stop_2 = settings["actuator.angle_min"].value, settings["actuator.angle_max"].value
     # So fast that the short ramp of the first angle still ends within what a level may be.
     fastest = (settings["motion.profile.level"].quantity.maximum - max(abs(stop_1), abs(stop_2))) / _FIRST_RAMP
-    start = motion.profile.start_level
+    start = motion.locked_angle
     summary = "angle of the ankle, 90 deg neutral, growing in plantarflexion"
     return Drive(
         motion=(
@@ -231,6 +243,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "follow_inputs": follow_lines(alone, "first", by_name),
         "hidden": ", ".join(f"`{c_identifier(path)}`" for path in sorted(alone.hidden)),
         "step": f"{alone.step:g}",
+        "clock": c_identifier(alone.clock),
     }
     surface = Surface(
         "plant.h",
@@ -238,21 +251,25 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "plant_README.md",
         "plant.c",
         words,
-        "run_step",
-        ("controller_period", "run_output_interval"),
+        c_identifier(alone.clock),
+        _as_clock(alone),
     )
     return replace(alone, library=replace(alone.library, surface=surface))
 
 
-_ONE_STEP = tuple(Assignment(field, "{settings}->run_step") for field in ("controller_period", "run_output_interval"))
-"""The engine is called step by step: commands come once in each, and nothing lies between."""
+def _as_clock(alone: PlantAlone) -> tuple[str, ...]:
+    """Names of the other times that are this step: commands come once in each, and nothing lies between."""
+    return tuple(c_identifier(path) for path in (SAMPLES, "run.output_interval") if path != alone.clock)
 
 
 def follow_lines(alone: PlantAlone, settings: str, inputs: Mapping[str, str]) -> str:
     """Return lines of C that give ``settings``, a pointer, what ``inputs`` decide, by name as they are called in C."""
     return "\n".join(
         f"    {settings}->{field} = {expression.format(settings=settings, **inputs)};"
-        for field, expression in (*_ONE_STEP, *alone.drive.settings)
+        for field, expression in (
+            *((name, f"{{settings}}->{c_identifier(alone.clock)}") for name in _as_clock(alone)),
+            *alone.drive.settings,
+        )
     )
 
 
@@ -269,13 +286,18 @@ def _volume_conditions(alone: PlantAlone) -> list[str]:
     return [f"({low} < {end} && {end} < {high})" for end in ends]
 
 
+def _led(plant: Scenario) -> Scenario:
+    """Return a plant whose ankle, where it is locked, is on a ramp that inputs can turn: one that is level."""
+    angle = plant.motion.locked_angle if isinstance(plant.motion, PrescribedMotion) else None
+    if angle is None:
+        return plant
+    settings = {"start_level": angle, "level": angle, "ramp_start": 0.0, "ramp_time": 2.0}
+    return replace(plant, motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
+
+
 @singledispatch
 def _commanded(_motion: Motion, scenario: Scenario) -> Scenario:
-    """Return the scenario under a command at every step of its engine; a prescribed angle comes from outside too."""
-    return _commanded_vane(scenario)
-
-
-def _commanded_vane(scenario: Scenario) -> Scenario:
+    """Return the scenario under a command at every step of its engine."""
     # The engine's own step: commands come once in each, and nothing lies between.
     step = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
@@ -297,26 +319,22 @@ def _commanded_vane(scenario: Scenario) -> Scenario:
 
 
 @_commanded.register
-def _commanded_path(motion: PrescribedMotion, scenario: Scenario) -> Scenario:
-    # It begins where the scenario has it.
-    start: tuple[float, float, float] = PROFILES[motion.profile.kind].value(profile_parameters(motion.profile), 0.0)
-    settings = {"start_level": start[0], "level": start[0], "ramp_start": 0.0, "ramp_time": 2.0}
-    return replace(_commanded_vane(scenario), motion=PrescribedMotion(ProfileChoice("ramp_hold", settings)))
-
-
-@_commanded.register
 def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
     # Sensors are there that nothing reads.
     check_can_leave(walk)
     step = step_counts(1.0, walk.run.step, 1.0, walk.controller.period).step
+    # What fails with the controller, a shut-off valve and a slow valve go by its samples, and so do commands then.
+    goes_by_samples = bool(motion.shut_off) or not {"controller", "valve"}.isdisjoint(motion.broken)
+    period = walk.controller.period if goes_by_samples else step
     # The forces under the foot are among the outputs.
     forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
     return replace(
         walk,
         name=f"{walk.name}-plant",
         description=f"The plant alone of this walk, on its leg: {walk.description}",
-        controller=Control(switching.CONSTANT.name, {"command": 0.0}, step),
-        run=replace(walk.run, step=step),
-        sensors=Sensors(),
+        controller=Control(switching.CONSTANT.name, {"command": 0.0}, period),
+        run=replace(walk.run, step=step, output_interval=period),
+        # Which samples a controller misses is drawn by the same seed.
+        sensors=Sensors(seed=walk.sensors.seed),
         motion=replace(motion, forces=forces, faults={sensor: FaultSettings() for sensor in motion.faults}),
     )

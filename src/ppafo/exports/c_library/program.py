@@ -55,7 +55,7 @@ class _ForOneRun(ast.NodeTransformer):
         return ast.copy_location(ast.Call(node.args[0], node.args[1:], node.keywords), node)
 
     def value_of(self, node: ast.expr) -> Any:
-        """What a name, an attribute of one or a text stands for; None for anything else."""
+        """Value of a constant, a name or an attribute; None for any other expression."""
         if isinstance(node, ast.Constant):
             return node.value
         if isinstance(node, ast.Name):

@@ -1,25 +1,34 @@
-"""From the settings of a walk to the numbers of a run: one composed function that calls the planning.
+"""From the settings of a walk to the numbers of a run: plain functions that call the planning.
 
-What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out.
+What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out. Rows that
+the planning reads as mappings are structs in C: Python runs the functions of ``preparation`` alone.
 """
 
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 from ppafo.control.walking.catalog import walking_controllers
-from ppafo.engine.program import Program
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
-from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.files import Relation, Setting, c_identifier
-from ppafo.exports.c_library.preparation import SAID, Writing, declared_settings
+from ppafo.exports.c_library.preparation import (
+    Preparation,
+    PreparedLane,
+    counted,
+    named,
+    set_gas,
+    set_plant,
+    set_timing,
+    start,
+)
+from ppafo.exports.c_library.settings import SAID, declared_settings
 from ppafo.model.declaration import Quantity
 from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
 from ppafo.parameters.graph import Follows, Graph, Term, holding
-from ppafo.simulation.declaration import RUN, SUPPLY_LINES
+from ppafo.simulation.declaration import RUN
 from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.profiles import profile_parameters
 from ppafo.simulation.scenario import Scenario
@@ -140,101 +149,116 @@ def relations_of_walk(configuration: Scenario) -> tuple[Relation, ...]:
     )
 
 
-def preparation_of_walk(
-    configuration: Scenario, program: Program, collector: SourceCollector, boundary: Boundary
-) -> str:
-    """The composed function ``prepare`` of a walk, once everything it calls is gathered."""
-    writing = Writing(configuration.device, configuration.supply_lines, program, collector)
-    return writing.text(settings_of_walk(configuration), _lines(configuration, writing), boundary)
+def put_walking_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set leg, gait, and the plant with both; the rocker of the heel is fitted to the gait before."""
+    gait = walk_of(parts.scenario).gait
+    lane["wearer"] = parts.row("Wearer", named(WEARER))(
+        *(getattr(settings, name) for name in parts.names("wearer", named(WEARER)))
+    )
+    lane["rocker"] = rocker_on_heel(
+        fit_rocker(gait)[0], fit_rocker(gait)[1], fit_rocker(gait)[2], settings.wearer_heel_lever
+    )
+    lane.leg = leg_parameters(lane["wearer"], lane["rocker"])
+    lane.share = device_share(lane["bare"], lane.leg.gravity)
+    lane.plant = with_leg(lane["bare"], lane.leg)
+    lane.gait = parts.constant(gait_series(gait))
+    lane.gait_timing = parts.constant(gait_timing(gait))
 
 
-def _lines(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines from settings to the numbers of a run; each needs names that lines before it have made."""
-    add = writing.add
-    yield from writing.plant("bare", "0.0")
-    yield from _leg(configuration, writing)
-
-    # Sensors with their faults, and the longest time by which one is late.
-    faults = walk_of(configuration).faults
-    for sensor, fault in faults.items():
-        names = writing.section(f"faults.{sensor}", [quantity.name for quantity in fault_numbers(sensor, fault.kind)])
-        yield f"{sensor}_fault = {_fault(writing, fault.kind, names)}"
-    row = writing.row("SensorNumbers", writing.section("sensors", (*_FORCES, *_OTHERS)))
-    failing_sensors = ", ".join(f"{sensor}_fault" for sensor in faults)
-    yield f"gait_sensors = {add(gait_sensors)}({row}, controller_period, {failing_sensors})"
-    yield f"signal_delay = {add(longest_delay)}(gait_sensors) * controller_period"
-
-    # What fails of the plant and the shut-off valve, numbers written out.
-    failing = failing_of(configuration)
+def set_walk_sensors(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set the sensors with their faults, and the faults of the plant, whose numbers are constants."""
+    for sensor, fault in walk_of(parts.scenario).faults.items():
+        numbers = {quantity.name: f"faults.{sensor}.{quantity.name}" for quantity in fault_numbers(sensor, fault.kind)}
+        if not fault.kind:
+            # A sensor without a fault has one that never begins, so that one program serves both.
+            lane[f"{sensor}_fault"] = fixed_fault(NEVER, 0.0, 0.0, 0.0)
+        elif fault.kind != DISTORTED:
+            # A frozen sensor keeps its last value; the other kinds show a reading of their own.
+            lane[f"{sensor}_fault"] = fixed_fault(
+                getattr(settings, c_identifier(numbers["time"])),
+                1.0 if fault.kind == FROZEN else 0.0,
+                getattr(settings, c_identifier(numbers["reading"])) if "reading" in numbers else 0.0,
+                getattr(settings, c_identifier(numbers["period"])),
+            )
+        else:
+            lane[f"{sensor}_fault"] = distorting_fault(
+                *(
+                    settings.controller_period
+                    if name == "controller.period"
+                    else (getattr(settings, c_identifier(numbers[name])) if name in numbers else 0.0)
+                    for name in (*DISTORTING, "controller.period")
+                )
+            )
+    lane.gait_sensors = gait_sensors(
+        parts.row("SensorNumbers", (*_FORCES, *_OTHERS))(
+            *(getattr(settings, name) for name in parts.names("sensors", (*_FORCES, *_OTHERS)))
+        ),
+        settings.controller_period,
+        *(lane[f"{sensor}_fault"] for sensor in walk_of(parts.scenario).faults),
+    )
+    lane.signal_delay = longest_delay(lane.gait_sensors) * settings.controller_period
+    failing = failing_of(parts.scenario)
     if failing is not None:
-        yield f"plant_faults = {writing.constant(failing[0], 'plant_faults')}"
-        yield f"shut_off = {writing.constant(failing[1], 'shut_off')}"
-        yield f"unpowered = {writing.constant(POWERED, 'unpowered')}"
-
-    # Steps: the smallest volume limits them, and adiabatic gas, which is stiffer by the heat capacity ratio.
-    yield "room = plant.atmospheric_pressure"
-    filled = add(writing.program.actuator.chambers)
-    ends = (f"{filled}(plant, {angle!r}, room, room)" for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
-    yield f"volume = {add(smallest_chamber)}({', '.join(ends)})"
-    if configuration.supply_lines is not None:
-        volumes = (c_identifier(f"supply_line.{line}.volume") for line in SUPPLY_LINES)
-        yield f"volume = min(volume, {', '.join(volumes)})"
-    times = "run_duration, run_step, run_output_interval, controller_period"
-    yield f"counts_of_steps = {add(walk_step_counts)}({times}, plant, volume, {writing.stiffness})"
-    yield "needs_parts = False"
-    yield from writing.timing("signal_delay")
-
-    # Controller, gas and task sequence.
-    settings = {quantity.name: c_identifier(path) for path, quantity in _control(configuration).items()}
-    yield f"controller = {writing.kind('controller', law_of(configuration), settings)}"
-    yield f"reference = {writing.constant(profile_parameters(NO_REFERENCE), 'reference')}"
-    yield from writing.gas()
-    planned = task_sequence_of_walk(configuration)
-    if planned is not None:
-        yield f"task_sequence = {writing.constant(planned.timed, 'task_sequence')}"
-
-    yield from _start(configuration, writing)
-    yield from writing.start()
+        lane.plant_faults = parts.constant(failing[0])
+        lane.shut_off = parts.constant(failing[1])
+        lane.unpowered = parts.constant(POWERED)
 
 
-def _leg(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the leg, the gait on it, and the plant with both."""
-    # The rocker is fitted to the gait here: a fit has no place in a library.
-    add, fit = writing.add, fit_rocker(walk_of(configuration).gait)
-    yield f"wearer = {writing.row('Wearer', writing.section('wearer', [quantity.name for quantity in WEARER]))}"
-    fitted = ", ".join(map(repr, fit))
-    yield f"rocker = {add(rocker_on_heel)}({fitted}, wearer_heel_lever)"
-    yield f"leg = {add(leg_parameters)}(wearer, rocker)"
-    yield f"share = {add(device_share)}(bare, leg.gravity)"
-    yield f"plant = {add(with_leg)}(bare, leg)"
-    yield f"gait = {writing.constant(gait_series(walk_of(configuration).gait), 'gait')}"
-    yield f"gait_timing = {writing.constant(gait_timing(walk_of(configuration).gait), 'gait_timing')}"
+def count_walk_steps(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set number and length of the steps: the smallest volume limits them, and gas that is stiffer where it warms."""
+    lane["room"] = lane.plant.atmospheric_pressure
+    lane["volume"] = smallest_chamber(
+        parts.program.actuator.chambers(lane.plant, LOWEST_ANGLE, lane["room"], lane["room"]),
+        parts.program.actuator.chambers(lane.plant, HIGHEST_ANGLE, lane["room"], lane["room"]),
+    )
+    if parts.scenario.supply_lines is not None:
+        lane["volume"] = min(lane["volume"], *(getattr(settings, name) for name in parts.line_volumes))
+    lane.counts_of_steps = walk_step_counts(
+        settings.run_duration,
+        settings.run_step,
+        settings.run_output_interval,
+        settings.controller_period,
+        lane.plant,
+        lane["volume"],
+        settings.gas_heat_capacity_ratio if parts.program.is_thermal else 1.0,
+    )
+    lane.needs_parts = False
 
 
-def _fault(writing: Writing, kind: str, names: Mapping[str, str]) -> str:
-    """A fault of a sensor from its settings, or none."""
-    if not kind:
-        # A sensor without a fault has one that never begins, so that one program serves both.
-        return f"{writing.add(fixed_fault)}({NEVER!r}, 0.0, 0.0, 0.0)"
-    if kind != DISTORTED:
-        # A frozen sensor keeps its last value; the other kinds show a reading of their own.
-        holds = 1.0 if kind == FROZEN else 0.0
-        reading = names.get("reading", "0.0")
-        return f"{writing.add(fixed_fault)}({names['time']}, {holds!r}, {reading}, {names['period']})"
-    numbers = ", ".join(names.get(name, "0.0") for name in DISTORTING)
-    return f"{writing.add(distorting_fault)}({numbers}, controller_period)"
+def set_walking_law(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set the parameters of the controller; nothing follows the reference."""
+    lane.controller = rebuilt(
+        law_of(parts.scenario).parameters,
+        (getattr(settings, c_identifier(path)) for path in _control(parts.scenario)),
+    )
+    lane.reference = parts.constant(profile_parameters(NO_REFERENCE))
 
 
-def _start(configuration: Scenario, writing: Writing) -> Iterator[str]:
-    """Lines that make the states at the start: at a heel strike, or standing where there is a task sequence."""
-    add, planned = writing.add, task_sequence_of_walk(configuration)
+def start_walk(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
+    """Set leg and gas at the start: at a heel strike, or standing where there is a task sequence."""
+    planned = task_sequence_of_walk(parts.scenario)
     if planned is None:
-        yield f"walk = {add(walk_from_strike)}({add(gait_at)}(gait, gait_timing, leg, 0.0))"
+        lane.walk = walk_from_strike(gait_at(lane.gait, lane.gait_timing, lane.leg, 0.0))
     else:
+        lane.task_sequence = parts.constant(planned.timed)
+        foot = flat_foot(gait_timing(walk_of(parts.scenario).gait))
         first = planned.timed.parts[0]
-        sine, cosine = map(float, flat_foot(gait_timing(walk_of(configuration).gait)))
-        numbers = f"leg, gait_timing.ground_angle, {sine!r}, {cosine!r}, {first.turns!r}, {first.load!r}"
-        yield f"walk = {add(walk_from_standing)}({add(standing_on)}({numbers}))"
-    yield f"gait_seen = {writing.constant(NOTHING_SEEN, 'gait_seen')}"
-    filled = f"{add(writing.program.actuator.chambers)}(plant, walk.now.ankle, room, room)"
-    yield f"state = {add(vented_state)}(plant, {filled}, walk.now.ankle, walk.now.ankle_rate)"
+        lane.walk = walk_from_standing(
+            standing_on(
+                lane.leg, lane.gait_timing.ground_angle, float(foot[0]), float(foot[1]), first.turns, first.load
+            )
+        )
+    lane.gait_seen = parts.constant(NOTHING_SEEN)
+    lane.state = vented_state(
+        lane.plant,
+        parts.program.actuator.chambers(lane.plant, lane.walk.now.ankle, lane["room"], lane["room"]),
+        lane.walk.now.ankle,
+        lane.walk.now.ankle_rate,
+    )
+
+
+WALK_PREPARATION = (
+    *(set_plant, put_walking_leg_on, set_walk_sensors, count_walk_steps, set_timing),
+    *(set_walking_law, set_gas, start_walk, start, counted),
+)
+"""Functions that prepare the run of a walk, in this order; the last one gives the numbers of its steps."""

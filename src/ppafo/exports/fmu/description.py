@@ -27,11 +27,11 @@ _DISPLAY_UNITS = {
     "rad": "deg",
     "rad/s": "deg/s",
 }
-"""What a tool shows in place of an SI unit, whose values it exchanges: units of the bench, as in the files of ppafo."""
+"""Display unit of each exchanged SI unit: bench units, as in the files of ppafo."""
 
 
 def description_of_fmi2(interface: Interface, identifier: str, token: str) -> bytes:
-    """Return modelDescription.xml of FMI 2.0; ``identifier`` names the library, ``token`` is that of its sources."""
+    """modelDescription.xml of FMI 2.0; ``identifier`` names the library, ``token`` identifies its sources."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("2.0", interface, guid=token))
     kind = Xml.SubElement(
@@ -63,7 +63,7 @@ def description_of_fmi2(interface: Interface, identifier: str, token: str) -> by
 
 
 def description_of_fmi3(interface: Interface, identifier: str, token: str) -> bytes:
-    """Return modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` is that of its sources."""
+    """modelDescription.xml of FMI 3.0; ``identifier`` names the library, ``token`` identifies its sources."""
     variables = variables_of(interface)
     root = Xml.Element("fmiModelDescription", _head("3.0", interface, instantiationToken=token))
     has_clock = str(interface.clock is not None).lower()

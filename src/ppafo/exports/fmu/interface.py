@@ -1,4 +1,4 @@
-"""What a unit shows of a scenario: the closed loop without inputs, or the plant alone, whose inputs a tool gives."""
+"""Interface of a unit: the closed loop without inputs, or the plant alone, driven by the tool."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ _LOOP_TIME = (
     "The unit goes from sample to sample, <code>run.output_interval</code> apart, and shows the last one that is due. "
     "Any communication step is taken. The run ends at <code>run.duration</code>: a longer one is set before the start."
 )
-"""How the closed loop goes on, for the page of the unit."""
+"""Time stepping of the closed loop, for the page of the unit."""
 _LOOP_TUNING = (
     "The controller takes them at its next sample, the plant one step of the engine later. Of a reference that changes "
     "under way, metrics of ramp and hold keep the times of the first one."
 )
 """When the closed loop takes a changed parameter, for the page of the unit."""
 _PLANT_TIME = (
-    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>run.step</code>; the engine "
+    "Inputs are taken at the beginning of a communication step. It is a multiple of <code>{clock}</code>; the engine "
     "divides it further where its error asks for that. {motion} There is no end."
 )
-"""How the plant goes on, for the page of the unit; ``motion`` is what its vane does."""
+"""Time stepping of the plant, for the page of the unit; ``motion`` is the motion of its vane."""
 _PLANT_TUNING = "They are taken at the next communication step."
 """When the plant takes a changed parameter, for the page of the unit."""
 
@@ -34,7 +34,7 @@ class Interface:
     ``templates`` are the files of C that move it on, and ``words`` what is filled in there by name. ``hidden`` are the
     paths of settings that are no variables. ``time`` tells people how the unit goes on, ``tuning`` when it takes a
     changed parameter; both are HTML. ``step`` [s] is the usual communication step; where ``is_step_fixed``, others must
-    be multiples of it. ``duration`` [s] is that of the usual experiment. ``clock`` says when the clock of the
+    be multiples of it. ``duration`` [s] is the length of the default experiment. ``clock`` says when the clock of the
     controller ticks, None for a unit without one. ``run`` is a run of Python that it is compared with; a plant's is
     under the command ``EXAMPLE``.
     """
@@ -80,9 +80,9 @@ def closed_loop(scenario: Scenario) -> Interface:
 
 
 def plant_alone(scenario: Scenario) -> Interface:
-    """Return the plant; a free joint takes a torque, one with a prescribed angle takes angle and rate.
+    """Return the plant; a free joint takes a torque, a locked one angle and rate, others the command alone.
 
-    For a walk it is the device on its walking leg, which takes the command alone. ``export c`` writes the same plant.
+    ``export c`` writes the same plant.
     """
     alone = surfaced(plant_of(scenario))
     library = alone.library
@@ -92,7 +92,7 @@ def plant_alone(scenario: Scenario) -> Interface:
         name=library.title,
         library=library,
         templates=("stepped.c", "plant_inputs.c", "plant.c"),
-        time=_PLANT_TIME.format(motion=alone.motion),
+        time=_PLANT_TIME.format(motion=alone.motion, clock=alone.clock),
         tuning=_PLANT_TUNING,
         step=alone.step,
         duration=scenario.run.duration,
@@ -105,6 +105,7 @@ def plant_alone(scenario: Scenario) -> Interface:
         words={
             "inputs": inputs,
             "follow": follow_lines(alone, "settings", numbers),
+            "clock": alone.clock,
             "checked": "the limits of the inputs, inertia, volumes and areas",
         },
         run=half_open(scenario),

@@ -9,9 +9,9 @@ from ppafo.exports.fmu.interface import Interface
 from ppafo.model.controlled import CONTROLLED
 
 Tuning = Literal["hidden", "tunable", "fixed"]
-"""Whether a setting is no variable, a parameter that may change under way, or one that may not."""
+"""Access to a setting: not a variable, a parameter tunable during the run, or a fixed one."""
 Variability = Literal["discrete", "continuous"]
-"""Whether an output jumps from sample to sample or goes on in between, in words of FMI."""
+"""Variability of an output in terms of FMI: discrete between samples, or continuous."""
 
 FIXED_SECTIONS = ("run", "initial", "gas", "actuator", "foot_plate", "wearer", "motion", "motion.profile")
 """Settings that the start of a run is made of: they cannot change under way."""
@@ -34,7 +34,7 @@ _LARGEST_LIMIT = 1.0e308
 
 @dataclass(frozen=True, slots=True)
 class Variable:
-    """One variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in words of FMI.
+    """Variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in terms of FMI.
 
     A ``start`` of None is calculated, limits of None are none; all three are in ``unit``.
     """

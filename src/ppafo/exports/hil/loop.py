@@ -74,7 +74,7 @@ class RealTime:
         return self.clock() - self._start
 
     def late(self, due: float) -> float:
-        """By how much a time [s] that was listened for has been missed [s]."""
+        """Delay [s] behind a time [s] that was waited for."""
         missed = max(0.0, self.now() - due)
         # Less than a period late is jitter, which the next sample makes up; more would be made up by a burst of
         # samples.
@@ -132,7 +132,7 @@ class LockStep:
 
 
 Pace = RealTime | LockStep
-"""How the plant's time goes on; ``is_real`` where times mean something."""
+"""Time stepping of the plant: real time or lock step; ``is_real`` if times are meaningful."""
 
 
 @contextmanager

@@ -202,7 +202,7 @@ class Collector:
         return Recording(label, time_axis, channels, self._kind), lost
 
     def fresh_lines(self) -> str:
-        """What came since the last call as lines of a CSV file, which begins with its heading; for a file aside.
+        """Samples since the last call as lines of a CSV file, with its heading first; for a temporary file.
 
         A sample that was overtaken by lines of an earlier call is not among them.
         """
@@ -249,7 +249,7 @@ def _why_not(before: wire.Sample, packet: wire.Sample) -> str:
 
 
 def _difference(later: int, earlier: int) -> int:
-    """How far a number of 32 bits is behind another one, which may have gone on from 0 between them."""
+    """Difference of two 32-bit counters, of which the later one may have wrapped around."""
     return (later - earlier + _HALF) % wire.WRAP - _HALF
 
 

@@ -1,4 +1,4 @@
-"""What came of a run at the wire: the result, its log, and how the link did."""
+"""Result of a hardware-in-the-loop run: recording, log and statistics of the link."""
 
 import csv
 import io
@@ -36,7 +36,7 @@ _SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
 
 @dataclass(frozen=True, slots=True)
 class Machine:
-    """What the plant ran on: system, cores, Python, and the load (mean number of processes that run, 1 min) around it.
+    """Computer of the plant: system, cores, Python, and load (mean number of running processes, 1 min).
 
     The load is None where the system does not tell it.
     """
@@ -49,7 +49,7 @@ class Machine:
 
 
 class Timing(NamedTuple):
-    """How late samples were sent, after how long they were answered [s], and how many had no answer of their own.
+    """Delays of the samples sent, response times [s], and number of samples without a response.
 
     Samples with which a stopped run was vented are not among them: they were not sent.
     """

@@ -207,7 +207,7 @@ class Reader:
 
 
 def _wrong_head(data: bytes) -> str | None:
-    """What is wrong with the bytes after a mark, as far as they are here; None where nothing is."""
+    """Fault in the bytes after a mark, as far as they have arrived; None if there is none."""
     if len(data) > 2 and data[2] != VERSION:
         return "version"
     if len(data) > 3 and data[3] not in (SAMPLE, ANSWER):
@@ -241,7 +241,7 @@ def _read(data: bytes) -> Packet | str:
 
 
 def described_refusals(refused: Mapping[str, int], others: Iterable[tuple[str, int]] = ()) -> str:
-    """What was dropped, in words; ``nothing`` where nothing was."""
+    """Discarded bytes and messages by cause, in words; ``nothing`` if there were none."""
     counted = [*((why, refused.get(why, 0)) for why in REFUSALS), *others]
     return ", ".join(f"{count} {why}" for why, count in counted if count) or "nothing"
 
@@ -264,7 +264,7 @@ class Port(Protocol):
     is_stream: bool
     """True where bytes follow each other, false where they come packet by packet."""
     failure: str
-    """What went wrong under way, empty while all is well."""
+    """Fault during the run; empty without one."""
     strangers: int
     """Packets of somebody else, which were dropped."""
 
@@ -272,7 +272,7 @@ class Port(Protocol):
         """Send a packet, or drop it where that would take time."""
 
     def receive(self, timeout: float) -> bytes:
-        """What came first within a time [s]; nothing where nothing came."""
+        """Bytes received within a time [s]; empty on a timeout."""
 
     def close(self) -> None:
         """Give the port back."""
@@ -345,7 +345,7 @@ class SerialPort:
                 self._device.write(data)
 
     def receive(self, timeout: float) -> bytes:
-        """What came in, once there is anything, within a time [s]."""
+        """Bytes received, as soon as there are any, within a time [s]."""
         if self.failure:
             time.sleep(timeout)
             return b""
@@ -401,7 +401,7 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
 
 
 def _errors_of_ports() -> tuple[type[Exception], ...]:
-    """What opening a port raises: a terminal has an error of its own, where the system has terminals."""
+    """Exceptions that opening a port raises: a terminal adds its own, on systems that have terminals."""
     try:
         import termios
     except ImportError:

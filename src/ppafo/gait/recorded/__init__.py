@@ -1,4 +1,4 @@
-"""From recorded files to a gait: tables, what their columns mean, events and strides."""
+"""Import of recorded files as a gait: tables, meaning of their columns, events and strides."""
 
 from ppafo.gait.recorded.importing import ImportedGait, import_gait
 from ppafo.gait.recorded.mapping import ImportSettings

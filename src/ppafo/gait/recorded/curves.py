@@ -21,9 +21,9 @@ PHASES = np.linspace(0.0, 1.0, SAMPLES)
 REMARKED_SPREAD, REFUSED_SPREAD = 0.1, 0.25
 """Standard deviation between strides, fractions of the range of the mean curve; steady walks have 0.004 to 0.06."""
 REMARKED_MISFIT, REFUSED_MISFIT = 0.03, 0.1
-"""What the series leaves, root mean square, fractions of the same range; true curves have below 0.01."""
+"""RMS residual of the series over the range [-] that is remarked, and refused; below 0.01 for true curves."""
 _UNLOADED_PHASE = 0.02
-"""Of the stride, at either end of the stance, in which so little force acts that its centre has no meaning."""
+"""Fraction of the stride at either end of the stance with too little force for a centre of pressure."""
 _REMEDY = "smooth the recording (--low-pass '6 Hz'), or give better or more strides"
 
 

@@ -1,4 +1,4 @@
-"""Where the strides of a recording come from: force, events of the file, the shank, or one cycle that wraps around.
+"""Detection of the strides of a recording: force, events of the file, the shank, or one repeated cycle.
 
 Force plates do not say whose foot they carried: each contact is of the foot whose shank leans over it. A record little
 longer than a stride, which begins anywhere in it, is one cycle that wraps around.
@@ -289,7 +289,7 @@ def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: b
 _NEAR = 0.15
 """Seconds between a strike or an off seen in the shank and by a plate, for both to be the same."""
 _ABOUT_STANCE = 0.05
-"""Of the stride, at either end of the stance, which a load need not cover."""
+"""Fraction of the stride at either end of the stance that a load need not cover."""
 _COVERED = 0.9
 """Fraction of the rest of the stance on the plate, for the load to be the stride's."""
 
@@ -313,7 +313,7 @@ def lost_in(signal: Signal, stride: Stride) -> int:
 
 
 _LEAST_OF_CYCLE = 0.75
-"""Of a cycle, that the stride in it lasts at least."""
+"""Shortest stride in a cycle, as a fraction of the cycle."""
 LEAST_STRIDES = 2
 """Least number of strides by default; a walk past a plate and one cycle have one."""
 

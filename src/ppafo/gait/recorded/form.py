@@ -10,7 +10,7 @@ from ppafo.gait.recorded.table import MotionTable
 
 @dataclass(frozen=True, slots=True)
 class Convention:
-    """What the columns of a file mean that comes without a gait map.
+    """Meaning of the columns of a file without a gait map.
 
     ``columns`` is the map, ``plates`` are columns of force plates to choose from by the foot's motion, ``remarks``
     sentences for whoever reads the file.
@@ -22,28 +22,28 @@ class Convention:
 
 
 class FileReader(Protocol):
-    """How a file of a form is read."""
+    """Reader of a file of a form."""
 
     def __call__(self, path: str | Path, /) -> MotionTable:
         """Return time [s], columns and units of a file, its ``form`` left empty; DataError where it cannot be read."""
 
 
 class ConventionOf(Protocol):
-    """What the columns of a file of a form mean where no gait map of the user says it."""
+    """Meaning of the columns of a file of a form, where no gait map of the user gives it."""
 
     def __call__(self, table: MotionTable, side: Side, body_mass: float, /) -> Convention:
         """Return the convention for a foot, and for forces over a body mass [kg]."""
 
 
 class FileTest(Protocol):
-    """How files of a form are told from others with their suffix."""
+    """Test that tells files of a form from others with their suffix."""
 
     def __call__(self, path: str | Path, /) -> bool:
         """Return whether a file is of the form, by its content."""
 
 
 class TableChange(Protocol):
-    """How a table is changed before its columns have their meaning, where no gait map of the user says it."""
+    """Conversion of a table before its columns are interpreted, where no gait map of the user does it."""
 
     def __call__(self, table: MotionTable, /) -> MotionTable:
         """Return the table with the columns that the convention of its form is about."""

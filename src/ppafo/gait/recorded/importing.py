@@ -304,7 +304,7 @@ _COARSE_RATE = 50.0
 _NOISY_FORCE = 0.02
 """Body weights, standard deviation in swing; the events are at 0.05 and 0.03."""
 _WITHIN_SWING = 0.1
-"""Of the swing, at either end, in which the foot may still be on the plate, or again."""
+"""Fraction of the swing at either end in which the foot may still touch the plate."""
 
 
 def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> list[str]:

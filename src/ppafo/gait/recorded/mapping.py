@@ -81,7 +81,7 @@ class AngleMap(StrictTable):
 
 
 class MomentMap(StrictTable):
-    """Where a file has the moment of the ankle, and whether it is in N m or N m/kg."""
+    """Column of the ankle moment, and its unit, N m or N m/kg."""
 
     terms: _Terms
     unit: _Unit = None
@@ -127,7 +127,7 @@ class KneeMap(StrictTable):
 
 
 class GaitMap(StrictTable):
-    """What the columns of recorded files mean; a curve that is not named is not imported."""
+    """Meaning of the columns of recorded files; a curve that is not named is not imported."""
 
     schema_version: SchemaVersion = 1
     shank_angle: ShankMap

@@ -1,4 +1,4 @@
-"""Which column may be meant by one that is not there: the same joint, marker and side, spelt a little otherwise."""
+"""Suggestions for a missing column: the same joint, marker and side in another spelling."""
 
 import difflib
 import re

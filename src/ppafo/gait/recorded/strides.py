@@ -22,7 +22,7 @@ LONGEST_HELD = 0.1
 """Seconds that a column may keep one value within the strides."""
 
 _ABOUT_STANCE = 0.05
-"""Of the stride, at either end of the stance, in which a load may rest too."""
+"""Fraction of the stride at either end of the stance in which a load may rest too."""
 _COARSE = 0.001
 """Fraction of the range; a sensor with coarser steps keeps a value where its curve turns round."""
 _STEPS_OF_REST = 3.0

@@ -29,7 +29,7 @@ _MINIMUM_OVER_NOISE = 20.0
 
 
 class Decay(NamedTuple):
-    """One decay: times from its start [s], angle [rad], its direction (1 or -1), and its velocity [rad/s] if known."""
+    """Free decay: times from its start [s], angle [rad], its direction (1 or -1), and its velocity [rad/s] if known."""
 
     time: Floats
     angle: Floats

@@ -127,7 +127,7 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
 
 
 class Sizes(NamedTuple):
-    """What is sought of an opening: Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)]; b [-]; c of a gap beside it."""
+    """Unknowns of an opening: Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)]; b [-]; c of a parallel gap."""
 
     size: float
     critical_ratio: float = 0.0
@@ -136,7 +136,7 @@ class Sizes(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """What flows through an opening: the law, and what is known of it.
+    """Flow through an opening: its law, and its known quantities.
 
     For an orifice the area [m^2] or the discharge coefficient [-] that ``known`` multiplies; for ISO 6358 ``known`` is
     not used, and the critical ratio [-] is sought where it is not given. ``both`` is ISO 6358 beside a laminar gap
@@ -238,4 +238,4 @@ NEXT_LAW: Mapping[Law, str] = {
     "iso6358": "try law = 'both'",
     "both": "neither an orifice nor a laminar gap nor both explain them",
 }
-"""What to do where readings do not agree on one opening; the sum of both laws has each of them in it."""
+"""Remedy if readings do not agree on one opening; the sum of both laws contains each of them."""

@@ -177,7 +177,7 @@ _OVER_INERTIA = (
 
 
 class _Push(NamedTuple):
-    """What a decay starts from, roughly: angle [rad], speed [rad/s], and the angle that it sweeps in all [rad]."""
+    """Rough initial values of a decay: angle [rad], speed [rad/s], and the total angle swept [rad]."""
 
     angle: float
     speed: float

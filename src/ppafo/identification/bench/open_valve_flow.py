@@ -39,7 +39,7 @@ _FULLY_OPEN = 0.99
 _NEARLY_EQUAL = 0.9
 """Ratio of the pressures [-] above which they are nearly equal."""
 _LEVELS = "choked flow", "subsonic flow", "flow at nearly equal pressures"
-"""What a reading is, by its pressure ratio."""
+"""Name of a reading's flow regime, by its pressure ratio."""
 _SPAN, _SUBSONIC = 0.15, 0.6
 """Span of the pressure ratios, and the largest of them, from which both numbers of ISO 6358 can be fitted."""
 

@@ -1,4 +1,4 @@
-"""What a bench procedure returns: estimates with one verdict each, a table and two panels, in SI units.
+"""Result of a bench procedure: estimates with one verdict each, a table and two panels, in SI units.
 
 Figure 3 of the paper is the static torque beside the free decay.
 """

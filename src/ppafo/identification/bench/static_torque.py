@@ -160,7 +160,7 @@ def _marks(readings: "Sweeps", slope: float, zero: float) -> list[Mark]:
 
 
 def _of_files(at: Values, names: list[str], files: Labels) -> Floats:
-    """Return a tolerance for each reading: that of its file, or the only one there is; 0 for none."""
+    """Tolerance of each reading: its file's, or the only one there is; 0 for none."""
     values = np.array([at[name] for name in names] or [0.0])
     return np.asarray(values[files] if len(names) > 1 else values)
 
@@ -202,7 +202,7 @@ def _straight_line(readings: "Sweeps", files: str) -> _Rough:
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """What the numbers are of a load in a unit, by path, unit and word: the slope, and a friction at rest or in motion.
+    """Unknowns of a load in one unit, by path, unit and word: the slope, and static or kinetic friction.
 
     Only what a set has a place for has a path of a set.
     """
@@ -273,7 +273,7 @@ def slides(sources: tuple[Source, ...]) -> bool:
 
 
 def _swept(source: Source, name: str) -> float:
-    """By how much a channel moves with or against the direction in a sweep, the mean of all sweeps."""
+    """Mean change of a channel with the direction of a sweep, over all sweeps."""
     direction = source.recording["direction"]
     within = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
     used = direction[direction != 0.0]

@@ -36,7 +36,7 @@ _MINIMUM_RANGE = 0.5
 _SHUT, _HALF_OPEN = 0.05, 0.5
 """Shares of the largest area below which the valve is shut, and above which it is neither shut nor fully open."""
 _SATURATES = 0.02
-"""By how much [-] the saturation lies below the highest command where it is seen at all."""
+"""Least distance of the saturation from the highest command for it to be identified [-]."""
 _CLEAR_COMMAND = 0.1
 """Size of a command [-] from which on it is one towards its chamber."""
 _SMALL_COMMAND = 0.2
@@ -249,7 +249,7 @@ def _areas(sources: tuple[Source, ...], sweep: Sweep, gas: GasAt) -> Floats:
 def _branch(source: Source) -> Floats:
     """Return the direction of the command (readings,), 1, -1 or 0 before it first changes.
 
-    It is what the recording says, else that of the command's own last change.
+    Taken from the recording's channel, else from the last change of the command.
     """
     if "direction" in source.recording:
         return source.recording["direction"]

@@ -275,7 +275,7 @@ class Decay:
         return f"relaxation of {sensor}, decay {self.number}"
 
     def numbers(self) -> Iterator[Free]:
-        """Yield what is sought: pressures at the start, that of a room to its noise, and what is off just then."""
+        """Yield the unknowns: initial pressures, the room's within its noise, and initial offsets of the readings."""
         chambers = self.chambers
         pairs = zip(self.sensors, (chambers.first, chambers.second), strict=True)
         for place, (sensor, values) in enumerate(pairs):

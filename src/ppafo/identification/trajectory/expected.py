@@ -1,4 +1,4 @@
-"""Which further experiment would say most: the information of its samples, added to what a fit has found."""
+"""Choice of the most informative next experiment: information of its samples, added to the information of the fit."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -34,7 +34,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What a candidate would bring.
+    """Expected benefit of a candidate experiment.
 
     ``gain`` is half the growth of the logarithm of the determinant of the information on the numbers sought [-]
     (D-optimality): the volume of their region shrinks by exp(gain). ``shrinkage`` is, by number, the standard error

@@ -26,7 +26,7 @@ from ppafo.simulation.recorded.rest import value_at_rest
 from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
-"""What a recording is compared in [rad], [Pa], [Pa]."""
+"""Channels compared with a recording [rad], [Pa], [Pa]."""
 
 INPUTS = (COMMAND, SUPPLY, EXTERNAL_TORQUE)
 """Channels that a run follows where they were recorded, sample by sample, if it has no scenario."""
@@ -35,7 +35,7 @@ ALL_INPUTS = (*INPUTS, DORSIFLEXION_SUPPLY, ANGLE)
 """Channels that a run may follow instead of its scenario; a recorded angle prescribes the vane's."""
 
 InitialState = Literal["scenario", "recording"]
-"""Where angle and pressures at the start of a run are from."""
+"""Source of the initial angle and pressures of a run."""
 
 _FITS = 1.0e-6
 """Time [s] by which a sample may pass the start of an experiment: rounding of a clock."""

@@ -33,7 +33,7 @@ from ppafo.simulation.scenario import Scenario
 
 @dataclass(frozen=True, slots=True)
 class ChannelFit:
-    """What one channel of one experiment leaves, in its SI unit.
+    """Residual statistics of one channel of one experiment, in its SI unit.
 
     ``noise`` is the standard deviation that weighs it and ``order`` the order of the autoregression that makes it
     white, both of its sensor; ``rms`` and ``largest`` are of this recording, ``span`` is the range that the samples

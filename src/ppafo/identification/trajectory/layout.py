@@ -15,7 +15,7 @@ _Noise = dict[str, Text]
 
 
 class PriorSection(StrictTable):
-    """What is known beforehand: a normal distribution."""
+    """Prior knowledge: a normal distribution."""
 
     mean: Annotated[Text, Field(description="most likely value, with its unit")]
     relative: Annotated[float, Field(gt=0.0, description="standard deviation over the mean")]

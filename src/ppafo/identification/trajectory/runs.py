@@ -56,7 +56,7 @@ _MAXIMUM_RECORDS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """One channel of an experiment: samples [rad] or [Pa] and the least noise that they are thought to have."""
+    """Channel of an experiment: samples [rad] or [Pa], and the smallest noise assumed for them."""
 
     name: str
     values: Floats
@@ -258,7 +258,7 @@ _NUMBERS_OF_RUN = (
     "effects",
     "leg",
 )
-"""What of a run follows from the numbers of its scenario; program, clock and prescribed motion stay."""
+"""Fields of a run that depend on the numbers of its scenario; program, clock and prescribed motion stay."""
 
 
 def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:

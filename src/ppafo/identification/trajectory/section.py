@@ -1,4 +1,4 @@
-"""From the section [trajectory] of a problem file to a problem in SI units, and to the outcome of that.
+"""Section [trajectory] of a problem file: its problem in SI units, and the outcome.
 
 Everything that can be refused is refused before the search begins.
 """
@@ -46,7 +46,7 @@ _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """What a section leans on.
+    """Context of a section: parameter set, recordings and earlier results.
 
     ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
     call the section. ``parameter_set`` takes the place of the sets that scenarios name, ``valve`` of their valves.
@@ -245,7 +245,7 @@ class TrajectoryOutcome:
 
     @property
     def is_good(self) -> bool:
-        """Whether the search converged on a device that keeps its rules, and no recording wants other numbers."""
+        """Tell whether the search converged to a valid device on which all recordings agree."""
         return not self.fit.conflict and not self.fit.remarks
 
 
@@ -268,7 +268,7 @@ def solve_section(section: TrajectorySection, setting: Setting, report: Report) 
 
 
 def _against_bench(estimates: Iterable[Estimate], bench: Mapping[str, Estimate]) -> Iterator[str]:
-    """Yield a remark on each fitted value whose interval does not meet that of a bench procedure."""
+    """Yield a remark on each fitted value whose interval does not overlap the interval of a bench procedure."""
     for fitted in estimates:
         measured = bench.get(fitted.path)
         if measured is None or not (measured.is_usable and fitted.is_usable):

@@ -1,4 +1,4 @@
-"""What a bench and a set do not know exactly, as numbers of a trajectory fit with priors."""
+"""Tolerances of bench and parameter set, as numbers of a trajectory fit with priors."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

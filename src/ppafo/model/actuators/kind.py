@@ -1,4 +1,4 @@
-"""What a kind of actuator declares of itself: volumes, pressures and torque over angle, as the plant computes them.
+"""Declaration of a kind of actuator: volumes, pressures and torque over angle, as the plant computes them.
 
 Each chamber has a co-energy Phi(angle, gauge pressure) with the volume V = dPhi/dp and the torque tau = dPhi/dangle, so
 that d tau/dp = dV/dangle: what the gas gives as p dV the shaft gets. A kind is that relation as functions of floats.
@@ -85,7 +85,7 @@ class ActuatorKind:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What its settings declare."""
+        """Quantities that its settings declare."""
         return quantities_of(self.settings)
 
 

@@ -60,7 +60,7 @@ class Measured(NamedTuple):
 
 
 class Bases(NamedTuple):
-    """What the coefficients of a curve stand before: of its value, and of its slope [1/rad]."""
+    """Factors of the coefficients of a curve: for its value, and for its slope [1/rad]."""
 
     value: Curve
     slope: Curve

@@ -36,7 +36,7 @@ class Bandwidths(NamedTuple):
 
 
 def prepare(settings: Bandwidths, _device: Any) -> SensorRates:
-    """How fast sensors with some bandwidths [Hz] follow."""
+    """Rates [1/s] of sensors with given bandwidths [Hz]."""
     # A first order with a bandwidth f (-3 dB) follows at the rate 2 pi f.
     turn = 2.0 * math.pi
     return SensorRates(angle=turn * settings.angle_bandwidth, pressure=turn * settings.pressure_bandwidth)
@@ -63,7 +63,7 @@ def start(_bandwidth: SensorRates, now: Moment) -> SensorState:
 def advance(
     bandwidth: SensorRates, bandwidth_state: SensorState, before: Moment, after: Moment, step: float
 ) -> SensorState:
-    """What the sensors show after a step [s] in which the truth runs straight; exact."""
+    """Sensor readings after a step [s] over which the true values are linear in time; exact."""
     pressure = bandwidth.pressure
     return SensorState(
         angle=follow(bandwidth.angle, step, bandwidth_state.angle, before.angle, after.angle),

@@ -43,7 +43,7 @@ def slower(rise: float, pull_in_share: float) -> float:
 
 
 class CoilSettings(NamedTuple):
-    """How warm a coil becomes, how soon, and how much current lifts its valve."""
+    """Temperature rise and time constant of a coil, and current that lifts its valve."""
 
     steady_rise: Annotated[
         float, Number("K", "rise of temperature of a coil that is always on, 0 for none", 0.0, 0.0, 100.0)

@@ -29,7 +29,7 @@ class IceSettings(NamedTuple):
 
 
 def prepare(settings: IceSettings, _device: Any) -> Ice:
-    """How ice grows and melts."""
+    """Growth and melting rates of ice."""
     return Ice(blockage_per_gas=settings.blockage_per_gas, melting=1.0 / settings.melting_time)
 
 

@@ -1,4 +1,4 @@
-"""What stands at the joint beside the foot plate: a drag, a spring, and the weight of a link."""
+"""Loads at the joint beside the foot plate: drag, spring, and weight of a link."""
 
 import math
 from typing import Annotated, NamedTuple

@@ -1,4 +1,4 @@
-"""What a physical effect is: one value, from which every part of the package takes what it needs.
+"""Physical effect as one value, from which every part of the package takes its share.
 
 Files, overrides, columns of studies, fits, exported libraries, the page, linear models, the reference solver and walks
 know an effect by this value alone; none of them names one.
@@ -18,7 +18,7 @@ SECTION = "effects"
 
 
 class Moment(NamedTuple):
-    """What an effect with a state sees of the plant: angle [rad], its rate [rad/s], absolute pressures [Pa].
+    """State of the plant that an effect depends on: angle [rad], its rate [rad/s], absolute pressures [Pa].
 
     Flows [kg/s] from the supplies and to the atmosphere, and the command that the valve has [-]. At both ends of a step
     that is done the flows are their means over it.
@@ -105,17 +105,17 @@ class Effect:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What its settings declare."""
+        """Quantities that its settings declare."""
         return quantities_of(self.settings)
 
     @property
     def section(self) -> str:
-        """Where its settings stand in files, and what their paths begin with: a parameter set unless it says so."""
+        """Section of its settings in files and start of their paths; by default, in a parameter set."""
         return self.section_of_files or f"{SECTION}.{self.name}"
 
     @property
     def is_of_device(self) -> bool:
-        """Whether its settings stand in a parameter set, beside the numbers of the device."""
+        """Tell whether its settings belong to a parameter set, beside the numbers of the device."""
         return not self.section_of_files
 
     @property
@@ -139,7 +139,7 @@ class Effect:
         return {item.name: float(item.default or 0.0) for item in self.quantities_in(species)}
 
     def is_on(self, settings: Mapping[str, Any]) -> Any:
-        """Whether the effect is on with some settings; for arrays (runs,) among them an array of truth values."""
+        """Tell whether the effect is on with some settings; an array of truth values if some are arrays (runs,)."""
         found: Any = self.always
         for name in self.switch:
             # Not "or": settings may be columns of an ensemble.
@@ -153,7 +153,7 @@ def effect_problem(effect: Effect) -> str:
 
 
 def _problems(effect: Effect) -> Iterator[str]:
-    """What is wrong with the declaration of an effect: each as a clause behind its name."""
+    """Yield the faults in the declaration of an effect, each as a clause to follow its name."""
     if not effect.name.isidentifier():
         yield "its name is the parameter by which laws take its parameters, and must be an identifier"
     if effect.always and (effect.switch or effect.is_of_device):
@@ -173,7 +173,7 @@ def _problems(effect: Effect) -> Iterator[str]:
 
 
 def _problems_of_switch(effect: Effect) -> Iterator[str]:
-    """What is wrong with an effect that can be off: its switch and its defaults."""
+    """Yield the faults of an effect that can be off: in its switch and its defaults."""
     for item in effect.quantities:
         if item.default is None:
             yield f"'{item.name}' has no default: a device that says nothing of an effect must be without it"

@@ -9,7 +9,7 @@ from ppafo.model.ports import exhaust_path, supply_path
 
 
 class LineResistance(NamedTuple):
-    """One over the square of the conductance of each line [(s Pa/kg)^2]; 0 where there is none."""
+    """Inverse square of the conductance of each line [(s Pa/kg)^2]; 0 without a line."""
 
     resistance: float
 

@@ -9,7 +9,7 @@ from ppafo.model.ports import exhaust_path
 
 
 class Silencer(NamedTuple):
-    """One over the square of the silencer's conductance [(s Pa/kg)^2]; 0 where there is none."""
+    """Inverse square of the silencer's conductance [(s Pa/kg)^2]; 0 without a silencer."""
 
     resistance: float
 

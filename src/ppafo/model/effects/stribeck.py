@@ -8,7 +8,7 @@ from ppafo.model.ports import friction_in_motion
 
 
 class Stribeck(NamedTuple):
-    """How much more friction there is near standstill [N m], and one over the square of its velocity [s^2/rad^2]."""
+    """Additional friction near standstill [N m], and inverse square of its velocity [s^2/rad^2]."""
 
     friction_rise: float
     velocity_scale: float

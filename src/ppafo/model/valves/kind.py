@@ -1,4 +1,4 @@
-"""What a valve declares of itself, what a command to it means, and the two ways in which an engine can see it.
+"""Declaration of a valve: meaning of its command, and its two forms for an engine.
 
 A command goes from -1 to 1 as equation (8) says; one value stands for free motion.
 """
@@ -106,7 +106,7 @@ class ValveKind:
 
     @property
     def quantities(self) -> tuple[Quantity, ...]:
-        """What its settings declare."""
+        """Quantities that its settings declare."""
         return quantities_of(self.settings)
 
 

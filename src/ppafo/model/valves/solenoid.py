@@ -43,7 +43,7 @@ class TimedSolenoid(NamedTuple):
 
 
 class Coil(NamedTuple):
-    """Where the flow is (0 or 1), where the coil was commanded to go, when, and when the flow follows [s].
+    """Coil of an on/off valve: present flow (0 or 1), commanded flow, time of the command and of the response [s].
 
     It starts as one that was switched off long ago: the first order is taken at once, whatever the interval.
     """

@@ -108,7 +108,7 @@ from ppafo.units.shown import quantity_of_unit
 from ppafo.version import __version__
 
 _KINDS = {VANE: "scenario", WALK: "walk"}
-"""What a page calls what it simulates."""
+"""Name of each kind of simulation on a page."""
 _TASK = {"origin": "task", "source": "", "note": "", "half_width": None}
 _CHANGED = {**_TASK, "origin": "changed"}
 _DEFAULT = {**_TASK, "origin": "default"}
@@ -170,7 +170,7 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
 
 
 def _kept(library: Library) -> dict[str, str]:
-    """How settings must stay, by name in C; of some of which any must be above 0 that one which alone is."""
+    """Settings, by name in C, that must stay zero or above zero: a switch is fixed by its sole positive setting."""
     values = {setting.name: setting.value for setting in library.settings}
     kept: dict[str, str] = {}
     for switch in library.switches:
@@ -206,7 +206,7 @@ def _shown(name: str, unit: str, said: str, atmosphere: float) -> dict[str, Any]
 
 
 def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolute: bool = False) -> dict[str, Any]:
-    """In which unit a quantity is shown, and how: a value in SI is ``zero`` plus ``factor`` times the one shown.
+    """Display unit of a quantity and its conversion: SI value = ``zero`` + ``factor`` * displayed value.
 
     Gauge pressures count from ``atmosphere`` [Pa], but where ``is_absolute``; ``kilograms`` is what a mass is.
     """
@@ -228,7 +228,7 @@ def display_of(unit: str, atmosphere: float, kilograms: str = "mass", is_absolut
 
 
 def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
-    """Where the value of each setting comes from, by path."""
+    """Origin of the value of each setting, by path."""
     origin, device, parameter_set = scenario.origin, scenario.device, _parameter_set(scenario)
     assumed = {assumption.path: assumption.note for assumption in scenario.assumptions}
     changed = {
@@ -382,7 +382,7 @@ _ARRAYS = {
     "prepared->states": "STATES",
     "prepared->counts": "COUNTS",
 }
-"""What the function from settings to the numbers of a run is handed, and how many there are of each."""
+"""Arrays of the function from settings to the numbers of a run, and the size of each."""
 
 
 def _chosen_loop(program: ExportedProgram, ending: str) -> str:

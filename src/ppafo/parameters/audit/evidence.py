@@ -34,7 +34,7 @@ class NamedValue:
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One of the numbers that are compared; SI units, pressures absolute."""
+    """Operand of a comparison, in SI units, pressures absolute."""
 
     label: str
     value: float

@@ -1,1 +1,1 @@
-"""What publications state of this device and its kin: one file each, every statement that a simulation could meet."""
+"""Statements of publications on this device and its kin, one file each: all that a simulation could meet."""

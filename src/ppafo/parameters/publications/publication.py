@@ -24,7 +24,7 @@ _IDENTIFIER = r"^[a-z][a-z0-9_]*$"
 
 
 class ClaimEntry(StrictTable):
-    """One statement in the file of a publication."""
+    """Statement in the file of a publication."""
 
     id: str = Field(pattern=_IDENTIFIER, description="name of the statement, unique in the file")
     statement: Text = Field(description="what is stated, one sentence")

@@ -1,4 +1,4 @@
-"""What an integer controller declares of itself, beside what it is in the catalogue of controllers."""
+"""Declaration of an integer controller, in addition to its entry in the catalogue of controllers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -44,7 +44,7 @@ FINE_BITS = 8
 FINE = 2**FINE_BITS
 """Parts of a part that the integral is kept in."""
 WIDE = 2**FRACTION_BITS
-"""What the error is multiplied by, so that ``fraction_of`` keeps all bits of its product with a gain."""
+"""Factor of the error, so that ``fraction_of`` keeps all bits of its product with a gain."""
 SLOPE_UNIT = 65536
 """Parts of a count that the slope is kept in."""
 LARGEST_CHANGE = 8191
@@ -126,7 +126,7 @@ def pid_update(
 
 
 class PidFactors(NamedTuple):
-    """What the law multiplies by: the error, in parts of a step a count, and in fine parts for the integral of it.
+    """Factors of the law: for the error, in parts of a step per count, and in fine parts for its integral.
 
     The slope, in parts of a step for 1/65536 count a sample times 2^15; and the shares [-] of a change that the slope
     takes at once, and of the excess that the integral gives back at a sample.
@@ -189,7 +189,7 @@ _PID_NUMBERS = (
 )
 _PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _LARGEST_ERROR = 2 * LARGEST_READING
-"""In counts: reference from its middle and difference of the pressures are a whole range each at most."""
+"""Largest error in counts: reference from mid-range and pressure difference each span at most one range."""
 PID_FIXED_POINT = fixed_point_kind(
     FLOAT_PID,
     PidRows,

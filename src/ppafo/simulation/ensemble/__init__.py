@@ -20,7 +20,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
-"""How a run of an ensemble ended; refused is a combination of values that no run can have."""
+"""End of a run of an ensemble; refused: a combination of values that no run can have."""
 
 _ROUNDING = 1.0e-9
 """Fraction by which rounding may put the end of a run before the last time of its traces."""

@@ -1,4 +1,4 @@
-"""From columns to runs that share one program and one clock; a run whose numbers contradict each other is refused."""
+"""Planning of an ensemble: runs with one program and one clock from columns; contradictory runs are refused."""
 
 import operator
 from collections.abc import Callable
@@ -28,7 +28,7 @@ from ppafo.units.shown import shown_text
 _WHOLE = ("sensors.seed", "wearer.person")
 
 Rule = Callable[[Scenario], tuple[Problem, ...]]
-"""What may be wrong with a scenario that represents many runs."""
+"""Function that returns the possible faults of a scenario that represents many runs."""
 
 
 @dataclass(slots=True)

@@ -24,7 +24,7 @@ _SAME = 1.0e-6
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What is requested of every run: metrics by name, channels to trace and the times at which to keep them [s].
+    """Outputs requested of every run: metrics by name, channels to trace, and the times at which to keep them [s].
 
     ``custom`` is the Python object that controls every run, one after the other; None where the lanes do.
     """
@@ -85,7 +85,7 @@ class Outcome:
             self.metrics[name][members] = np.where(self.is_completed[members], values, np.nan)
 
     def _judge(self, task: "_MeteredBatch", states: Floats) -> None:
-        """Which runs were completed, as in a single run: possible all the time, and finite at the end."""
+        """Set which runs were completed, as for a single run: valid throughout, and finite at the end."""
         members = task.members
         result = group_of("result", task.batch.program.state_rows(), states)
         failed = result.failure_time

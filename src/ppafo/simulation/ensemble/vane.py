@@ -1,4 +1,4 @@
-"""What a vane alone brings to an ensemble: clocks of runs, numbers that contradict each other, metrics it has not."""
+"""Ensembles of a vane alone: clocks of runs, contradictory numbers, and metrics that it lacks."""
 
 from collections.abc import Mapping
 from typing import Any

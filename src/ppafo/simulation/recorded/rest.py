@@ -1,4 +1,4 @@
-"""Where a replay starts: angle and pressures that the samples before the first command show, noise averaged out."""
+"""Initial state of a replay: angle and pressures of the samples before the first command, averaged over the noise."""
 
 import math
 from collections.abc import Mapping

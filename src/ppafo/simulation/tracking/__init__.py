@@ -1,4 +1,4 @@
-"""Whether what a run controls follows its reference: the rule, the causes, and the remedies that were tried."""
+"""Verdict on reference tracking: the rule, the causes, and the remedies that were tried."""
 
 from ppafo.simulation.tracking.rule import REVERSALS, most_reversals
 from ppafo.simulation.tracking.verdict import Tracking, tracking_in

@@ -89,7 +89,7 @@ def oscillation(case: Case) -> Cause | None:
 
 
 def _steps_of_pair(case: Case, law: ControllerKind, quicker: float) -> Cause:
-    """What a pair of on/off valves changes during its dead time, over what is wanted."""
+    """Change caused by a pair of on/off valves during its dead time, as a multiple of the wanted value."""
     scenario = case.scenario
     step, late = pair_step(scenario, law)
     step *= quicker

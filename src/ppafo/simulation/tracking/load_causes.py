@@ -49,7 +49,7 @@ def torque_beyond_reach(case: Case) -> Cause | None:
 
 
 def load_beyond_reach(case: Case) -> Cause | None:
-    """What works on a free joint is more than the actuator gives where the joint is to be."""
+    """Load on a free joint beyond the torque of the actuator at the wanted angle."""
     scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
     if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
         return None

@@ -101,7 +101,7 @@ class Tracking:
 
     @property
     def time_text(self) -> str:
-        """Settled part in words, in which the error is less than that of the whole run among the metrics."""
+        """Settled part of the run, in words; its error is less than the error of the whole run in the metrics."""
         return f" from {self.since:.3g} s on" if self.since > 0.0 else ""
 
     @property

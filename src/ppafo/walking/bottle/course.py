@@ -31,7 +31,7 @@ UNITS = {
 
 
 class SupplyEnding(NamedTuple):
-    """What ended a walk on its bottle: kind, a sentence, and when [s]."""
+    """End of a walk on its bottle: kind, a sentence, and its time [s]."""
 
     kind: EndKind
     message: str
@@ -39,7 +39,7 @@ class SupplyEnding(NamedTuple):
 
 
 class SupplyBalance(NamedTuple):
-    """What must close: gas out of the bottle, through its regulator and as ice in it [kg], and energy of all parts [J].
+    """Balances of a supply: gas out of the bottle, through its regulator and as ice [kg], energy of all parts [J].
 
     left_bottle = regulated + iced. ``given_up`` is what content, wall, regulator and hose lost, ``ice`` the enthalpy
     that the dry ice in the seat lacks, ``room`` the heat of the room, ``delivered`` the enthalpy of the gas behind the

@@ -26,7 +26,7 @@ LEAST_TORQUE = Quantity("least_torque", "1", "torque that ends the walk, over th
 COUPLING = Quantity("coupling", "s", "time between two exchanges of bottle and device", 0.1, 1.0e-3, 1.0)
 _SET_PRESSURE = "regulator.set_pressure"
 BOTTLE_OVERRIDES = {path if path.startswith(f"{BOTTLE}.") else f"{BOTTLE}.{path}": path for path in PATHS}
-"""What an override may set of the bottle's own file, ``bottle.volume`` and ``bottle.regulator.area``, by its path."""
+"""Values of the bottle's own file that an override may set, ``bottle.volume`` or ``bottle.regulator.area``, by path."""
 
 BOTTLE_NUMBERS = (FILL, TEMPERATURE, LEAST_TORQUE, COUPLING)
 
@@ -36,10 +36,10 @@ _FOLLOWS = {
     "regulator": f"set {BOTTLE}.regulator.heat_capacity higher",
     "hose": f"set {BOTTLE}.hose.heat_capacity higher",
 }
-"""What makes a part of the supply follow more slowly."""
+"""Remedies that slow the response of a part of the supply."""
 
 _OWN = tuple(f"{SUPPLY_LINE}.plantarflexion.{name}" for name in ("droop", "largest_flow"))
-"""What the bottle's own regulator says instead."""
+"""Settings that the bottle's own regulator replaces."""
 
 _SAME_GAS = 1.0e-2
 """Fraction by which the gas constants of bottle and device may differ: the same species from two sources."""

@@ -1,4 +1,4 @@
-"""What figures over the time of a walk share: the axis of time, kinds of numbers, the look of their lines."""
+"""Common basis of figures over the time of a walk: time axis, kinds of numbers, styles of the lines."""
 
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark

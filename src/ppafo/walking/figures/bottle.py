@@ -97,7 +97,7 @@ def _marks_inside(supply: SupplyCourse) -> list[Mark]:
 
 
 def _temperature_marks(supply: SupplyCourse) -> list[Mark]:
-    """Return the temperatures on the way of the gas, and that of dry ice where the gas may freeze."""
+    """Return the temperatures along the gas path, and the temperature of dry ice if the gas may freeze."""
     marks = [
         Mark("line", supply.times, supply.values[name], label=label, colour=colour)
         for name, label, colour in _TEMPERATURES

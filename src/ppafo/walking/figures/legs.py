@@ -55,7 +55,7 @@ _COLOURS = 48
 _NEARLY_WHITE = 248
 """Level from 0 to 255 above which all three make white, so that the background has one colour."""
 _SLOWED = 2.0
-"""Time of the animation over that of the walk."""
+"""Duration of the animation over the duration of the walk [-]."""
 _VIEW = (-0.62, 0.62, -0.12, 0.78)
 _TICK = 0.35
 """Distance of the marks on the ground [m]."""
@@ -194,7 +194,7 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """One state of a row: name, the same for a narrow block, colour, and where a channel's values belong to it."""
+    """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
 
     name: str
     short: str
@@ -334,7 +334,7 @@ def _pressures(axes: "Axes", result: WalkResult) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Scene:
-    """One panel with a leg that walks through it."""
+    """Panel with a leg that walks through it."""
 
     axes: "Axes"
     legs: Legs

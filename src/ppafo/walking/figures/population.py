@@ -1,4 +1,4 @@
-"""What many wearers get: histograms of the outcomes of their walks, and two outcomes over a trait of the wearer."""
+"""Outcomes of many wearers: histograms over their walks, and two outcomes over a trait of the wearer."""
 
 import textwrap
 from typing import TYPE_CHECKING

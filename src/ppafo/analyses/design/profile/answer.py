@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """How far a sized valve is from its limits, as fractions [-].
+    """Reserves of a sized valve to its limits, as fractions [-].
 
     ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
     than the profile asks for; below 0 where the error limit lets its crest be cut. ``flow``: how much smaller the
@@ -46,7 +46,7 @@ class Margins:
 
 @dataclass(frozen=True, slots=True)
 class Notes:
-    """What else is to be known of a sized valve.
+    """Remarks on a sized valve.
 
     ``fails_above`` is a higher pressure [Pa absolute] at which the error limit is exceeded again, ``rated`` the rated
     pressure [Pa absolute] of its parts, where it works at none and none above was tried. ``is_cold`` is true where a

@@ -44,7 +44,7 @@ class ProfileTable(StrictTable):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TorqueProfile:
-    """One repetition: times [s] from 0 and torques [N m] as given, and the knots of the table that stands for them.
+    """Period of a torque profile: times [s] from 0 and torques [N m] as given, and the knots of its table.
 
     ``kind`` says where it comes from: ``measured``, ``simulated``, ``synthetic`` or ``typed``.
     """
@@ -222,7 +222,7 @@ class SizingFile(StrictTable):
 
 @dataclass(frozen=True, slots=True)
 class SizingProblem:
-    """What to size for, in SI.
+    """Sizing problem in SI units: torque profile, motion, valve and limits.
 
     ``scenario`` follows the profile for ``simulated`` repetitions. ``repetitions`` is what one bottle has to last for,
     with ``reserve`` [-] left. ``largest_error`` [N m] is the limit; pressures [Pa absolute]. ``gains`` are the paths of

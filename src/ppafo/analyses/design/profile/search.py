@@ -1,4 +1,4 @@
-"""Which supply pressures a valve can do a task with, what it takes there, and what limits it.
+"""Search for the feasible supply pressures of a valve, their gas demand, and the limiting quantity.
 
 Each pressure is tried with many gains, and some openings, of one valve at once. Nothing is taken for
 granted about how the error depends on the pressure.
@@ -31,7 +31,7 @@ LIMITS: dict[Limit, str] = {
     "control": "the control: neither more pressure nor a larger opening would suffice",
     "pressure": "nothing: the lowest requested pressure suffices",
 }
-"""What keeps a valve from working at a lower pressure, or from working at all."""
+"""Quantity that keeps a valve from working at a lower pressure, or at any pressure, in words."""
 ERROR, GAS = "rms_error", "gas_supplied"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
@@ -42,7 +42,7 @@ GRID = 17
 FINENESS = 0.1 * PASCALS_PER_PSI
 """Pressure [Pa] to which the lowest one is found."""
 WIDER = (2.0, 4.0, 16.0)
-"""How much larger openings are tried to see whether the flow limits."""
+"""Factors by which the opening is enlarged to test whether the flow is the limit [-]."""
 NEAR_CEILING = 1.2
 """A lowest gauge pressure of at most this many times the one that the torque ceiling alone demands is owed to it."""
 LEAST_PEAK = 0.7

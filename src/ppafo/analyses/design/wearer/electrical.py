@@ -1,4 +1,4 @@
-"""What coils, spool, shut-off valve and processor take over a walk, and the battery that feeds them."""
+"""Electrical energy of coils, spool, shut-off valve and processor over a walk, and the battery that supplies it."""
 
 import math
 from dataclasses import dataclass

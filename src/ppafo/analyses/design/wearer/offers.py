@@ -1,4 +1,4 @@
-"""What would have to be given up where no device does what is wanted: each offer walked on the largest bottle."""
+"""Alternatives where no device meets the requirements: one is relaxed in each, and walked on the largest bottle."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -12,7 +12,7 @@ from ppafo.parameters.parts.catalogue import rated_pressure
 
 @dataclass(frozen=True, slots=True)
 class Shelf:
-    """What a device may be built of: parts by group, and the catalogue file they are from where it is one's own."""
+    """Parts available for a device, by group, and the user's catalogue file, if any."""
 
     groups: Mapping[str, Mapping[str, Part]]
     own_groups: frozenset[str]

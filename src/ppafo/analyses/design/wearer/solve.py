@@ -1,4 +1,4 @@
-"""From a wearer to a device: the lightest parts with which a walk on its bottle does what is wanted.
+"""Sizing for a wearer: the lightest parts whose walk on the bottle meets the requirements.
 
 Every pair of valve and actuator walks a few strides; those with the torque whose toes clear the ground walk on bottles,
 lightest first, until one lasts. That walk, whole, is the suggestion; where none does, walks say what would have to be

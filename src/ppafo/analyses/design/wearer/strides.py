@@ -31,7 +31,7 @@ _EARLY_LIFT = ("controller.swing_peak_time=0.73", "controller.swing_rise_time=0.
 _OF_ACTUATOR = ("torque_constant", "displacement_per_radian")
 """Numbers of an actuator in the catalogue that a walk takes over."""
 _PROPORTIONAL = "proportional"
-"""The kind of valve whose controller follows a torque; that of a pair of solenoid valves only has a limit."""
+"""Kind of valve with which a controller follows a torque; solenoid valves only limit it."""
 SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OFF} | {"area": 1.0e-5}
 """Numbers of the shut-off valve of every device [SI]: the usual ones, and an area that does not throttle the supply."""
 

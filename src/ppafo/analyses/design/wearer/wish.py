@@ -1,4 +1,4 @@
-"""What is wanted of a device for a wearer, what was tried for it, and what came of it."""
+"""Design requirements of a wearer, the devices that were tried, and the result of each."""
 
 import math
 import shlex
@@ -37,7 +37,7 @@ TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What is wanted: body mass [kg], stature [m] or None, torque [N m], supply pressure [Pa absolute], time [s].
+    """Design requirements: body mass [kg], stature [m] or None, torque [N m], supply [Pa absolute], time [s].
 
     ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted.
     """
@@ -199,7 +199,7 @@ class Offer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WearerSizing:
-    """What was wanted and all that was tried; ``device`` is None where none has it, and ``instead`` what would do.
+    """Requirements and every device tried; ``device`` is None if none meets them, ``instead`` has the alternatives.
 
     ``healthy_toes`` is the clearance of the toes in the healthy gait [m].
     """

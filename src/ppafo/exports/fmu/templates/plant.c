@@ -14,7 +14,7 @@ static bool take_first_sample(unit *item)
     return do_steps(item, 0);
 }
 
-/* Go on to a time since the start that is a whole number of run.step, to a thousandth; the engine may divide these. */
+/* Go on to a time since the start that is a whole number of steps of the inputs, to a thousandth; the engine may divide these. */
 static bool go_to(unit *item, double time)
 {
     const double step = item->run->parameters.timing.period;
@@ -27,7 +27,7 @@ static bool go_to(unit *item, double time)
     }
     until = (int64_t)(wanted + 0.5);
     if (fabs(wanted - (double)until) > 1.0e-3) {
-        return refuse(item, "time %g s lies between the steps of the engine: a communication step is a multiple of run.step, %g s",
+        return refuse(item, "time %g s lies between the steps of the inputs: a communication step is a multiple of @clock@, %g s",
             time, step);
     }
     if (!are_inputs_numbers(item) || (item->now.is_stale && !renew(item))) {

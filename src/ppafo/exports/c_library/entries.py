@@ -1,0 +1,96 @@
+"""Entries of an exported module that prepare a run: their lines around the functions that prepare it."""
+
+import ast
+from collections.abc import Sequence
+
+from ppafo.engine.entries import indent, parse_expression
+from ppafo.engine.generator import StepText
+from ppafo.engine.source_text import SourceCollector
+from ppafo.exports.c_library.boundary import Boundary
+from ppafo.exports.c_library.exported import COUNTS
+from ppafo.exports.c_library.files import Setting, c_identifier
+from ppafo.exports.c_library.preparation import Preparation
+from ppafo.model.declaration import PlainFunction, quantities_of
+from ppafo.parameters.graph import Graph, Term
+
+
+def prepare_entry(
+    preparation: Preparation,
+    functions: Sequence[PlainFunction],
+    settings: Sequence[Setting],
+    collector: SourceCollector,
+    boundary: Boundary,
+) -> str:
+    """Entry ``prepare`` of an exported module, made of functions that prepare a run.
+
+    Arguments:
+        preparation: scenario and program
+        functions: functions of preparation, lane and settings in their order; the last one gives the numbers of steps
+        settings: settings of the library, in the order of their places
+        collector: functions of the module
+        boundary: interface between the entry and its callers
+    """
+    program = preparation.program
+    *lines, counts = StepText(program, collector).joined(functions, preparation, ["settings"])
+    assert isinstance(counts, ast.Return), "the last function gives the numbers of the steps"
+    assert isinstance(counts.value, ast.Tuple), "as many as there are names"
+    cells = {setting.name: boundary.cell("settings", place, setting.name) for place, setting in enumerate(settings)}
+
+    class FromSettings(ast.NodeTransformer):
+        def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+            if isinstance(node.value, ast.Name) and node.value.id == "settings":
+                return parse_expression(cells[node.attr])
+            self.generic_visit(node)
+            return node
+
+    def written(node: ast.AST) -> str:
+        return ast.unparse(ast.fix_missing_locations(FromSettings().visit(node)))
+
+    body = [*map(written, lines), *boundary.given("parameters", program.parameter_rows())]
+    # Task sequence and meters begin with the first sample.
+    later = {"course", *program.meter_groups}
+    body += boundary.given("states", {name: row for name, row in program.state_rows().items() if name not in later})
+    body += [
+        f"{boundary.cell('counts', place, name)} = {written(number)}"
+        for place, (name, number) in enumerate(zip(COUNTS, counts.value.elts, strict=True))
+    ]
+    head = boundary.head("prepare", dict.fromkeys(("settings", "parameters", "states", "counts"), "float64[::1]"))
+    return "\n".join([head, *indent(body)])
+
+
+def follow_entry(settings: Sequence[Setting], links: Graph, collector: SourceCollector, boundary: Boundary) -> str:
+    """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
+    places = {setting.path: index for index, setting in enumerate(settings)}
+
+    def cell(array: str, path: str) -> str:
+        return boundary.cell(array, places[path], c_identifier(path))
+
+    used = {source for follows in links.values() for link in follows for source in link.sources}
+    rows: list[str] = []
+    lines = [f"{c_identifier(path)} = {cell('settings', path)}" for path in places if path in used - set(links)]
+    for path, follows in links.items():
+        name, own = c_identifier(path), cell("settings", path)
+        text = own
+        # The first link that holds wins, so it is the outermost choice.
+        for link in reversed(follows):
+            number = " + ".join([*(_term(term, rows, collector) for term in link.terms), repr(link.gap)])
+            source = link.sources[0]
+            # Compared with the default to the bit: a value that was written again counts as not set.
+            is_set = f"{cell('settings', source)} != {settings[places[source]].value!r}"
+            text = f"(({number}) if {is_set} else {text})" if link.when_set else f"({number})"
+        lines.append(f"{name} = {text} if {own} == {settings[places[path]].value!r} else {own}")
+        lines.append(f"{cell('followed', path)} = {name}")
+    head = boundary.head("follow", dict.fromkeys(("settings", "followed"), "float64[::1]"))
+    return "\n".join([*rows, head, *indent(lines)])
+
+
+def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
+    """A term of what is followed; structs that only it has are added to ``rows``."""
+
+    def filled(row: type, numbers: Sequence[str]) -> str:
+        name = f"Followed{len(rows)}"
+        rows.append(f"{name} = namedtuple({name!r}, {[quantity.name for quantity in quantities_of(row)]!r})")
+        return f"{name}({', '.join(numbers)})"
+
+    arguments = term.arguments([c_identifier(source) for source in term.sources], filled)
+    return f"{collector.add(term.function)}({', '.join(arguments)})"

@@ -1,0 +1,91 @@
+"""Settings of an exported scenario: every number by its path, in SI units, and those that contradict each other."""
+
+from dataclasses import replace
+
+from ppafo.exports.c_library.files import Relation, Setting, c_identifier
+from ppafo.model.catalog import device_effects
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.building import consistency
+from ppafo.parameters.plant import effects_of
+from ppafo.simulation.clock import TIMES, step_unless_given, step_with_output, time_texts
+from ppafo.simulation.declaration import LOCKED_ANGLE, value_at
+from ppafo.simulation.numbers import declared_numbers, number_at, other_form, path_of_locked_angle
+from ppafo.simulation.profiles import TOLERANCE
+from ppafo.simulation.scenario import Scenario
+from ppafo.units import parse_quantity
+
+SAID = {
+    "run.step": "longest step of the engine",
+    "run.output_interval": "time from one sample to the next",
+    "controller.period": "time between two decisions of the controller",
+}
+"""Meanings of some settings outside a file."""
+
+
+def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
+    """Every number of a scenario in SI units, under the path that overrides know it by."""
+    # The file's step, from which the engine makes one that divides a sample.
+    texts = time_texts(scenario)
+    duration, period = scenario.run.duration, scenario.controller.period
+    step, output = (value_at(texts, f"run.{name}") for name in ("step", "output_interval"))
+    if step is not None:
+        longest = parse_quantity(str(step), "s")
+    elif output is None:
+        longest = step_unless_given(duration, period)
+    else:
+        longest = step_with_output(duration, period, scenario.run.output_interval)
+    times = {
+        "run.duration": duration,
+        "run.step": longest,
+        "run.output_interval": scenario.run.output_interval,
+        "controller.period": period,
+    }
+    return tuple(
+        Setting(
+            c_identifier(path),
+            path,
+            replace(quantity, summary=SAID.get(path, quantity.summary)),
+            times[path] if path in TIMES else number_at(scenario, path),
+        )
+        for path, quantity in declared_settings(scenario).items()
+    )
+
+
+def relations_of(scenario: Scenario) -> tuple[Relation, ...]:
+    """Settings that contradict each other, as they would in a file."""
+    rules: list[tuple[str, str, str, float]] = [
+        *((path, relation, other, 0.0) for path, relation, other, _ in consistency(scenario.device)),
+        ("run.step", "at most", "run.duration", 0.0),
+        ("run.output_interval", "at most", "run.duration", 0.0),
+        ("sensors.delay", "at most", "run.duration", 0.0),
+    ]
+    # A vane that stays at an angle, or starts there.
+    stays = path_of_locked_angle(scenario) or LOCKED_ANGLE
+    if stays in declared_settings(scenario):
+        rules.append((stays, "at least", "actuator.angle_min", TOLERANCE))
+        rules.append((stays, "at most", "actuator.angle_max", TOLERANCE))
+    if scenario.supply_lines is not None:
+        rules.append(("supply.dorsiflexion_pressure", "at most", "supply.pressure", 0.0))
+    of_steps = (
+        Relation("run_step", "at most", longer, TOLERANCE, is_share=True)
+        for longer in ("controller_period", "run_output_interval")
+    )
+    return (
+        *(Relation(c_identifier(path), relation, c_identifier(other), slack) for path, relation, other, slack in rules),
+        *of_steps,
+    )
+
+
+def declared_settings(scenario: Scenario) -> dict[str, Quantity]:
+    """Declarations by path, without the form of an orifice that is not used, effects that are off, second names."""
+    device = scenario.device
+    unused = {"controller.rate"}
+    unused |= {f"{section}.{name}" for section in ("valve", "actuator.leak") for name in other_form(device, section)}
+    is_on = effects_of(device)
+    unused |= {
+        f"{effect.section}.{quantity.name}"
+        for effect in device_effects()
+        if effect not in is_on
+        for quantity in effect.quantities
+    }
+    return {path: quantity for path, quantity in declared_numbers(scenario).items() if path not in unused}
