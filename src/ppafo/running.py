@@ -16,6 +16,7 @@ from ppafo.simulation import simulate as of_loaded
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import RunSettings, Scenario
 from ppafo.simulation.simulate import Result
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from ppafo.simulation.gains import Gains
@@ -107,11 +108,10 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
         if left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
             best = (remedy, left.error)
     if best is not None:
-        error = change_text(verdict.controlled, best[1])
-        return replace(
-            verdict,
-            tried=f"with {best[0].text} an RMS error of {error} is left{verdict.time_text}, as a further run shows",
-        )
+        with shown_in(verdict.units):
+            error = change_text(verdict.controlled, best[1])
+        left_text = f"an RMS error of {error} is left{verdict.time_text}"
+        return replace(verdict, tried=f"with {best[0].text} {left_text}, as a further run shows")
     names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
     advice = f"{verdict.advice}; " if verdict.advice else ""
     return replace(verdict, tried=f"{advice}other {names} alone did not mend it")

@@ -441,6 +441,16 @@ OBJECTS = (
     Case("vane: an object of Python", "long", VANE_BASE, BASES[VANE_BASE], has_object=True),
     Case("walk: an object of Python", "long", WALK_BASE, has_object=True),
 )
+STOPPED = Case(
+    "walk: a stop shuts the shut-off valve",
+    "long",
+    WALK_BASE,
+    (
+        *("shut_off.area=10 mm^2", "shut_off.delay=10 ms"),
+        *("faults.valve_1.kind=stuck", "faults.valve_1.time=0.55 s", "faults.valve_1.opening=0.5"),
+    ),
+)
+"""Its controller stops the device, which no command says, and the valve that is stuck lets gas on."""
 
 REFUSED: tuple[tuple[str, float, str], ...] = (
     ("valve.area", -1.0, "valve.area"),
@@ -476,6 +486,6 @@ ALONE = tuple(
     if (case := _joined("thorough", base, {name: feature})).name not in _IN_GROUPS
 )
 PAIRS = tuple(case for base, features in _ALL for case in _pairs(base, features))
-CASES = (*SHORT, *SHIPPED, *OBJECTS, *GROUPS, *ALONE, *PAIRS)
+CASES = (*SHORT, *SHIPPED, *OBJECTS, STOPPED, *GROUPS, *ALONE, *PAIRS)
 EXPORTED = tuple(case for case in CASES if case.leaves)
 """Cases that leave Python."""

@@ -7,7 +7,7 @@ from ppafo.analyses.endurance.walk_gas import WALK_FILE
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.errors import DataError, reason
 from ppafo.report.recording_figure import recording_figure
-from ppafo.report.stored_figure import draw_stored_result, draw_stored_walk, stated_atmosphere, stated_units
+from ppafo.report.stored_figure import draw_stored_result, draw_stored_walk, stated_units
 from ppafo.rig.experiments import RIG_FILE
 from ppafo.storage import read_recording, read_result
 from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
@@ -52,10 +52,8 @@ def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
 
 def _draw_rig_recording(file: Path, document: dict[str, Any], name: str) -> "Figure":
     """Return the figure of a recording of the rig, whose truth the document of its folder holds."""
-    # Gauge pressure of a recording counts from the atmosphere of its device.
-    atmosphere = stated_atmosphere(file, document, "recordings", name, "device")
     with shown_in(stated_units(file, document, "recordings", name)):
-        return recording_figure(read_recording(file.parent / name), atmosphere=atmosphere)
+        return recording_figure(read_recording(file.parent / name))
 
 
 def _document(file: Path) -> dict[str, Any]:

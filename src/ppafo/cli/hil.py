@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 from ppafo.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, counting_number
 from ppafo.cli import output
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_INTERRUPTED, Said
+from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from ppafo.exports.hil.result import HardwareRun
@@ -72,6 +73,7 @@ def hil(
     return _said(ran, port, folder)
 
 
+@in_units(lambda ran, *_: ran.result.scenario.device.shown)
 def _said(ran: "HardwareRun", port: str, folder: Path) -> Said:
     """Return what is said of a run that is written."""
     from ppafo.report.display_units import metrics_lines
@@ -83,7 +85,7 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> Said:
         "",
         ran.text(),
         "",
-        *metrics_lines(result.metrics, result.scenario.device.supply.atmospheric_pressure),
+        *metrics_lines(result.metrics),
         "",
         f"written: {folder} (recording.nc, recording.csv, log.csv, link.json, run.json, figures)",
     ]

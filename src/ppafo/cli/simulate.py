@@ -97,9 +97,8 @@ def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tu
     device = f"device '{scenario.device.name}', valve '{scenario.device.valve_name}'"
     changed = f"; values changed for this run: {', '.join(scenario.origin.overrides)}"
     caption = "What the device does over time. Pressures count from the atmosphere."
-    zero = result.scenario.device.supply.atmospheric_pressure
     rows = [
-        (metric_words(name), metric_text(metric.value, metric.unit, zero), metric.summary)
+        (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
         for name, metric in result.metrics.items()
     ]
     return Finding(

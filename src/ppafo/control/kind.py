@@ -78,7 +78,8 @@ class ControllerKind:
 
     ``controls`` names what it can follow a reference of, in ``model.controlled.CONTROLLED``. One that controls more
     than a torque acts on ``seen_error`` or ``seen_value`` of there alone, and its settings in N m are in the unit of
-    what is controlled.
+    what is controlled. Where the supplies are vacuums a command above 0 lowers the torque: these, and one of the angle
+    by ``steered``, then turn round, and laws of a torque alone are refused.
 
     A law with a ``plan`` has other numbers than its settings: ``plan(settings, period, torque_constant, reference)``
     makes them, by name, from settings in SI units, a period [s], the device's torque constant [N m/Pa] and the lowest

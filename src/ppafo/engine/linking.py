@@ -40,11 +40,11 @@ def link_program(program: Program, collector: Linked) -> None:
         of_walk = program.leg.links(program)
         collector.links.update(of_walk)
         collector.effects.update({function: program.leg.ASKED[function] for function in of_walk.values()})
+    followed = CONTROLLED[program.controlled]
     if program.controlled != TORQUE:
-        followed = CONTROLLED[program.controlled]
         collector.links[controlled] = followed.value
-        if followed.sign < 0.0:
-            collector.links[steered] = turned_round
+    if (followed.sign < 0.0) != program.has_vacuum:
+        collector.links[steered] = turned_round
     if not program.effects:
         return
     # Names of rows without any effect: two effects that share a name are refused by the catalogue.

@@ -200,6 +200,7 @@ class Program:
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
     that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
+    ``has_vacuum`` True where the supplies are below the atmosphere: a command above 0 then lowers what it raises else.
     """
 
     valve: ValveModel
@@ -226,6 +227,7 @@ class Program:
     shank: ProfileKind | None = None
     foot: FootPhases | None = None
     controlled: str = TORQUE
+    has_vacuum: bool = False
 
     @property
     def groups(self) -> Groups:

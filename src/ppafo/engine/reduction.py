@@ -363,7 +363,7 @@ class Reduction:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
         if called is rebuilt:
-            return self.row_of(self.value_of(node.args[0]), self.arguments(ast.Starred(node.args[1])))
+            return self.row_of(self.outside(node.args[0]), self.arguments(ast.Starred(node.args[1])))
         if is_step_function(called):
             name, arguments = self.called(called, node)
             if self.collector.effects_of(name).results:

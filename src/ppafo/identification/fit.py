@@ -38,6 +38,8 @@ class Fit:
     of them that were left out because each stands out by itself. ``unidentified`` are combinations, as weights of
     numbers in units of their scale, that the recordings do not fix; ``shares`` has for each number the
     tolerances that widen its interval, largest first, as fractions of the variance. ``jacobian`` is whitened [1/SI].
+    ``edge`` names the sought numbers that the recordings want where no run succeeds, each with 1 for above its value
+    and -1 for below; a search that ends there has not converged.
     """
 
     numbers: tuple[Free, ...]
@@ -57,6 +59,7 @@ class Fit:
     sensors: Mapping[str, Noise]
     jacobian: Floats
     confidence: float
+    edge: Mapping[str, int]
 
     @property
     def by_name(self) -> dict[str, float]:
@@ -205,7 +208,7 @@ def _outliers(work: Work, left: Floats) -> Indices:
 
 
 class _Settled(NamedTuple):
-    """End of a fit: scaled numbers, residuals of the samples, linearisation there, and gain of the last step.
+    """End of a fit: scaled numbers, residuals of the samples, linearisation there, last step tried, and its gain.
 
     ``gain`` is by how much the last step that was tried would lower the cost, at most 0 where it was not taken, and
     -inf where no run succeeds there.
@@ -214,6 +217,7 @@ class _Settled(NamedTuple):
     point: Floats
     residuals: Floats
     linear: Linear
+    step: Floats
     gain: float
 
 
@@ -248,12 +252,24 @@ def _settled(work: Work, point: Floats) -> _Settled:
             work.left_out = np.union1d(work.outliers, highest[leverage[highest] > _LEVERAGE])
         if gain > 0.0:
             point, left = reached, after
-    return _Settled(point=point, residuals=left, linear=linear, gain=gain)
+    return _Settled(point=point, residuals=left, linear=linear, step=step, gain=gain)
+
+
+def _edge(work: Work, point: Floats, step: Floats) -> dict[str, int]:
+    """Return the sought numbers with which no run succeeds a short step from a point, each with the sign of the step.
+
+    All of them where each alone may take it and only together they may not.
+    """
+    sought = np.flatnonzero((work.prior == 0.0) & (step != 0.0))
+    moved = point[:, None] + _SHARES[-1] * np.diag(step)[:, sought]
+    fails = ~np.isfinite(work.at(np.clip(moved, work.low[:, None], work.high[:, None]))).all(axis=0)
+    rows = sought[fails] if fails.any() else sought
+    return {work.numbers[row].name: int(np.sign(step[row])) for row in rows.tolist()}
 
 
 def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
     """Return the fit after whitening, with its intervals and what speaks against it, from scaled least squares."""
-    point, left, linear, gain = _settled(work, start)
+    point, left, linear, step, gain = _settled(work, start)
     rows = linear.rows
     known, whitened, errors = linear.sensors, rows[:, 1:], rows[:, 0]
     covariance = linear.root @ linear.root.T
@@ -284,6 +300,7 @@ def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
         sensors=known,
         jacobian=whitened / work.scale,
         confidence=confidence,
+        edge={} if math.isfinite(gain) else _edge(work, point, step),
     )
 
 

@@ -9,13 +9,17 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from ppafo.identification.residuals import Work
 from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_errors
 from ppafo.signals.recording import Floats
 
-_TRIES, _CORRECTIONS = 6, 3
-"""Points that are tried for an end, and steps of all other numbers while one is held there."""
+_TRIES, _CORRECTIONS, _LINEARISATIONS = 6, 3, 4
+"""Points tried for an end; at each, steps of the other numbers on the Jacobian of the estimate, then on new ones."""
+
+_SHARES = 0.5 ** np.arange(4.0)[:, None]
+"""Fractions of a step on a new Jacobian, of which the best is taken."""
 
 _STILL = 0.3
 """Fall of the squares [-] below which the others have settled."""
@@ -27,7 +31,7 @@ _NARROW = 0.1
 """Width of the bracket of an end over its distance from the estimate, within which it lies on a straight line."""
 
 _BENT = 1.1
-"""Factor by which an end lies beyond the straight line's at least, for it to be moved."""
+"""Factor by which the ends of profile and straight line must differ for the profile to be followed."""
 
 _UNKNOWN = 0.5
 """Standard error of a combination over the scales of its numbers from which it is not identifiable."""
@@ -72,6 +76,8 @@ def _end(
     inner, near = point, 0.0
     outer: Floats | None = None
     far, (squares, reached) = math.inf, straight
+    if math.sqrt(max(squares - least, 0.0)) > _BENT * times:
+        squares, reached = _least_along(work, reached, number, linear)
     for _ in range(_TRIES):
         # By how many standard errors priors and samples tell this point from the estimate.
         parted = math.sqrt(max(squares - least, 0.0))
@@ -87,8 +93,7 @@ def _end(
             break
         further = min(max(times / max(near, 0.1), _FURTHER), 2.0)
         tried = point + further * (inner - point) if outer is None else 0.5 * (inner + outer)
-        (squares,), points = _least_beside(work, tried[:, None], [number], linear)
-        reached = points[:, 0]
+        squares, reached = _least_along(work, np.clip(tried, work.low, work.high), number, linear)
     if outer is None:
         return bound
     share = (times - near) / (far - near)
@@ -119,6 +124,37 @@ def _least_beside(work: Work, points: Floats, held: list[int], linear: Linear) -
             break
         tried = np.where(moves, np.clip(tried + step, low, high), tried)
     return least, best
+
+
+def _least_along(work: Work, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
+    """Return the least squares with a number of a scaled point held, and the point where they are.
+
+    The other numbers take Gauss-Newton steps within their bounds, each on a Jacobian of its own: far from the estimate
+    its Jacobian leads out of a valley that bends. Infinite where no run succeeds.
+    """
+    errors = whitened_errors(work, work.at(point[:, None]), linear)
+    squares = float(squares_of(work, errors, point[:, None])[0])
+    if not math.isfinite(squares):
+        return math.inf, point
+    others = np.delete(np.arange(len(point)), number)
+    for _ in range(_LINEARISATIONS):
+        slopes = whitened_errors(work, work.jacobian(point, 1.0 / linear.noise, is_central=False), linear)
+        axes, triangle = np.linalg.qr(np.concatenate([slopes, np.diag(work.prior)])[:, others])
+        pull = axes.T @ np.concatenate([errors[:, 0], (point - work.mean) * work.prior])
+        low, high = (end - point[others] for end in (work.low[others], work.high[others]))
+        step = np.zeros(len(point))
+        step[others] = lsq_linear(triangle, -pull, (low - 1.0e-300, high + 1.0e-300), method="bvls").x
+        tried = np.clip(point + _SHARES * step, work.low, work.high).T
+        all_errors = whitened_errors(work, work.at(tried), linear)
+        all_squares = squares_of(work, all_errors, tried)
+        best = int(np.argmin(np.where(np.isfinite(all_squares), all_squares, np.inf)))
+        fall = squares - float(all_squares[best])
+        if not fall > 0.0:
+            break
+        point, errors, squares = tried[:, best], all_errors[:, [best]], float(all_squares[best])
+        if fall < _STILL:
+            break
+    return squares, point
 
 
 def unidentified(covariance: Floats, names: Sequence[str]) -> Iterator[dict[str, float]]:

@@ -49,9 +49,12 @@ class Source:
         return self.reference or self.recording.label
 
 
-def source_of(path: Path, recording: Recording) -> Source:
-    """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone."""
-    return Source(recording, f"{path.name} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
+def source_of(path: Path, recording: Recording, trial: str = "") -> Source:
+    """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone.
+
+    ``trial`` stands behind the name where the file has several recordings.
+    """
+    return Source(recording, f"{path.name}{trial} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,11 @@ def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: N
     return supplied - vented - (mass_1 + mass_2)
 
 
+def gas_taken(supplied: Numeric) -> Numeric:
+    """Gas [kg] that a source moves: out of a supply, or into one that is a vacuum."""
+    return abs(supplied)
+
+
 def energy_imbalance(supplied: Numeric, vented: Numeric, heat: Numeric, work: Numeric, stored: Numeric) -> Numeric:
     """Enthalpy supplied less vented, and heat, less work and stored energy [J]; what a simulation loses or invents."""
     return supplied - vented + heat - work - stored
@@ -51,7 +56,7 @@ def mechanical_work(recording: Recording) -> float:
 
 def work_per_gas(recording: Recording) -> float | None:
     """Mechanical work per gas taken from the supply [J/kg]; None where none was taken."""
-    gas = gained(recording, ("supplied_mass",))
+    gas = gained(recording, ("supplied_mass",), gas_taken)
     return mechanical_work(recording) / gas if gas > 0.0 else None
 
 
@@ -59,7 +64,7 @@ def gas_per_work(recording: Recording) -> float | None:
     """Gas taken from the supply per mechanical work [kg/J]; None where the actuator gave no work."""
     # A task that takes work from the leg would have a ratio below 0, which would rank as the best.
     work = mechanical_work(recording)
-    return gained(recording, ("supplied_mass",)) / work if work > 0.0 else None
+    return gained(recording, ("supplied_mass",), gas_taken) / work if work > 0.0 else None
 
 
 class GasGains(NamedTuple):
@@ -187,6 +192,16 @@ def ratio(above: Floats, below: Floats) -> Floats:
     return found
 
 
+def per_gas(work: Floats, supplied: Floats) -> Floats:
+    """Work [J] per gas [kg] that a source moves; nan where there is none."""
+    return ratio(work, gas_taken(supplied))
+
+
+def of_gas(supplied: Floats, work: Floats) -> Floats:
+    """Gas [kg] that a source moves per work [J]; nan where that is not above 0."""
+    return ratio(gas_taken(supplied), work)
+
+
 _BALANCE = ("supplied_mass", "vented_mass", "mass_1", "mass_2")
 ENERGIES = ("supplied_enthalpy", "vented_enthalpy", "wall_heat", "gas_work", "gas_energy")
 WITH_ENERGY_BALANCE = frozenset({"temperature_1", "temperature_2", *ENERGIES})
@@ -209,8 +224,8 @@ def _of_gains(
 
 
 METRICS = (
-    _of_gains("gas_supplied", "kg", "gas taken from the supply", ("supplied_mass",)),
-    _of_gains("gas_vented", "kg", "gas let out to the atmosphere", ("vented_mass",)),
+    _of_gains("gas_supplied", "kg", "gas taken from the supply, or by a vacuum", ("supplied_mass",), gas_taken),
+    _of_gains("gas_vented", "kg", "gas let out to the atmosphere, below 0 let in", ("vented_mass",)),
     _of_gains("gas_leaked", "kg", "gas leaked from chamber to chamber, in either direction", ("leaked_mass",)),
     _of_gains("gas_imbalance", "kg", "supplied less vented less stored gas", _BALANCE, gas_imbalance),
     _of_gains(
@@ -254,7 +269,7 @@ METRICS = (
         "work per supplied gas",
         _EFFORT,
         work_per_gas,
-        ReadAt(("meters.work.work", "meters.gas.gained.supplied_mass"), ratio),
+        ReadAt(("meters.work.work", "meters.gas.gained.supplied_mass"), per_gas),
         (WORK, GAS),
     ),
     MetricKind(
@@ -263,7 +278,7 @@ METRICS = (
         "supplied gas per work",
         _EFFORT,
         gas_per_work,
-        ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), ratio),
+        ReadAt(("meters.gas.gained.supplied_mass", "meters.work.work"), of_gas),
         (WORK, GAS),
     ),
 )

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from ppafo.model.columns import larger, smaller
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 from ppafo.signals.meter import Sample
@@ -83,18 +84,23 @@ def stops(ends: Ends) -> tuple[Any, Any]:
 
 def reach_of_pressure_1(ends: Ends) -> tuple[Any, Any]:
     """Between which pressures [Pa] a valve brings chamber 1: it is fed, or vented."""
-    return ends.atmospheric_pressure, ends.supply_pressure
+    return _in_order(ends.atmospheric_pressure, ends.supply_pressure)
 
 
 def reach_of_pressure_2(ends: Ends) -> tuple[Any, Any]:
     """Between which pressures [Pa] a valve brings chamber 2."""
-    return ends.atmospheric_pressure, ends.dorsiflexion_pressure
+    return _in_order(ends.atmospheric_pressure, ends.dorsiflexion_pressure)
 
 
 def reach_of_difference(ends: Ends) -> tuple[Any, Any]:
     """Between which differences of pressure [Pa] a valve brings both: one is full while the other one is vented."""
     room = ends.atmospheric_pressure
-    return room - ends.dorsiflexion_pressure, ends.supply_pressure - room
+    return _in_order(room - ends.dorsiflexion_pressure, ends.supply_pressure - room)
+
+
+def _in_order(one: Any, other: Any) -> tuple[Any, Any]:
+    """Return the lower and the higher end of a range; a vacuum is below the atmosphere."""
+    return smaller(one, other), larger(one, other)
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +110,8 @@ class Controlled:
     ``words`` name it in a sentence, ``level`` declares a value of it, ``difference`` is the unit of a difference of two
     values. ``value(angle, pressure_1, pressure_2, torque)`` gives it of what sensors show. ``size`` is about as much of
     it as 1 N m is of a torque: the ranges of gains are scaled by it. A command above 0 raises it, or lowers it where
-    ``sign`` is -1. ``reach`` says between what it can be, called ``limits`` in a sentence; None of a torque, which
-    depends on what moves the joint.
+    ``sign`` is -1; the other way round where the supplies are below the atmosphere. ``reach`` says between
+    what it can be, called ``limits`` in a sentence; None of a torque, which depends on what moves the joint.
     """
 
     name: str

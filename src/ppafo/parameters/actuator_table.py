@@ -117,10 +117,11 @@ def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tupl
     return volume + resolution * solved.x[:size].reshape(volume.shape), float(resolution * solved.x[-1])
 
 
-def highest_pressure(table: Table) -> float:
-    """Return the highest pressure measured [Pa, gauge]; infinity where one pressure stands for all."""
-    ends = [rise.lower + rise.length for rise in table.chamber_1.rises if rise.lower < _UNREACHED]
-    return max(ends, default=math.inf)
+def measured_pressures(table: Table) -> tuple[float, float]:
+    """Return the lowest and the highest pressure measured [Pa, gauge]; infinite where one pressure stands for all."""
+    rises = [rise for rise in table.chamber_1.rises if rise.lower < _UNREACHED]
+    lowest = min((rise.lower for rise in rises), default=-math.inf)
+    return lowest, max((rise.lower + rise.length for rise in rises), default=math.inf)
 
 
 def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> Chamber:

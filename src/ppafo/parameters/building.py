@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
-from ppafo.model.columns import Problem, at, larger
+from ppafo.model.columns import Problem, at, first, larger, smaller
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects.kind import SECTION
 from ppafo.model.gas import SPECIES
@@ -28,7 +28,7 @@ from ppafo.parameters.device import (
     Supply,
     Valve,
 )
-from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, SECOND_PRESSURE_PATH, Graph
+from ppafo.parameters.graph import ATMOSPHERE_PATH, DISPLACEMENT_PATH, PRESSURE_PATH, SECOND_PRESSURE_PATH, Graph
 from ppafo.parameters.overrides import FORMS, either, in_two_forms
 from ppafo.parameters.parameter_set import (
     ParameterSet,
@@ -44,7 +44,9 @@ from ppafo.parameters.plant import shape_and_growth
 _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
 _COVERED = 1.01
-"""A supply this much above the pressures of a table is still covered by it."""
+"""A supply this much beyond the pressures of a table is still covered by it."""
+_BESIDE_ANOTHER = "; the other supply is above it, and both must be on one side"
+SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
 """Function that reads a section by its declared quantities: numbers in SI, by name."""
 _FLAT_SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow")
@@ -84,7 +86,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
             for effect in sorted(named_effects)
         },
         links=links,
-        shown=parameter_set.shown,
+        units=parameter_set.shown,
     )
     is_beyond, line = beyond_pressures(device)
     if is_beyond:
@@ -92,7 +94,13 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     for path, relation, other, holds in consistency(device):
         if not holds:
             number, limit = number_text(parameter_set.numbers[path]), number_text(parameter_set.numbers[other])
-            raise ParameterError(f"{parameter_set.file}: {path} = {number} must be {relation} {other} = {limit}")
+            why = _BESIDE_ANOTHER if path in SUPPLIES else ""
+            raise ParameterError(f"{parameter_set.file}: {path} = {number} must be {relation} {other} = {limit}{why}")
+    if device.supply.is_vacuum and relieving is not None and not relieving.value:
+        raise ParameterError(
+            f"{parameter_set.file}: {declaration.RELIEVING_PATH} = false: gas goes from the chambers into a supply "
+            "below the atmosphere; set it to true or leave it out"
+        )
     if device.actuator.kind == VANE:
         return device
     # An actuator of another kind has what a vane of its mean size would have, for whatever is made for a vane.
@@ -159,20 +167,25 @@ def actuator_problem(actuator: Actuator) -> str:
 
 
 def beyond_pressures(device: Device) -> Problem:
-    """Return where the supply is above the pressures at which a table was measured, in columns too."""
+    """Return where the supply is beyond the pressures at which a table was measured, in columns too."""
     table, supply = device.actuator.table, device.supply
     if table is None:
-        highest = math.inf
+        lowest, highest = -math.inf, math.inf
     else:
-        from ppafo.parameters.actuator_table import highest_pressure
+        from ppafo.parameters.actuator_table import measured_pressures
 
-        highest = highest_pressure(table)
-    gauge = larger(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+        lowest, highest = measured_pressures(table)
+    if supply.is_vacuum:
+        gauge = smaller(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+        is_beyond, way, end = gauge < _COVERED * lowest, "down", lowest
+    else:
+        gauge = larger(supply.pressure, supply.dorsiflexion_pressure) - supply.atmospheric_pressure
+        is_beyond, way, end = gauge > _COVERED * highest, "up", highest
 
     def line(run: int) -> str:
-        return f"its file was measured up to {highest / 1e3:.4g} kPa_g, and the supply has {at(gauge, run) / 1e3:.4g}"
+        return f"its file was measured {way} to {end / 1e3:.4g} kPa_g, and the supply has {at(gauge, run) / 1e3:.4g}"
 
-    return gauge > _COVERED * highest, line
+    return is_beyond, line
 
 
 def _reader(parameter_set: ParameterSet) -> Reader:
@@ -265,7 +278,10 @@ def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
 def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
     """Rules between two numbers: path, relation, path of the other, and whether it holds (in columns, for each run)."""
     actuator, friction, supply = device.actuator, device.friction, device.supply
-    atmosphere = supply.atmospheric_pressure
+    # Of two supplies on either side of the atmosphere both would turn the joint one way.
+    pressures = supply.pressure, supply.dorsiflexion_pressure
+    sides = [pressure - supply.atmospheric_pressure for pressure in pressures]
+    is_suction = supply.is_vacuum and max(first(gauge) for gauge in sides) <= 0.0
     return (
         ("actuator.angle_min", "below", "actuator.angle_max", actuator.angle_min < actuator.angle_max),
         (
@@ -274,6 +290,10 @@ def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:
             "friction.static_torque",
             friction.dynamic_torque <= friction.static_torque,
         ),
-        ("supply.pressure", "at least", ATMOSPHERE_PATH, supply.pressure >= atmosphere),
-        ("supply.dorsiflexion_pressure", "at least", ATMOSPHERE_PATH, supply.dorsiflexion_pressure >= atmosphere),
+        *(
+            (path, "at most", ATMOSPHERE_PATH, gauge <= 0.0)
+            if is_suction
+            else (path, "at least", ATMOSPHERE_PATH, gauge >= 0.0)
+            for path, gauge in zip(SUPPLIES, sides, strict=True)
+        ),
     )

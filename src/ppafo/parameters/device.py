@@ -9,10 +9,12 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError
 from ppafo.model.actuators.vane import SMALLEST_VOLUME
 from ppafo.model.catalog import ACTUATORS
+from ppafo.model.columns import first
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
 from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.units.shown import counted_from
 
 VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
@@ -134,7 +136,8 @@ class FootPlate:
 class Supply:
     """Regulated pressures [Pa absolute]: to chamber 1, to chamber 2 (dorsiflexion), and the atmosphere.
 
-    ``relieving`` is True where the regulators take gas back from a chamber above their pressure.
+    ``relieving`` is True where the regulators take gas back from a chamber above their pressure. A supply below the
+    atmosphere is a vacuum, into which the gas of a chamber goes.
     """
 
     pressure: Annotated[float, Number("Pa_a", "regulated pressure to chamber 1", minimum=1e3, maximum=1e8)]
@@ -149,6 +152,16 @@ class Supply:
         """Tell whether both regulators are set to one pressure, so that they are changed together."""
         # Two texts of one pressure in two units differ in the last bits.
         return math.isclose(self.pressure, self.dorsiflexion_pressure, rel_tol=SAME_PRESSURE)
+
+    @property
+    def is_vacuum(self) -> bool:
+        """True where a supply is below the atmosphere; of an ensemble the first run says it for all."""
+        return min(first(self.pressure), first(self.dorsiflexion_pressure)) < first(self.atmospheric_pressure)
+
+    @property
+    def takes_back(self) -> bool:
+        """True where gas may flow from a chamber into its supply."""
+        return self.relieving or self.is_vacuum
 
 
 @dataclass(frozen=True, slots=True)
@@ -183,7 +196,7 @@ class Device:
 
     ``effects`` has the settings [SI] of effects by their names, of those that anything was said of; the others are off.
     ``links`` say which of its numbers follow others that are varied; ``joint`` is what it turns, in words.
-    ``shown`` are the units, by unit in SI, in which a person is shown its numbers.
+    ``units`` are those, by unit in SI, in which the author of its parameter set writes.
     """
 
     name: str
@@ -198,12 +211,26 @@ class Device:
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
     joint: Joint = ANKLE
-    shown: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+    units: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
+
+    @property
+    def shown(self) -> dict[str, str]:
+        """The units in which a person is shown its numbers, and the atmosphere from which gauge pressures count."""
+        return counted_from(self.units, first(self.supply.atmospheric_pressure))
 
     @property
     def has_torque_constant(self) -> bool:
         """True where the torque is a constant times the difference of both pressures."""
         return ACTUATORS[self.actuator.kind].model.has_torque_constant
+
+    def check_pressurised(self, what: str, remedy: str = "") -> None:
+        """Raise ParameterError, with a remedy, where ``what`` needs supplies that are not below the atmosphere."""
+        if self.supply.is_vacuum:
+            raise ParameterError(
+                f"{what} needs a supply above the atmosphere; '{self.name}' has a vacuum: supply.pressure = "
+                f"{first(self.supply.pressure) / 1e3:.4g} kPa_a, supply.dorsiflexion_pressure = "
+                f"{first(self.supply.dorsiflexion_pressure) / 1e3:.4g} kPa_a{remedy}"
+            )
 
     def check_torque_constant(self, what: str) -> None:
         """Raise ParameterError where ``what`` needs a torque that is a constant times the difference of pressures."""

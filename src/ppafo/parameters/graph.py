@@ -119,7 +119,13 @@ def counts_from(path: str, atmosphere: float) -> float:
     Pressures of the supply, of the start and of a reference count from the atmosphere of the device; what a controller
     or a sensor is set to knows no weather and counts from the standard atmosphere.
     """
-    return atmosphere if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
+    fixed = fixed_zero(path)
+    return atmosphere if fixed is None else fixed
+
+
+def fixed_zero(path: str) -> float | None:
+    """Return the standard atmosphere [Pa] where a gauge pressure at a path counts from that, None from the device's."""
+    return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 
 
 def gauge_link(path: str, value: float, unit: str) -> tuple[Follows, ...]:

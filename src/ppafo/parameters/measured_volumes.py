@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
 from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason, refused_as, said_missing
@@ -196,11 +197,13 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     angles, pressures = np.unique(angle), np.unique(pressure)
     if angles.size < 2:
         raise ParameterError(f"{file}: has one angle only, at least 2 are needed")
-    if pressures[0] < 0.0:
-        raise ParameterError(f"{file}: pressure = {pressures[0]:g} Pa_g is below the atmosphere")
-    if pressures.size > 1 and pressures[0] > 0.0:
+    if pressures[0] <= -STANDARD_ATMOSPHERE:
+        raise ParameterError(f"{file}: pressure = {pressures[0] / 1e3:.4g} kPa_g is below a perfect vacuum")
+    if pressures.size > 1 and 0.0 not in pressures:
+        nearest = pressures[int(np.argmin(np.abs(pressures)))]
         raise ParameterError(
-            f"{file}: the lowest pressure is {pressures[0] / 1e3:.4g} kPa_g; volumes at 0 kPa_g, vented, are needed too"
+            f"{file}: the pressure nearest to the atmosphere is {nearest / 1e3:.4g} kPa_g; volumes at 0 kPa_g, vented, "
+            "are needed too"
         )
     _check_spacing("angle", angles, MOST_ANGLES, _NEAREST_ANGLES * float(np.ptp(angles)), file)
     _check_spacing("pressure", pressures, MOST_PRESSURES, _NEAREST_PRESSURES, file)

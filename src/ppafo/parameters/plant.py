@@ -80,6 +80,7 @@ def plant_parameters(device: Device, external_torque: float = 0.0) -> PlantParam
     ratio = device.flow.linear_ratio
     valve = restriction(device.valve.orifice, device.gas, ratio)
     plant = plant_with(device, valve, restriction(device.actuator.leak, device.gas, ratio), external_torque)
+    plant = plant._replace(relieving=float(device.supply.takes_back))
     if ACTUATORS[device.actuator.kind].model.shape is None:
         return plant
     return cast(

@@ -1,18 +1,22 @@
 """Static torque limits of an actuator of any kind at an angle, from the torque function of the kind itself.
 
-At the upper limit chamber 1 is at its supply pressure and chamber 2 vented, at the lower limit the other way round.
+At the upper limit chamber 1 is at its supply pressure and chamber 2 vented, at the lower limit the other way round. Of
+a supply below the atmosphere chamber 2 raises the torque and chamber 1 lowers it.
 """
 
 from collections.abc import Callable
 
 from ppafo.model.catalog import ACTUATORS
 from ppafo.parameters.device import Device
+from ppafo.parameters.graph import PRESSURE_PATH, SECOND_PRESSURE_PATH
 from ppafo.parameters.plant import plant_parameters
 
 HIGHEST_PRESSURE = 1.6e6
 """Highest supply pressure [Pa gauge] that is looked for: what usual pneumatic parts are built for at most."""
 _HALVINGS = 60
 """Bisection steps, which bring any bracket down to rounding."""
+_LOWEST_PRESSURE = 1.0e3
+"""Lowest absolute pressure [Pa] of a vacuum that is looked for: what a set may state at least."""
 
 StaticTorque = Callable[[float, float, float], float]
 """Torque [N m] of an angle [rad] and the absolute pressures [Pa] of chambers 1 and 2."""
@@ -31,25 +35,33 @@ def torque_reach(device: Device, angle: float, torque: StaticTorque | None = Non
     """
     own, supply = torque or static_torque(device), device.supply
     vented = float(supply.atmospheric_pressure)
-    return own(angle, vented, float(supply.dorsiflexion_pressure)), own(angle, float(supply.pressure), vented)
+    by_1, by_2 = own(angle, float(supply.pressure), vented), own(angle, vented, float(supply.dorsiflexion_pressure))
+    return (by_1, by_2) if supply.is_vacuum else (by_2, by_1)
+
+
+def supply_that_moves(device: Device, upwards: bool) -> str:
+    """Path of the supply that raises the torque of a device, or lowers it."""
+    return PRESSURE_PATH if upwards != device.supply.is_vacuum else SECOND_PRESSURE_PATH
 
 
 def supply_for(device: Device, angle: float, torque: float) -> float | None:
     """Supply pressure [Pa absolute] with which a device gives a static torque [N m] at an angle [rad].
 
-    Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it. None where no supply up to
-    ``HIGHEST_PRESSURE`` gives it.
+    Chamber 1 raises the torque above the torque of the vented actuator, chamber 2 lowers it; of a vacuum the other way
+    round. None where no supply up to ``HIGHEST_PRESSURE``, or no vacuum, gives it.
     """
     own, vented = static_torque(device), float(device.supply.atmospheric_pressure)
     sign = 1.0 if torque > own(angle, vented, vented) else -1.0
+    is_first = supply_that_moves(device, sign > 0.0) == PRESSURE_PATH
 
     def is_enough(gauge: float) -> bool:
         full = vented + gauge
-        return sign * own(angle, *((full, vented) if sign > 0.0 else (vented, full))) >= sign * torque
+        return sign * own(angle, *((full, vented) if is_first else (vented, full))) >= sign * torque
 
-    if not is_enough(HIGHEST_PRESSURE):
+    farthest = _LOWEST_PRESSURE - vented if device.supply.is_vacuum else HIGHEST_PRESSURE
+    if not is_enough(farthest):
         return None
-    low, high = 0.0, HIGHEST_PRESSURE
+    low, high = 0.0, farthest
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if is_enough(middle) else (middle, high)

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.metrics import Metric
 from ppafo.units import without_exponent
 from ppafo.units.shown import QUANTITIES, quantity_of_unit, shown_value, unit_of
@@ -51,8 +50,10 @@ def axis_unit(quantity: str, given: str = "") -> str:
     return unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$")
 
 
-def display_value(value: float, quantity: str, atmosphere: float = STANDARD_ATMOSPHERE, unit: str = "") -> float:
-    """Return a value in SI in the unit in which it is shown; gauge counts from ``atmosphere`` [Pa absolute].
+def display_value(value: float, quantity: str, atmosphere: float | None = None, unit: str = "") -> float:
+    """Return a value in SI in the unit in which it is shown.
+
+    Gauge counts from ``atmosphere`` [Pa absolute], that of the device in force unless given (``units/shown.py``).
 
     What is zero within the accuracy of a run is 0. ``unit`` is the one in which it was given, where that is known.
     """
@@ -68,29 +69,21 @@ def display_difference(value: float, quantity: str, unit: str = "") -> float:
     return display_value(value, quantity, unit=unit) - display_value(0.0, quantity, unit=unit)
 
 
-def display_values(values: Floats, quantity: str, unit: str = "") -> Floats:
+def display_values(values: Floats, quantity: str, atmosphere: float | None = None, unit: str = "") -> Floats:
     """Return values in SI (any shape) in the unit in which they are shown, or were given."""
     # Units are affine, so that two values decide all.
-    zero, one = display_value(0.0, quantity, unit=unit), display_value(1.0, quantity, unit=unit)
+    zero, one = (display_value(number, quantity, atmosphere, unit) for number in (0.0, 1.0))
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 
-def quantity_text(value: float, quantity: str, form: str = ".3g", atmosphere: float = STANDARD_ATMOSPHERE) -> str:
-    """Return a value in SI as text with the unit in which it is shown; gauge counts from ``atmosphere`` [Pa]."""
-    return f"{without_exponent(display_value(value, quantity, atmosphere), form)} {display_unit(quantity)}".rstrip()
+def quantity_text(value: float, quantity: str, form: str = ".3g") -> str:
+    """Return a value in SI as text with the unit in which it is shown."""
+    return f"{without_exponent(display_value(value, quantity), form)} {display_unit(quantity)}".rstrip()
 
 
 def metric_quantity(si_unit: str) -> str:
     """Return the kind of quantity of a metric or channel that has a unit in SI, empty for a plain number."""
     return _OF_GAS.get(si_unit) or quantity_of_unit(si_unit)
-
-
-def gauge_shift(atmosphere: float) -> float:
-    """Return what [Pa] is taken from pressures of a figure whose gauge ones count from ``atmosphere`` [Pa absolute].
-
-    Axes count from the standard atmosphere; nothing is taken where absolute pressures are shown.
-    """
-    return atmosphere - STANDARD_ATMOSPHERE if display_unit("pressure").endswith("_g") else 0.0
 
 
 def metric_words(name: str) -> str:
@@ -99,12 +92,9 @@ def metric_words(name: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def metrics_lines(metrics: Mapping[str, Metric], atmosphere: float = STANDARD_ATMOSPHERE) -> list[str]:
-    """Return a line of text for each metric: name, value and unit as people are shown it, meaning.
-
-    Gauge pressures count from ``atmosphere`` [Pa absolute].
-    """
-    levels = [metric_level(metric.value, metric.unit, atmosphere) for metric in metrics.values()]
+def metrics_lines(metrics: Mapping[str, Metric]) -> list[str]:
+    """Return a line of text for each metric: name, value and unit as people are shown it, meaning."""
+    levels = [metric_level(metric.value, metric.unit) for metric in metrics.values()]
     values, units = [without_exponent(value, _METRIC) for value, _ in levels], [unit for _, unit in levels]
     name_width, value_width, unit_width = (max(map(len, texts), default=0) for texts in (metrics, values, units))
     return [
@@ -113,19 +103,16 @@ def metrics_lines(metrics: Mapping[str, Metric], atmosphere: float = STANDARD_AT
     ]
 
 
-def metric_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
+def metric_text(value: float, si_unit: str) -> str:
     """Return a value of a metric or channel as text with its unit, as people are shown them."""
-    shown, unit = metric_level(value, si_unit, atmosphere)
+    shown, unit = metric_level(value, si_unit)
     return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
 
 
-def metric_level(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> tuple[float, str]:
-    """Return a value of a metric or channel, and its unit, as people are shown them.
-
-    Pressures are gauge ones and count from ``atmosphere`` [Pa absolute].
-    """
+def metric_level(value: float, si_unit: str) -> tuple[float, str]:
+    """Return a value of a metric or channel, and its unit, as people are shown them."""
     quantity = metric_quantity(si_unit)
-    return display_value(value, quantity, atmosphere), display_unit(quantity) or si_unit.removeprefix("-")
+    return display_value(value, quantity), display_unit(quantity) or si_unit.removeprefix("-")
 
 
 def metric_change(value: float, si_unit: str) -> tuple[float, str]:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ppafo.metrics import METRICS
+from ppafo.parameters.graph import fixed_zero
 from ppafo.report.display_units import (
     axis_unit,
     change_unit,
@@ -40,13 +41,15 @@ class Interval:
 class Kind:
     """Kind of a number: words, SI unit, quantity (``QUANTITIES``; else shown in SI), and form.
 
-    ``given`` is the unit in which the user gave it, which goes before that of the set.
+    ``zero`` [Pa absolute] is the pressure from which gauge ones count, None for the atmosphere of the device.
+    ``given`` is the unit in which the user gave the number, which goes before that of the set.
     """
 
     words: str = ""
     unit: str = ""
     quantity: str = ""
     form: str = ".4g"
+    zero: float | None = None
     given: str = ""
 
     @property
@@ -79,11 +82,11 @@ class Kind:
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values in SI in the unit in which they are shown."""
-        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.given)
+        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.zero, self.given)
 
     def number(self, value: float, form: str = "") -> str:
         """Return a value in SI as text in the unit in which it is shown, without that unit."""
-        return without_exponent(display_value(value, self.quantity, unit=self.given), form or self.form)
+        return without_exponent(display_value(value, self.quantity, self.zero, self.given), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
         """Return a value in SI as text with the unit in which it is shown."""
@@ -127,7 +130,7 @@ def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
 def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
     """Return what the number at a path is, from its unit in SI, and the one in which it was given."""
     quantity = quantity_of_unit(unit)
-    return Kind(label_of(path), unit, quantity, form, given if quantity else "")
+    return Kind(label_of(path), unit, quantity, form, fixed_zero(path), given if quantity else "")
 
 
 def of_channel(name: str, unit: str) -> Kind:

@@ -7,7 +7,6 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from ppafo.metrics import Metric
-from ppafo.parameters.device import Device
 from ppafo.report.display_units import metric_text, metric_words
 from ppafo.report.style import render_figure
 
@@ -15,12 +14,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def result_html(head: str, metrics: Mapping[str, Metric], device: Device, figure: "Figure") -> str:
+def result_html(head: str, metrics: Mapping[str, Metric], figure: "Figure") -> str:
     """Return how a run ended, its metrics in the units that people are shown, and its figure, as HTML."""
-    atmosphere = device.supply.atmospheric_pressure
     rows = []
     for name, metric in metrics.items():
-        cells = (metric_words(name), metric_text(metric.value, metric.unit, atmosphere), metric.summary)
+        cells = (metric_words(name), metric_text(metric.value, metric.unit), metric.summary)
         rows.append("".join(f'<td style="text-align: left">{html.escape(cell)}</td>' for cell in cells))
     table = "".join(f"<tr>{row}</tr>" for row in rows)
     picture = base64.b64encode(png_of(figure)).decode()

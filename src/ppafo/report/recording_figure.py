@@ -6,10 +6,10 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
 from ppafo.parameters.joint import ANKLE, Joint
-from ppafo.report.display_units import display_difference, gauge_shift
+from ppafo.report.display_units import display_difference
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import (
@@ -24,6 +24,7 @@ from ppafo.report.style import (
     render_figure,
 )
 from ppafo.signals import Recording
+from ppafo.units.shown import gauge_zero
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +70,6 @@ _QUANTITIES = (
             "reference_pressure_2": ("reference, chamber 2", REFERENCE),
         },
         smallest_span=5.0 * PASCALS_PER_PSI,
-        always_shown=(STANDARD_ATMOSPHERE,),
     ),
     _Quantity(
         kind=Kind("Pressure in chamber 1 less chamber 2", "Pa_d", "pressure change"),
@@ -98,15 +98,15 @@ def recording_figure(
     recording: Recording,
     title: str = "",
     remark: str = "",
-    atmosphere: float = STANDARD_ATMOSPHERE,
     valve: str = "",
     joint: Joint = ANKLE,
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
     An ankle that a simulation holds at one angle is in the title instead, unless there is nothing else to draw.
-    ``remark`` stands below the panels, for example why a run stopped early. Gauge pressure counts from ``atmosphere``
-    [Pa absolute]. ``valve`` is the kind of valve, in whose colour the device is drawn, ``joint`` what it turns.
+    ``remark`` stands below the panels, for example why a run stopped early. ``valve`` is the kind of valve, in whose
+    colour the device is drawn, ``joint`` what it turns. Gauge pressure counts from the atmosphere in force
+    (``units/shown.py``).
     """
     title = title or recording.label
     held = _held_angle(recording)
@@ -120,25 +120,25 @@ def recording_figure(
     if not drawn:
         channels = ", ".join(channel for quantity in _QUANTITIES for channel in quantity.lines)
         raise DataError(f"{recording.label}: has nothing to draw; a figure shows {channels}")
-    panels = [_panel(recording, quantity, atmosphere, valve, joint) for quantity in drawn]
+    panels = [_panel(recording, quantity, valve, joint) for quantity in drawn]
     return draw_panels(panels, 1, _SIZE, title, remark, recording.kind)
 
 
-def _panel(recording: Recording, quantity: _Quantity, atmosphere: float, valve: str, joint: Joint) -> Panel:
-    """Return the panel of a quantity of the recording; gauge pressure counts from ``atmosphere`` [Pa absolute]."""
+def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: Joint) -> Panel:
+    """Return the panel of a quantity of the recording."""
     kind = quantity.kind
     lines = {channel: line for channel, line in quantity.lines.items() if channel in recording}
-    shift = -gauge_shift(atmosphere) if kind.quantity == "pressure" else 0.0
     marks = []
     for channel, (name, line) in lines.items():
         look = look_of_valve(valve) if line is ACTUAL else line
         # A command holds between two samples; all else goes on in between.
         style = {"linestyle": look.line, "drawstyle": "steps-post" if channel == "command" else "default"}
         label = joint.said(name) if len(lines) > 1 else ""
-        marks.append(Mark("line", recording.time, recording[channel] + shift, (), label, look.colour, style))
+        marks.append(Mark("line", recording.time, recording[channel], (), label, look.colour, style))
     ends = (float(recording.time[0]), float(recording.time[-1])) if recording.duration > 0.0 else None
+    always_shown = (gauge_zero(),) if kind.quantity == "pressure" else quantity.always_shown
     smallest_span = display_difference(quantity.smallest_span, kind.quantity)
-    then = partial(_set_limits, ends, smallest_span, tuple(kind.values(quantity.always_shown)))
+    then = partial(_set_limits, ends, smallest_span, tuple(kind.values(always_shown)))
     vents = kind is _COMMAND and float(recording["command"].max()) > 1.0
     shown_kind = _COMMAND_THAT_VENTS if vents else kind
     return Panel(TIME, replace(shown_kind, words=joint.said(shown_kind.words)), marks, then=then, shares_x=True)

@@ -69,7 +69,7 @@ def with_residuals(
 class Course:
     """Samples and a model of them at the same times, in units of ``time`` and ``level``; ``colour`` is the model's.
 
-    ``change`` is what a difference of both is, ``names`` are those of both in the legend, ``above`` is taken from both.
+    ``change`` is what a difference of both is, ``names`` are those of both in the legend.
     """
 
     time: Kind
@@ -80,14 +80,13 @@ class Course:
     model: Floats
     names: tuple[str, str]
     colour: str
-    above: float = 0.0
 
 
 def course_panels(course: Course, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
     """Return samples and model over time and, half as tall below them, their residual, with ``limits`` dashed."""
     upper = [
-        readings_mark(course.names[0], course.times, course.samples - course.above, look),
-        Mark("line", course.times, course.model - course.above, (), course.names[1], course.colour, {"linewidth": 1.3}),
+        readings_mark(course.names[0], course.times, course.samples, look),
+        Mark("line", course.times, course.model, (), course.names[1], course.colour, {"linewidth": 1.3}),
     ]
     lower = [
         Mark("line", course.times, course.samples - course.model, colour=course.colour, style={"linewidth": 0.9}),

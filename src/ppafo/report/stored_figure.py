@@ -15,7 +15,7 @@ from ppafo.signals import Recording
 from ppafo.storage import StoredResult
 from ppafo.storage.result_folder import RUN_FILE
 from ppafo.units import conversion
-from ppafo.units.shown import shown_in
+from ppafo.units.shown import GAUGE_ZERO, counted_from, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,11 +39,10 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     name = _under(file, document, "scenario").get("name", "")
     if not isinstance(name, str):
         raise _other_form(file, "scenario.name", name, "a text")
-    atmosphere = stated_atmosphere(file, document, "scenario", "device")
     valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
     joint = stated_joint(file, document, "scenario", "device")
-    with shown_in(stated_units(file, document)):
-        return recording_figure(stored.recording, one_line(name), _ending(file, document), atmosphere, valve, joint)
+    with shown_in(stated_units(file, document, device=("scenario", "device"))):
+        return recording_figure(stored.recording, one_line(name), _ending(file, document), valve, joint)
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":
@@ -55,34 +54,30 @@ def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recordi
     # A short walk is drawn whole, and then nothing is left out that had to be said.
     part = f"the last {_END_OF_WALK:g} s of {end:.4g} s" if recording.duration > _END_OF_WALK else ""
     remark = "; ".join(text for text in (_ending(file, document), part) if text)
-    atmosphere = stated_atmosphere(file, document, "configuration", "device")
     shown = recording.between(end - _END_OF_WALK, end)
     valve = str(_under(file, document, "configuration", "device", "valve").get("kind", ""))
-    with shown_in(stated_units(file, document)):
-        return recording_figure(shown, recording.label, remark, atmosphere, valve)
+    with shown_in(stated_units(file, document, device=("configuration", "device"))):
+        return recording_figure(shown, recording.label, remark, valve)
 
 
-def stated_units(file: Path, document: Mapping[str, Any], *keys: str) -> dict[str, str]:
-    """Return the units in which a file's document says, at some keys, that numbers are shown, by unit in SI; else none.
+def stated_units(
+    file: Path, document: Mapping[str, Any], *keys: str, device: tuple[str, ...] = ("device",)
+) -> dict[str, str]:
+    """Return the units in which a file's document says, at some keys, that numbers are shown, by unit in SI.
 
-    DataError names one that is no unit of that kind.
+    With the atmosphere, from which gauge pressures count, of the device at the keys below these. DataError names one
+    that is no unit of that kind, and the key that is of another form.
     """
-    stated = _under(file, document, *keys, "shown")
+    # The device itself says from which pressure gauge ones count.
+    stated = {key: unit for key, unit in _under(file, document, *keys, "shown").items() if key != GAUGE_ZERO}
     for si_unit, unit in stated.items():
         try:
             conversion(str(unit), si_unit)
         except UnitError as error:
             raise _other_form(file, f"shown.{one_line(si_unit)[:_LONGEST_SHOWN]}", unit, "a unit for it") from error
-    return {si_unit: str(unit) for si_unit, unit in stated.items()}
-
-
-def stated_atmosphere(file: Path, document: Mapping[str, Any], *device: str) -> float:
-    """Return the atmosphere [Pa absolute] of the device at some keys of a file's document, else the standard one.
-
-    DataError names the key that is of another form.
-    """
-    atmosphere = _positive(file, document, "a pressure in Pa", *device, "supply", "atmospheric_pressure")
-    return STANDARD_ATMOSPHERE if atmosphere is None else atmosphere
+    path = (*keys, *device, "supply", "atmospheric_pressure")
+    atmosphere = _positive(file, document, "a pressure in Pa", *path)
+    return counted_from(stated, STANDARD_ATMOSPHERE if atmosphere is None else atmosphere)
 
 
 def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint:

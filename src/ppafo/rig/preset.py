@@ -231,7 +231,9 @@ def real_device(device: Device, preset: Preset) -> Device:
     """Return the device as it stands on the rig: the valve with its dynamics, the leak of its seals.
 
     ParameterError for a device with an effect that is on: the rig has physics of its own, and would record without it.
+    So for one on a vacuum: its supplies are regulators.
     """
+    device.check_pressurised("the simulated bench", "; take the recording of a simulated run")
     for effect in (effect for effect, is_on in switches_of(device).items() if is_on):
         zeros = {quantity.name: f"0 {quantity.unit}".strip() for quantity in effect.quantities}
         off = " and ".join(f"'{SECTION}.{effect.name}.{name}={zeros[name]}'" for name in effect.switch)

@@ -51,7 +51,7 @@ CHANNELS: dict[str, ChannelKind] = {
         "Pa_d", "pressure in chamber 1 minus that in chamber 2, as requested of the controller"
     ),
     "command": ChannelKind(PLAIN_NUMBER, "command to the valve, from -1 to 1; 2 vents both chambers", is_held=True),
-    "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start"),
+    "supplied_mass": ChannelKind("kg", "gas taken from the supply since the start, below 0 into a vacuum"),
     "vented_mass": ChannelKind("kg", "gas vented to the atmosphere since the start"),
     "leaked_mass": ChannelKind(
         "kg", "gas from chamber to chamber, leaked or through a valve, either way, since the start"

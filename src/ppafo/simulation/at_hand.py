@@ -60,7 +60,7 @@ def html(self: Recorded) -> str:
     """Return metrics and figure, which a notebook shows."""
     from ppafo.report.notebook import result_html
 
-    return result_html(str(self).partition("\n")[0], self.metrics, self.scenario.device, self.plot())
+    return result_html(str(self).partition("\n")[0], self.metrics, self.plot())
 
 
 def dataset(self: Recorded, units: Mapping[str, str] | None = None) -> "xarray.Dataset":

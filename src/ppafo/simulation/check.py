@@ -13,7 +13,6 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import plain
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
@@ -132,7 +131,7 @@ class Check:
 
     ``error`` is the estimated error of the run from its steps, of which the one with finer steps has a sixteenth.
     ``parts_at`` is the first time [s] at which a repeat is elsewhere by more than 1e-2 of a range, None where none is;
-    ``failed`` names the repeats that diverged. Pressures are shown above ``atmosphere`` [Pa absolute].
+    ``failed`` names the repeats that diverged.
     """
 
     scenario: str
@@ -141,7 +140,6 @@ class Check:
     error: ErrorEstimate
     parts_at: float | None
     failed: tuple[str, ...]
-    atmosphere: float = STANDARD_ATMOSPHERE
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -185,7 +183,7 @@ class Check:
         from ppafo.report.writing import align_columns
 
         names = list(self.metrics[0].changes) if self.metrics else []
-        shown = [(row, metric_level(row.value, row.unit, self.atmosphere)) for row in self.metrics]
+        shown = [(row, metric_level(row.value, row.unit)) for row in self.metrics]
         # The value of a course is a range, which does not count from the atmosphere.
         shown += [(row, metric_change(row.value, row.unit)) for row in self.courses]
         rows = [["", "value", *names, ""]]
@@ -333,7 +331,6 @@ def checked(result: Ran, run: Run, again: Again) -> Check:
         error=estimated_error(result, results[0]),
         parts_at=min(partings, default=None),
         failed=tuple(dict.fromkeys(name for name, repeated in checked if not repeated.status.is_completed)),
-        atmosphere=scenario.device.supply.atmospheric_pressure,
     )
 
 

@@ -16,7 +16,7 @@ from ppafo.control.catalog import CONTROLLERS
 from ppafo.documents.models import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
-from ppafo.model.controlled import CONTROLLED
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
@@ -125,7 +125,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     reading = Reading(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    # What is refused is said in the units of the set.
+    # Refusals are in the units of the set.
     with shown_in(device.shown):
         clock = read_clock(reading)
         section = MOTIONS[kind_at(document, "motion")].section
@@ -164,7 +164,14 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             raise ScenarioError(f"{request.file}: {problem}")
         # Refuse what only a vane has.
         try:
-            if CONTROLLERS[scenario.controller.kind].plan is not None:
+            if lines is not None:
+                device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
+            law = CONTROLLERS[scenario.controller.kind]
+            if law.needs_reference and law.controls == (TORQUE,):
+                # These open the valve by their own idea of the device, where a command above 0 raises the torque.
+                able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
+                device.check_pressurised(f"the controller '{scenario.controller.kind}'", f"; take one of {able}")
+            if law.plan is not None:
                 scenario.device.check_torque_constant("a fixed-point controller")
         except ParameterError as error:
             raise _of_device(reading, error) from error

@@ -86,6 +86,12 @@ def usual_place(lowest: float, highest: float) -> float:
     return RIGHT_ANGLE if has_right_angle else 0.5 * (lowest + highest)
 
 
+def gauge_of(supply: float, room: float) -> float:
+    """Pressure [Pa] of a supply above the atmosphere ``room``, below 0 of a vacuum, and never 0."""
+    gauge = supply - room
+    return gauge if gauge <= -LEAST_GAUGE else max(gauge, LEAST_GAUGE)
+
+
 def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: float) -> MeanChambers:
     """Both chambers of a vane at an angle [rad]. Equations (2), (4), (5)."""
     growth = settings.displacement_per_radian
@@ -111,14 +117,14 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
         gravity_torque=0.0,
         external_torque=0.0,
     )
-    gauge_1 = max(around.supply_pressure - room, LEAST_GAUGE)
-    gauge_2 = max(around.dorsiflexion_pressure - room, LEAST_GAUGE)
+    gauge_1 = gauge_of(around.supply_pressure, room)
+    gauge_2 = gauge_of(around.dorsiflexion_pressure, room)
     half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
     filled = parts.chambers(plant, angle, half_1, half_2)
     vented = parts.torque(plant, angle, room, room)
     # By virtual work a chamber grows with the angle as its torque does with the pressure.
-    growth_1 = abs(parts.torque(plant, angle, room + gauge_1, room) - vented) / gauge_1
-    growth_2 = abs(parts.torque(plant, angle, room, room + gauge_2) - vented) / gauge_2
+    growth_1 = abs((parts.torque(plant, angle, room + gauge_1, room) - vented) / gauge_1)
+    growth_2 = abs((parts.torque(plant, angle, room, room + gauge_2) - vented) / gauge_2)
     return MeanChambers(
         torque_per_pressure_1=growth_1,
         torque_per_pressure_2=growth_2,

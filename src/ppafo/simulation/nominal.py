@@ -153,7 +153,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
             device, VALVE, Term(_GAS[1:2], critical_pressure_ratio), Term(SONIC_PATHS[VALVE][1:])
         ),
         # Not a number that varies: the source is there because a term needs one.
-        "relieving": Term(_ANY, yes if device.supply.relieving else no),
+        "relieving": Term(_ANY, yes if device.supply.takes_back else no),
         "pair": Term(_ANY, yes if is_pair else no),
         "delay": Term(("valve.delay",)) if valve.kind == _SPOOL else Term(_ANY, no),
         "lag": Term(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))

@@ -5,7 +5,7 @@ from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.parameters.device import Actuator, Device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque
-from ppafo.simulation.mean_chambers import LEAST_GAUGE, usual_place
+from ppafo.simulation.mean_chambers import gauge_of, usual_place
 
 
 def place_of_gains(actuator: Actuator) -> float:
@@ -24,15 +24,16 @@ def _rate_per_flow(device: Device, angle: float, controlled: str) -> float:
     supply, plant, torque = device.supply, plant_parameters(device), static_torque(device)
     room = float(supply.atmospheric_pressure)
     full_1, full_2 = float(supply.pressure), float(supply.dorsiflexion_pressure)
-    gauge_1, gauge_2 = max(full_1 - room, LEAST_GAUGE), max(full_2 - room, LEAST_GAUGE)
+    gauge_1, gauge_2 = gauge_of(full_1, room), gauge_of(full_2, room)
     half_1, half_2 = room + 0.5 * gauge_1, room + 0.5 * gauge_2
     filled = ACTUATORS[device.actuator.kind].model.chambers(plant, angle, half_1, half_2)
     volume_1 = float(filled.volume_1 + half_1 * filled.compliance_1)
     volume_2 = float(filled.volume_2 + half_2 * filled.compliance_2)
     if controlled in (TORQUE, ANGLE):
         vented = torque(angle, room, room)
-        by_1 = abs(torque(angle, room + gauge_1, room) - vented) / gauge_1
-        by_2 = abs(torque(angle, room, room + gauge_2) - vented) / gauge_2
+        by_1 = abs((torque(angle, room + gauge_1, room) - vented) / gauge_1)
+        by_2 = abs((torque(angle, room, room + gauge_2) - vented) / gauge_2)
     else:
         by_1, by_2 = float(controlled != "pressure_2"), float(controlled != "pressure_1")
-    return max(by_1 * full_1 / volume_1, by_2 * full_2 / volume_2)
+    # What fills a chamber of a suction device is the room.
+    return max(by_1 * max(full_1, room) / volume_1, by_2 * max(full_2, room) / volume_2)

@@ -262,6 +262,7 @@ def _program(components: Components, steps: Steps, walk: Walk | None, has_delay:
         shank=None if components.leg is None else components.leg.shank,
         foot=_foot(components),
         controlled=components.controlled,
+        has_vacuum=components.device.supply.is_vacuum,
     )
 
 

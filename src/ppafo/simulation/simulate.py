@@ -135,7 +135,7 @@ class Result:
         """Return what ``ppafo simulate`` prints: status, warnings and metrics in the units that people are shown."""
         from ppafo.report.display_units import metrics_lines
 
-        lines = metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)
+        lines = metrics_lines(self.metrics)
         return "\n".join([f"{self.scenario.name}: {self.status.kind}", *self.warnings, "", *lines])
 
     @in_units(_units_of)
@@ -145,10 +145,9 @@ class Result:
         from ppafo.report.recording_figure import recording_figure
 
         remark = "" if self.status.is_completed else self.status.message
-        atmosphere = self.scenario.device.supply.atmospheric_pressure
         valve = self.scenario.device.valve.kind
         joint = self.scenario.device.joint
-        return shown(recording_figure(self.recording, self.scenario.name, remark, atmosphere, valve, joint))
+        return shown(recording_figure(self.recording, self.scenario.name, remark, valve, joint))
 
     @in_units(_units_of)
     def error(self) -> "ErrorEstimate":

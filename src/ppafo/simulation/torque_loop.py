@@ -268,11 +268,14 @@ def loop_of(
     first, last = parts.places(stops, signals)
     here = parts.chambers_at(settings, stops, around, first)
     there = parts.chambers_at(settings, stops, around, last)
+    # A chamber at a vacuum is filled from the room, quicker than it is emptied.
+    first_source = max(around.supply_pressure, around.atmospheric_pressure)
+    second_source = max(around.dorsiflexion_pressure, around.atmospheric_pressure)
     per_flow = max(
-        parts.per_pressure_1(here) * around.supply_pressure / here.volume_1,
-        parts.per_pressure_2(here) * around.dorsiflexion_pressure / here.volume_2,
-        parts.per_pressure_1(there) * around.supply_pressure / there.volume_1,
-        parts.per_pressure_2(there) * around.dorsiflexion_pressure / there.volume_2,
+        parts.per_pressure_1(here) * first_source / here.volume_1,
+        parts.per_pressure_2(here) * second_source / here.volume_2,
+        parts.per_pressure_1(there) * first_source / there.volume_1,
+        parts.per_pressure_2(there) * second_source / there.volume_2,
     )
     return TorqueLoop(
         rate=parts.valve_flow(numbers) * per_flow,
@@ -293,8 +296,8 @@ def reach_of(
     """Largest change of a torque [N m] or a pressure [Pa] that one supply gives while the other chamber is vented."""
     place, _ = parts.places(stops, signals)
     mean = parts.chambers_at(settings, stops, around, place)
-    gauge_1 = around.supply_pressure - around.atmospheric_pressure
-    gauge_2 = around.dorsiflexion_pressure - around.atmospheric_pressure
+    gauge_1 = abs(around.supply_pressure - around.atmospheric_pressure)
+    gauge_2 = abs(around.dorsiflexion_pressure - around.atmospheric_pressure)
     return max(parts.per_pressure_1(mean) * gauge_1, parts.per_pressure_2(mean) * gauge_2, 0.0)
 
 

@@ -73,6 +73,9 @@ class MappedDirection(StrictTable):
     sign: Annotated[Literal[1, -1], Field(description="-1 where a growing channel means falling pressure")] = 1
 
 
+Trials = Annotated[tuple[Annotated[int, Field(ge=1)], ...], Field(strict=False, min_length=1)]
+
+
 class ColumnMap(StrictTable):
     """Format of a file and meaning of its columns."""
 
@@ -87,7 +90,8 @@ class ColumnMap(StrictTable):
         int, Field(ge=0, description="rows below the header to leave out: a line of units, or numbers")
     ] = 0
     trial: Annotated[
-        int | None, Field(ge=1, description="which one, from 1, of trials below each other with a clock from 0 each")
+        Literal["all"] | Annotated[int, Field(ge=1)] | Trials | None,
+        Field(description="of trials below each other with a clock from 0 each: one, from 1, or some, or 'all'"),
     ] = None
     channels: Annotated[dict[str, MappedChannel], Field(min_length=1, description="channels by name, with 'time'")]
     direction: Annotated[MappedDirection | None, Field(description="direction from the rate of a channel")] = None

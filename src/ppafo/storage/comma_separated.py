@@ -111,7 +111,9 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
         falls = np.flatnonzero(np.diff(time) < 0.0) + 1
         # Each trial of a file begins about where the first one does.
         are_trials = falls.size > 0 and bool((time[falls] < time[1]).all())
-        trials = f", or take one of {falls.size + 1} trials with trial = 1 in a column map" if are_trials else ""
+        trials = (
+            f", or take one of {falls.size + 1} trials with trial = 1, or 'all', in a column map" if are_trials else ""
+        )
         raise DataError(
             f"{noun} {lines[index]}, column '{TIME}': the clock {word}: {time[index]:.9g} s follows "
             f"{time[index - 1]:.9g} s; time must increase from sample to sample{trials}"

@@ -165,6 +165,28 @@ def read_foreign(
 ) -> Recording:
     """Return the recording in a table through a column map, in SI units; gauge counts from ``atmosphere`` [Pa abs].
 
+    DataError where the map takes several trials. Otherwise as ``read_trials``.
+    """
+    recordings = read_trials(path, columns, label, atmosphere, map_name, gas)
+    if len(recordings) > 1:
+        with refused_as(DataError, path, DataError), in_map(map_name):
+            raise DataError(
+                f"trial: {len(recordings)} recordings, where one is needed: name one; a procedure of 'ppafo identify' "
+                "takes all"
+            )
+    return recordings[0]
+
+
+def read_trials(
+    path: str | Path,
+    columns: ColumnMap,
+    label: str | None = None,
+    atmosphere: float = STANDARD_ATMOSPHERE,
+    map_name: str = "",
+    gas: str = "",
+) -> tuple[Recording, ...]:
+    """Return the recordings in a table through a column map: one, or one for each of the trials that the map names.
+
     ``gas`` is the gas of a volume flow whose map does not say it. DataError names the file and the column; of a fault
     in the map its key, and the map where ``map_name`` says which.
     """
@@ -190,27 +212,35 @@ def read_foreign(
                 if name != TIME
             }
             time = _time(columns.channels[TIME], table, atmosphere)
-            rows = slice(None) if columns.trial is None else _rows_of_trial(time, columns.trial)
-        time = time[rows]
-        channels = {name: replace(channel, values=channel.values[rows]) for name, channel in channels.items()}
-        check_clock(time, table.rows[rows], table.noun)
-        # A synthetic recording stays one through a column map.
-        recording = Recording(label or one_line(Path(path).stem), time, channels, table.kind)
-        with in_map(map_name):
-            return recording if columns.direction is None else with_direction(recording, columns.direction)
+            trials = {"": slice(None)} if columns.trial is None else _rows_of_trials(time, columns.trial)
+        recordings = []
+        for name, rows in trials.items():
+            check_clock(time[rows], table.rows[rows], table.noun)
+            of_trial = {channel: replace(one, values=one.values[rows]) for channel, one in channels.items()}
+            # A synthetic recording stays one through a column map.
+            said = (label or one_line(Path(path).stem)) + name
+            recording = Recording(said, time[rows], of_trial, table.kind)
+            with in_map(map_name):
+                recordings.append(
+                    recording if columns.direction is None else with_direction(recording, columns.direction)
+                )
+        return tuple(recordings)
 
 
-def _rows_of_trial(time: Floats, trial: int) -> slice:
-    """Return the rows of one of the trials in a file, each of which begins where the time [s] falls; from 1.
+def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[str, slice]:
+    """Return the rows of trials in a file, each of which begins where the time [s] falls, by what is added to its name.
 
-    DataError where there are fewer.
+    Trials count from 1. DataError where there are fewer.
     """
     starts = [0, *(np.flatnonzero(np.diff(time) < 0.0) + 1).tolist(), time.size]
-    if trial >= len(starts):
-        raise DataError(
-            f"trial = {trial}: the clock begins again {len(starts) - 2} times: there is 1 to {len(starts) - 1}"
-        )
-    return slice(starts[trial - 1], starts[trial])
+    last = len(starts) - 1
+    numbers = range(1, last + 1) if isinstance(wanted, str) else (wanted,) if isinstance(wanted, int) else wanted
+    for trial in numbers:
+        if trial > last:
+            raise DataError(f"trial = {trial}: the clock begins again {last - 1} times: there is 1 to {last}")
+    if isinstance(wanted, int):
+        return {"": slice(starts[wanted - 1], starts[wanted])}
+    return {f" trial {number}": slice(starts[number - 1], starts[number]) for number in numbers}
 
 
 def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings: _Surroundings) -> Channel:

@@ -28,6 +28,7 @@ from ppafo.storage.places import Place, read_document
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, chunk_size
 from ppafo.units import to_si
+from ppafo.units.shown import GAUGE_ZERO
 from ppafo.version import __version__
 
 # A controller in Python as plain data: its class with a hash of the source, and its settings after a reset.
@@ -277,7 +278,7 @@ class _Stored(_Part):
             raise ValueError(f"'{one_line(lost[0])}' varies and has no unit")
         for si_unit, unit in self.shown.items():
             try:
-                to_si(1.0, unit, si_unit)
+                to_si(1.0, "Pa_a" if si_unit == GAUGE_ZERO else unit, "Pa_a" if si_unit == GAUGE_ZERO else si_unit)
             except UnitError as error:
                 raise ValueError(f"shown: {one_line(error)}") from error
         return self

@@ -1,8 +1,9 @@
 """Display units of numbers: the one in which a number was given, else the set's, else the catalogue's.
 
 ``QUANTITIES`` is the only table of shown units, and ``shown_text`` what writes a number in one. Files and data stay in
-SI. What says or draws something does so inside ``shown_in``, with the units in which the author of a parameter set and
-its user wrote; outside of it, the table's own hold.
+SI. Gauge pressures count from the atmosphere of the device of which they are. It stands beside the units, so that text,
+tables and axes have one zero, and so do saved results, which keep both as ``shown``. Outside of ``shown_in`` the
+package's own choices hold.
 """
 
 import contextlib
@@ -82,6 +83,8 @@ _PER_PRESSURE = {"N/Pa": "N", "N m/Pa": "N m"}
 """Units in SI of what a pressure gives, and of what it gives; the pressure is in the unit of the set."""
 _DIGITS = 9
 """Digits that stay of what is written to be read again: what lies beyond them is the rounding of a unit."""
+GAUGE_ZERO = "gauge_zero"
+"""Key, beside units by their unit in SI, of the absolute pressure from which gauge pressures count."""
 
 _chosen: ContextVar[Mapping[str, str]] = ContextVar("_chosen", default=MappingProxyType({}))
 
@@ -116,6 +119,17 @@ def pressure_units(level: str) -> dict[str, str]:
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
 
+def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
+    """Return units by unit in SI with the atmosphere [Pa absolute] from which gauge pressures count."""
+    return {**units, GAUGE_ZERO: f"{atmosphere!r} Pa_a"}
+
+
+def gauge_zero() -> float:
+    """Return the absolute pressure [Pa] from which gauge pressures are counted where they are shown."""
+    stated = _chosen.get().get(GAUGE_ZERO)
+    return STANDARD_ATMOSPHERE if stated is None else float(stated.removesuffix(" Pa_a"))
+
+
 def units_in_force() -> dict[str, str]:
     """Return the chosen units by unit in SI; empty where the package's own choices hold."""
     return dict(_chosen.get())
@@ -146,19 +160,21 @@ def unit_of(quantity: str) -> str:
 
 
 def shown_value(
-    value: float, si_unit: str, unit: str = "", atmosphere: float = STANDARD_ATMOSPHERE, zero: float = 0.0
+    value: float, si_unit: str, unit: str = "", atmosphere: float | None = None, zero: float = 0.0
 ) -> float:
-    """Return a value in SI in a unit, or in the one in which it is shown; what is not larger than ``zero`` is 0."""
+    """Return a value in SI in a unit, or in the one in which it is shown; what is not larger than ``zero`` is 0.
+
+    Gauge counts from ``atmosphere`` [Pa absolute], that of the device in force unless given.
+    """
     known, unit = _WRITTEN.get(si_unit, si_unit), unit or shown_unit(si_unit)
     if unit in (known, "") or not math.isfinite(value):
         return 0.0 if abs(value) <= zero else float(value)
-    shown, further = (from_si(each, unit, known, atmosphere) for each in (float(value), float(value) + zero))
+    room = gauge_zero() if atmosphere is None else atmosphere
+    shown, further = (from_si(each, unit, known, room) for each in (float(value), float(value) + zero))
     return 0.0 if abs(shown) <= abs(further - shown) else shown
 
 
-def shown_text(
-    value: float, si_unit: str, form: str = ".6g", atmosphere: float = STANDARD_ATMOSPHERE, unit: str = ""
-) -> str:
+def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float | None = None, unit: str = "") -> str:
     """Return a value in SI as text with the unit in which it is shown; what is zero within the accuracy of a run is 0.
 
     ``unit`` is the one in which it was given, where that is known; gauge counts from ``atmosphere`` [Pa absolute].
@@ -173,7 +189,7 @@ def shown_text(
     return f"{number} {unit.removesuffix('_d')}".rstrip()
 
 
-def written_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE, unit: str = "") -> str:
+def written_text(value: float, si_unit: str, atmosphere: float | None = None, unit: str = "") -> str:
     """Return a value in SI as text to be read again, in the unit in which it is shown, without the rounding of units.
 
     >>> written_text(206842.71879504 + 101325.0, "Pa_a"), written_text(3.929e-9, "m^3/(s Pa)")

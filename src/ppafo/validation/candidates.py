@@ -46,6 +46,9 @@ _MISREAD_UNITS = {
 }
 """Factor [-] on a true pressure by the unit as which it was read."""
 
+_CONVERTED = "", "Pa", "Pa_a", "Pa_g"
+"""Declared units of pressures that were converted before, from a unit of which a file says nothing."""
+
 
 class _Group(NamedTuple):
     """Pressure sensors that may be wrong together: by channel, in words, and the verb that goes with these."""
@@ -67,14 +70,18 @@ def _groups(names: Collection[str]) -> Iterator[_Group]:
         yield _Group(channels, words, "seem" if has_several else "seems")
 
 
-def exchanges(device: Device, names: Collection[str], moving: AbstractSet[str]) -> Iterator[Candidate]:
+def exchanges(device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]) -> Iterator[Candidate]:
     """Yield mistakes without a size: units, gauge or absolute, swapped channels and signs.
 
-    A unit is misread of pressures of which one is ``moving``: a chamber that stays at the atmosphere shows no factor.
+    ``units`` are those that files declare of channels that move, empty where they declare none. A chamber that stays at
+    the atmosphere shows no factor, and what a file declares in bar was read as bar.
     """
     atmosphere = device.supply.atmospheric_pressure
     for channels, group, verb in _groups(names):
-        for unit, factor in _MISREAD_UNITS.items() if moving & set(channels) else ():
+        declared = frozenset[str]().union(*(units.get(name, ()) for name in channels))
+        for unit, factor in _MISREAD_UNITS.items() if units.keys() & set(channels) else ():
+            if not declared <= {*_CONVERTED, *(f"{unit.rpartition(' ')[2]}{kind}" for kind in ("", "_a", "_g"))}:
+                continue
             words = f"{group} {verb} to be {unit}"
             change = partial(_sensed, channels, "gain", atmosphere)
             yield Candidate(words, words, change, (factor,), is_of_unit=True)

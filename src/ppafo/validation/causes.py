@@ -108,7 +108,7 @@ def causes_of(
         # That no change explains the recordings would say too much.
         return _explained(search, none, tried, explaining, []) if explaining else Causes()
     names = set.intersection(*(set(measured.recording.names) for measured in read))
-    moving = _moving(agreements, device)
+    units = _units_of_moving(read, agreements, device)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
     sized = [*sizes(device, names), *numbers(read[0], device, settings)]
     first = [_samples(records), _motions(records, settings)]
@@ -123,7 +123,7 @@ def causes_of(
             return Causes(errors, None, len(tried) + len(of_bench))
 
         def stages() -> Iterator[list[Tried]]:
-            yield search.compared(list(exchanges(device, names, moving)), none)
+            yield search.compared(list(exchanges(device, names, units)), none)
             yield of_bench + search.compared([candidate for candidate in sized if not candidate.usual], none)
             yield search.compared(list(effects(device)), none)
 
@@ -140,16 +140,23 @@ def causes_of(
     return Causes() if nearest is None else Causes(None, _cause_of([nearest], search.penalty), len(tried))
 
 
-def _moving(agreements: Sequence[RecordingAgreement], device: Device) -> set[str]:
-    """Return the channels that part from the atmosphere, measured or in the model, by more than a usual zero."""
+def _units_of_moving(
+    read: Sequence[Measured], agreements: Sequence[RecordingAgreement], device: Device
+) -> dict[str, set[str]]:
+    """Return the units that files declare of channels, empty for none, by channel.
+
+    Only of those that part from the atmosphere, measured or in the model, by more than a usual zero.
+    """
     atmosphere = device.supply.atmospheric_pressure
-    return {
+    moving = {
         name
         for agreement in agreements
         for recording in (agreement.measured, agreement.model)
         for name in recording.names
         if float(np.abs(recording[name] - atmosphere).max()) > usual_errors(name).zero
     }
+    recordings = [measured.recording for measured in read]
+    return {name: {one.channels[name].stated for one in recordings if name in one} for name in moving}
 
 
 def _tried_in_turn(stages: Iterable[Sequence[Tried]]) -> tuple[list[Tried], list[Tried]]:

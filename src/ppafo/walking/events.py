@@ -213,7 +213,7 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
     if SILENT_ROW in record and shut_off:
         silent = np.flatnonzero(record[SILENT_ROW] > shut_off["silence"])
         watchdog = (SafetyEvent(float(time[silent[0]]), STOPPED, SILENT),) if silent.size else ()
-    if SAFE_ROW not in record:
+    if VENTINGS_ROW not in record:
         return watchdog
     level, ventings = record[SAFE_ROW], record[VENTINGS_ROW]
     vents = np.diff(ventings, prepend=0.0) > 0.0

@@ -13,7 +13,7 @@ from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, PpafoError, ScenarioError, one_line, refused_as
+from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.fault_catalogue import PLANT_FAULTS
@@ -191,6 +191,8 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     reading = Reading(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
+    with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
+        device.check_pressurised("a walk, whose controllers fill the chambers,")
     led = _led_by(reading, request)
     bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in request.instead else request.folder)
     if bottle is not None:

@@ -283,11 +283,12 @@ def noise(scenario: Scenario) -> Any:
 def law_of(scenario: Scenario) -> ControllerKind:
     """The controller of a walk with its estimator of the gait phase, computing with floats.
 
-    A constant command is no controller of a walk in a file: an exported plant has it, whose command is handed in.
+    A constant command, and an ordered one, are no controllers of a walk in a file: an exported plant has them.
     """
-    # The catalogue of walking has no constant command, which only an exported plant takes.
-    if scenario.controller.kind == switching.CONSTANT.name:
-        return switching.CONSTANT
+    # The catalogue of walking has neither, whose command is handed in.
+    for law in (switching.CONSTANT, switching.ORDERED):
+        if scenario.controller.kind == law.name:
+            return law
     return with_timing(walking_controllers()[scenario.controller.kind], TIMINGS[walk_of(scenario).timing])
 
 

@@ -286,7 +286,7 @@ class WalkResult:
         from ppafo.report.display_units import metrics_lines
 
         head = f"{self.scenario.name}: {self.status.kind}"
-        return "\n".join([head, "", *metrics_lines(self.metrics, self.scenario.device.supply.atmospheric_pressure)])
+        return "\n".join([head, "", *metrics_lines(self.metrics)])
 
     @in_units(_units_of)
     def plot(self) -> "Figure":

@@ -35,7 +35,16 @@ def commands(tuning: Path) -> dict[str, list[str]]:
     return {
         "compare": ["compare", "--study", STUDY, "--baseline", "solenoid", "--draws", "64", *SHORT],
         "statistic": [
-            *("sweep", STUDY, "--statistic", "mean", "--metric", "rms_error", "--configuration", "proportional"),
+            *(
+                "sweep",
+                STUDY,
+                "--statistic",
+                "quantile 0.5",
+                "--metric",
+                "rms_error",
+                "--configuration",
+                "proportional",
+            ),
             *("--width", "20 %", "--first-draws", "64", "--draws", "512", *SHORT),
         ],
         "sensitivity": [

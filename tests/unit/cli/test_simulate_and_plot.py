@@ -27,6 +27,7 @@ from ppafo.storage import read_result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.result_folder import check_owned_folder, marked_folder, write_marked_folder
+from ppafo.units.shown import counted_from, shown_in
 
 FILES = ["figure.png", "figure.svg", "recording.csv", "recording.nc", "report.html", "run.json"]
 
@@ -147,7 +148,8 @@ def test_gauge_pressure_of_a_bench_and_of_a_walk_counts_from_the_atmosphere_of_t
     walked = {"recording.nc": netcdf_bytes(recording, None)}
     walked["walk.json"] = json.dumps({"configuration": {"device": device}}).encode()
     write_marked_folder(tmp_path / "walk", walked, "walk")
-    drawn = figure_files(recording_figure(recording, atmosphere=83e3))["figure.png"]
+    with shown_in(counted_from({}, 83e3)):
+        drawn = figure_files(recording_figure(recording))["figure.png"]
     for figure in (tmp_path / "rig" / "high.png", tmp_path / "walk" / "figure.png"):
         assert main(["export", "figure", str(figure.parent)]) == 0
         assert figure.read_bytes() == drawn
@@ -274,6 +276,7 @@ def slow(self, content):
     return written
 Path.write_bytes = slow
 from ppafo.cli.main import main
+from ppafo.units.shown import counted_from, shown_in
 sys.exit(main(["simulate", "step-response", "--out", sys.argv[1]]))
 """
 

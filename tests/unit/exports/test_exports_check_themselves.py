@@ -1,5 +1,6 @@
 """A unit is compared with Python before it is written, and one with a late command gives what Python gives."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -58,3 +59,29 @@ def test_the_shipped_valve_with_a_delay_runs_in_fmpy_as_in_python(
     for name in channels:
         assert np.array_equal(found[name], result.recording[name]), name
     assert found["metrics.gas_supplied"][-1] == result.metrics["gas_supplied"].value > 3e-4
+
+
+@pytest.mark.parametrize(
+    ("asked", "compared", "not_run"),
+    [("linux64", ["linux64"], []), ("linux64,win64", ["linux64"], ["win64"]), ("win64", [], ["win64"])],
+)
+def test_a_unit_for_a_computer_that_cannot_run_here_is_said_to_be_not_compared(
+    asked: str,
+    compared: list[str],
+    not_run: list[str],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("ppafo.exports.fmu.unit.build", lambda *_: b"a library")
+    tried: list[int] = []
+    monkeypatch.setattr("ppafo.exports.fmu.unit.check_unit", lambda _interface, fmi, *_: tried.append(fmi))
+    line = ["export", "fmu", "step-response", "--platforms", asked, "--out"]
+    assert main([*line, str(tmp_path / "unit.fmu")]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert main([*line, str(tmp_path / "folder"), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert tried == [2, 2] * len(compared)
+    assert (document["compared"], document["not_run"]) == (compared, not_run)
+    told = f"not run here, and so not compared with Python: the library for {', '.join(not_run)}"
+    assert said[1:] == ([told] if not_run else [])

@@ -221,10 +221,14 @@ def test_a_fit_that_cannot_begin_says_why(numbers: tuple[Free, ...], blocks: tup
         fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
 
 
-def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_ends() -> None:
-    # Of the two the samples tell the product alone: at the upper end the exponent is at the lower one of its prior.
+@pytest.mark.parametrize("deviation", [0.8, 1.5])
+def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_ends(deviation: float) -> None:
+    """Of the two the samples tell the product alone: where one ends, the exponent is at an end of its prior.
+
+    The straight line at the estimate leads far out of the wider valley, and its Jacobian does not lead back.
+    """
     measured = 2.0 * np.ones((_COUNT, 1)) + 0.01 * np.random.default_rng(1).normal(size=(_COUNT, 1))
-    numbers = (Free("size", 1.0, 0.1, 100.0, 1.0), Free("exponent", 0.0, -5.0, 5.0, 0.8, 0.8))
+    numbers = (Free("size", 1.0, 0.01, 1000.0, 1.0), Free("exponent", 0.0, -9.0, 9.0, deviation, deviation))
 
     found = fit(
         lambda points: measured - points[0] * np.exp(points[1]) * np.ones((_COUNT, 1)),
@@ -232,8 +236,8 @@ def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_en
         (Block("only", "first", slice(0, _COUNT)),),
     )
 
-    assert found.high[0] == pytest.approx(2.0 * math.exp(1.96 * 0.8), rel=0.1)
-    assert found.low[0] <= 2.0 * math.exp(-1.96 * 0.8)
+    assert found.high[0] == pytest.approx(2.0 * math.exp(1.96 * deviation), rel=0.1)
+    assert found.low[0] <= 2.0 * math.exp(-1.96 * deviation)
 
 
 def test_samples_that_stand_out_are_left_out_of_a_motion_and_the_others_say_what_they_said() -> None:
@@ -255,3 +259,27 @@ def test_samples_that_stand_out_are_left_out_of_a_motion_and_the_others_say_what
         assert found.noise[channel] == pytest.approx(size, rel=0.02)
     errors = np.sqrt(np.diag(right.covariance))
     assert np.all(np.abs(found.values - right.values) < 0.3 * errors)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_search_that_ends_where_no_run_succeeds_has_not_converged_and_names_the_number(side: int) -> None:
+    """Runs succeed up to a rate of 1; the samples are of 2."""
+    random = np.random.default_rng(3)
+    measured = (2.0 * side * _TIME + 1.0 + 0.01 * random.normal(size=_COUNT))[:, None]
+
+    def residuals(points: Floats) -> Floats:
+        left = measured - points[0] * _TIME[:, None] - points[1]
+        return np.where(side * points[0] > 1.0, np.nan, left)
+
+    block = Block("only", "first", slice(0, _COUNT))
+    offset = Free("offset", 0.9, -5.0, 5.0, 1.0)
+    found = fit(residuals, (Free("rate", 0.2 * side, -5.0, 5.0, 1.0), offset), (block,))
+    assert not found.has_converged
+    assert found.edge == {"rate": side}
+    assert 0.5 < side * found.by_name["rate"] <= 1.0
+    # With a bound inside of the edge the search ends at that.
+    low, high = sorted((-4.0 * side, 0.9 * side))
+    bounded = fit(residuals, (Free("rate", 0.2 * side, low, high, 1.0), offset), (block,))
+    assert bounded.has_converged
+    assert not bounded.edge
+    assert bounded.by_name["rate"] == pytest.approx(0.9 * side, rel=1e-6)

@@ -66,6 +66,25 @@ def solved(bench: Path) -> Solve:
     return solve
 
 
+def test_trials_below_each_other_are_recordings_of_one_procedure(bench: Path, solved: Solve) -> None:
+    decays = [planted.decay(seed=seed) for seed in (1, 2, 3)]
+    rows = ["t,angle"]
+    for number, one in enumerate(decays):
+        write_csv(bench / f"decay{number}.csv", one.recording)
+        pairs = zip(one.recording.time.tolist(), one.recording["angle"].tolist(), strict=True)
+        rows += [f"{time!r},{angle!r}" for time, angle in pairs]
+    (bench / "logged.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    columns = '[columns.log]\ntrial = "all"\n[columns.log.channels]\ntime = { column = "t", unit = "s" }\n'
+    columns += 'angle = { column = "angle", unit = "rad" }\n'
+    one_file = DECAY.replace("decay.csv", "logged.csv") + 'columns = "log"\n' + columns
+    three = DECAY.replace('"decay.csv"', '"decay0.csv", "decay1.csv", "decay2.csv"')
+    found = [solved(text).results[0].estimates for text in (one_file, three)]
+    values = [[(estimate.path, estimate.value) for estimate in estimates] for estimates in found]
+    assert [path for path, _ in values[0]] == [path for path, _ in values[1]]
+    assert [value for _, value in values[0]] == pytest.approx([value for _, value in values[1]], rel=1e-9)
+    assert "logged.csv trial 3 sha256:" in " ".join(found[0][0].recordings)
+
+
 def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(solved: Solve) -> None:
     names = [result.procedure for result in solved(ALL).results]
     assert names == ["static-torque", "free-decay", "open-valve-flow", "valve-map", "vane-leak"]

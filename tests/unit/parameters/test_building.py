@@ -70,7 +70,7 @@ def test_the_printed_set_says_what_is_missing_and_where_it_is_completed() -> Non
         ("valve.dead_band=1", "at most 0.99"),
         ("actuator.angle_min=130deg", "must be below actuator.angle_max = 130 deg"),
         ("friction.dynamic_torque=1 N m", "must be at most friction.static_torque = 0.45 N m"),
-        ("supply.pressure=-1psi_g", "must be at least supply.atmospheric_pressure"),
+        ("supply.pressure=-1.01bar_g", "must be at least 0.01 bar_a"),
         ("supply.dorsiflexion_pressure=50kPa_a", "must be at least supply.atmospheric_pressure"),
     ],
 )

@@ -73,9 +73,10 @@ def test_a_leaking_step_with_an_empty_bottle_agrees_with_the_reference_solver() 
     assert agreement.angle < 2.0e-4
 
 
-def test_a_supply_below_the_atmosphere_is_refused_in_one_line() -> None:
-    with pytest.raises(PpafoError, match=r"supply\.pressure = -1 psi_g must be at least supply\.atmospheric_pressure"):
-        ppafo.load_scenario("step-response", ["supply.pressure=-1 psi_g"])
+def test_one_supply_below_the_atmosphere_beside_one_above_it_is_refused_in_one_line() -> None:
+    said = r"supply\.dorsiflexion_pressure = -1 psi_g must be at least supply\.atmospheric_pressure"
+    with pytest.raises(PpafoError, match=said):
+        ppafo.load_scenario("step-response", ["supply.dorsiflexion_pressure=-1 psi_g"])
 
 
 def test_an_empty_bottle_has_no_full_range_to_validate_against(tmp_path: Path) -> None:

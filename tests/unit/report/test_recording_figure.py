@@ -15,6 +15,7 @@ from ppafo.report.stored_figure import draw_stored_result
 from ppafo.report.style import house_style, render_figure
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.storage import StoredResult
+from ppafo.units.shown import counted_from, shown_in
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,7 +67,8 @@ def test_angles_are_drawn_in_degrees_and_gas_in_grams() -> None:
 
 def test_pressure_is_drawn_above_the_atmosphere_of_the_device() -> None:
     given = recording(pressure_1=90e3 + 50.0 * 6894.757293168361)
-    assert drawn(recording_figure(given, atmosphere=90e3), 0)[0][0] == pytest.approx(50.0)
+    with shown_in(counted_from({}, 90e3)):
+        assert drawn(recording_figure(given), 0)[0][0] == pytest.approx(50.0)
 
 
 def test_a_signal_that_hardly_changes_is_not_blown_up() -> None:
@@ -148,7 +150,8 @@ def test_a_table_shows_metrics_in_the_units_of_the_field() -> None:
     assert rows[1][:3] == ["angle_range", "180", "deg"]
     assert rows[2][:3] == ["largest_pressure", "50", "psi_g"]
     assert rows[3] == ["switchings", "10", "switchings"]
-    high = [line.split() for line in metrics_lines(metrics, atmosphere=446063.0 - 55.0 * 6894.757293168361)]
+    with shown_in(counted_from({}, 446063.0 - 55.0 * 6894.757293168361)):
+        high = [line.split() for line in metrics_lines(metrics)]
     assert high[2][:3] == ["largest_pressure", "55", "psi_g"]
 
 

@@ -187,3 +187,36 @@ def test_a_size_is_drawn_within_the_axes_whatever_the_unit(in_bar: str, tmp_path
     assert min(errors.get_ylim()) <= min(drawn[0]) <= max(errors.get_ylim())
     labels = [entry.get_text() for entry in design.plot("torque").axes[0].get_legend().get_texts()]
     assert re.search(r"at \d\.\d+ bar gauge", " ".join(labels))
+
+
+def test_gauge_pressures_count_from_the_atmosphere_of_the_set_in_every_answer(in_bar: str, tmp_path: Path) -> None:
+    room = 0.7e5
+    high = [f"device.set={in_bar}", "supply.atmospheric_pressure=0.7 bar_a", "supply.pressure=3.5 bar_g"]
+    changes = [*high, SHORT]
+
+    def gauge(pattern: str, text: str) -> float:
+        said = re.search(pattern + r"(-?[\d.]+) bar_g", text)
+        assert said is not None, text
+        return float(said[1])
+
+    result = ppafo.simulate(TASK, overrides=changes)
+    largest = (result.metrics["largest_pressure"].value - room) / 1e5
+    assert gauge("largest_pressure +", str(result)) == pytest.approx(largest, abs=2e-3)
+    assert gauge("Largest pressure</td><td[^>]*>", result._repr_html_()) == pytest.approx(largest, abs=2e-3)
+    drawn = next(axes for axes in result.plot().axes if axes.get_title(loc="left").startswith("Pressure"))
+    assert max(max(line.get_ydata()) for line in drawn.lines) == pytest.approx(largest, abs=1e-6)
+    found = ppafo.find(TASK, vary="supply.pressure=3..4 bar_g", such_that="peak_torque >= 1 N m", overrides=changes)
+    assert found.found.value is not None
+    assert gauge("supply.pressure = ", found.said[0]) == pytest.approx((found.found.value - room) / 1e5, abs=1e-4)
+    assert 3.0 <= (found.found.value - room) / 1e5 <= 4.0
+    linear = ppafo.linearise(TASK, overrides=[*changes, "reference.level=3 N m"])
+    assert gauge(r"supply_pressure +Pa +", str(linear)) == pytest.approx(3.5, abs=1e-3)
+    ppafo.sweep("torque-task-uncertainty", draws=4, out=tmp_path / "study", overrides=[*changes[:2], SHORT])
+    assert ppafo.load_study_results(tmp_path / "study").units["gauge_zero"] == "70000.0 Pa_a"
+    result.save(tmp_path / "run")
+    stored = draw_folder(tmp_path / "run", names_in(tmp_path / "run"))["figure"]
+    kept = next(axes for axes in stored.axes if axes.get_title(loc="left").startswith("Pressure"))
+    assert max(max(line.get_ydata()) for line in kept.lines) == pytest.approx(largest, abs=1e-6)
+    too_high = ppafo.simulate(TASK, overrides=[*high, "reference.level=9 N m"]).tracking
+    assert too_high is not None
+    assert gauge("at 75 deg and ", too_high.sentence) == pytest.approx(3.5, abs=1e-3)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import ppafo
 from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
-from ppafo.storage.foreign import read_foreign
+from ppafo.storage.foreign import read_foreign, read_trials
 from tests.repeatable import TOO_SLOW
 
 TIME = {"column": 1, "unit": "ms"}
@@ -363,8 +363,24 @@ def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Pa
         assert recording.time[0] == 0.0
     with pytest.raises(DataError, match=r"raw.csv: trial = 4: the clock begins again 2 times: there is 1 to 3"):
         read_foreign(path, mapped(channels=channels, trial=4))
-    with pytest.raises(DataError, match=r"line 5, column 'time'.*, or take one of 3 trials with trial = 1 in a column"):
+    with pytest.raises(
+        DataError, match=r"line 5, column 'time'.*, or take one of 3 trials with trial = 1, or 'all', in a"
+    ):
         read_foreign(path, mapped(channels=channels))
+
+
+def test_some_trials_or_all_are_a_recording_each(tmp_path: Path) -> None:
+    rows = [f"{10 * n},{100 * trial + n}\n" for trial in (1, 2, 3) for n in range(5 - trial)]
+    path, channels = written(tmp_path, "".join(rows)), {"torque": {"column": 2, "unit": "N m"}}
+    every = read_trials(path, mapped(channels=channels, trial="all"))
+    assert [one.label for one in every] == ["raw trial 1", "raw trial 2", "raw trial 3"]
+    assert [one["torque"][0] for one in every] == [100.0, 200.0, 300.0]
+    some = read_trials(path, mapped(channels=channels, trial=[3, 1]))
+    assert [one["torque"][0] for one in some] == [300.0, 100.0]
+    with pytest.raises(DataError, match=r"raw.csv: trial: 3 recordings, where one is needed: name one"):
+        read_foreign(path, mapped(channels=channels, trial="all"))
+    with pytest.raises(DataError, match=r"raw.csv: trial = 7: the clock begins again 2 times: there is 1 to 3"):
+        read_trials(path, mapped(channels=channels, trial=[1, 7]))
 
 
 def test_a_clock_that_falls_back_within_a_trial_is_no_other_trial(tmp_path: Path) -> None:

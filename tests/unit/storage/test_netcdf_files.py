@@ -92,7 +92,9 @@ def test_an_unknown_kind_is_refused_by_file_with_the_nearest(tmp_path: Path) -> 
     path = write_netcdf(tmp_path / "bench.nc", recording())
     with h5netcdf.File(path, "a") as file:
         file.attrs["kind"] = "simulatd"
-    with pytest.raises(DataError, match=r"bench\.nc: 'simulatd' is not a kind of recording, did you mean 'simulated'\?"):
+    with pytest.raises(
+        DataError, match=r"bench\.nc: 'simulatd' is not a kind of recording, did you mean 'simulated'\?"
+    ):
         read_netcdf(path)
 
 

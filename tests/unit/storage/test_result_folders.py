@@ -47,7 +47,9 @@ def test_an_unknown_kind_in_the_document_is_refused_with_the_nearest(tmp_path: P
     folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
     text = (folder / "run.json").read_text()
     (folder / "run.json").write_text(text.replace('"simulated"', '"synthtic"'))
-    with pytest.raises(DataError, match=r"run\.json: 'synthtic' is not a kind of recording, did you mean 'synthetic'\?"):
+    with pytest.raises(
+        DataError, match=r"run\.json: 'synthtic' is not a kind of recording, did you mean 'synthetic'\?"
+    ):
         read_recording(folder / "recording.csv")
 
 

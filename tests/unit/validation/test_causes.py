@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.tolerances import Tolerances
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device
+from ppafo.progress import Progress
 from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -368,6 +370,27 @@ def test_a_chamber_that_stands_still_is_within_its_limit_and_has_no_unit_misread
     found = causes_of([measured], [agreement], device, settings)
     assert found.found is None or found.found.is_usual
     assert found.nearest is None or "read as" not in found.nearest.name
+
+
+def test_a_search_for_causes_reports_how_many_changes_are_done_of_how_many(bench: Recording) -> None:
+    device, heard = load_device("ppafo2011", overrides=SUPPLY), list[Progress]()
+    measured, settings = check_recording(swapped(bench), device, "r.csv"), ReplaySettings()
+    causes_of([measured], [compare_recording(measured, device, settings)], device, settings, heard.append)
+    counted = [one for one in heard if one.activity == "searching for causes"]
+    assert counted
+    assert all(one.noun == "changes" and 0 <= one.done < one.total for one in counted)
+    assert any(one.done > 0 for one in counted)
+
+
+@pytest.mark.parametrize(("declared", "is_named"), [("psi_g", True), ("", True), ("Pa_a", True), ("bar_g", False)])
+def test_a_unit_is_misread_as_the_one_that_the_file_declares_and_as_no_other(
+    declared: str, is_named: bool, bench: Recording
+) -> None:
+    values = ROOM + 1.0e-5 * PASCALS_PER_PSI * (bench["pressure_2"] - ROOM)
+    channel = Channel(values, "Pa", stated=declared)
+    misread = replace(bench, channels={**bench.channels, "pressure_2": channel})
+    found = causes(misread).found
+    assert (found is not None and found.name == "pressure_2 seems to be bar read as psi") is is_named
 
 
 def test_a_chamber_that_rises_by_more_than_a_usual_zero_does_not_agree(filling: Recording) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import plain
 from ppafo.errors import DataError, count_of
 from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
@@ -19,8 +18,7 @@ from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
-from ppafo.parameters.parameter_set import ParameterSet
-from ppafo.report.display_units import gauge_shift
+from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -28,7 +26,7 @@ from ppafo.report.residuals import Course, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
-from ppafo.units.shown import in_units
+from ppafo.units.shown import counted_from, in_units
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +94,10 @@ _CHANNELS = {
 }
 
 
-def trajectory_panels(measurement: Recording, model: Recording, atmosphere: float = STANDARD_ATMOSPHERE) -> list[Panel]:
+def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
     """Return samples, model and residuals of one experiment over time, two panels for each channel that was fitted.
 
-    Both recordings have the same times. Gauge pressure counts from ``atmosphere`` [Pa absolute].
+    Both recordings have the same times.
     """
     if not np.array_equal(measurement.time, model.time):
         raise DataError(f"{model.label}: is not at the times of {measurement.label}")
@@ -116,7 +114,6 @@ def trajectory_panels(measurement: Recording, model: Recording, atmosphere: floa
             model=model[name],
             names=(_KIND_WORDS[measurement.kind], "model"),
             colour=look.colour,
-            above=0.0 if is_angle else gauge_shift(atmosphere),
         )
         panels += course_panels(course, "circles", "" if panels else "above")
     return panels
@@ -130,7 +127,7 @@ _MINIMUM_DIGITS, _MAXIMUM_DIGITS = 4, 9
 """Digits of a value: more than the least only where its interval is narrow."""
 
 
-@in_units(lambda identification: identification.before.shown)
+@in_units(lambda found: counted_from(found.before.shown, atmospheric_pressure(found.before)))
 def finding_of(identification: Identification) -> Finding[Identification]:
     """Return what was identified in words and tables; passed where recordings agree and the set makes a device."""
     name, new_set, before = identification.name, identification.new_set, identification.before
@@ -298,9 +295,9 @@ def _figures(identification: Identification) -> list[Part]:
         draw = partial(bench_figure, result.panels, result.kind)
         figures.append(Part(name=name, caption=result.summary, is_detail=True, draw=draw))
     fit = None if identification.trajectory is None else identification.trajectory.fit
-    for measurement, model, scenario in zip(fit.measurements, fit.models, fit.scenarios, strict=True) if fit else ():
-        label, atmosphere = measurement.label, scenario.device.supply.atmospheric_pressure
-        panels = partial(trajectory_panels, measurement, model, atmosphere)
+    for measurement, model in zip(fit.measurements, fit.models, strict=True) if fit else ():
+        label = measurement.label
+        panels = partial(trajectory_panels, measurement, model)
         name, caption = f"trajectory-fit-{label}", f"{label} and the fit."
         figures.append(Part(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
     first = {result.procedure: result for result in reversed(identification.results)}

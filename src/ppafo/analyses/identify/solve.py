@@ -25,9 +25,9 @@ from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, chosen_valve, number_in_si
 from ppafo.progress import Report, report_nothing
-from ppafo.storage.foreign import read_foreign
+from ppafo.storage.foreign import read_trials
 from ppafo.storage.result_folder import read_recording
-from ppafo.units.shown import shown_in
+from ppafo.units.shown import counted_from, shown_in
 
 
 def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Report = report_nothing) -> Identification:
@@ -38,7 +38,7 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     """
     given = _Given(problem, folder, file)
     before = _base_set(problem, folder)
-    with shown_in(before.shown):
+    with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, problem.device.valve)
         tasks = _tasks(given, before)
         used = _uses(tasks, before, valve, file)
@@ -79,7 +79,16 @@ class _Given:
     file: str
 
     def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> Source:
-        """Return the recording that the problem names, read through one of its column maps where it says one.
+        """Return the only recording in a file; IdentificationError where a map takes several trials of it."""
+        found = self.sources(name, columns, parameter_set)
+        if len(found) > 1:
+            raise IdentificationError(
+                f"{name}: columns.{columns}.trial: an experiment has one recording, not {len(found)}: name one trial"
+            )
+        return found[0]
+
+    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[Source, ...]:
+        """Return the recordings in a file that the problem names, read through one of its column maps if it says one.
 
         The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
         """
@@ -88,11 +97,12 @@ class _Given:
         if path.is_dir():
             raise IdentificationError(f"{path}: is a folder, which has no hash; name the recording in it")
         if columns is None:
-            return source_of(path, read_recording(path, atmosphere=atmosphere))
+            return (source_of(path, read_recording(path, atmosphere=atmosphere)),)
         molar_mass = number_in_si(parameter_set, "gas.molar_mass")
         gas = "" if molar_mass is None else f"{molar_mass!r} kg/mol"
         column_map, map_name = self.problem.columns[columns], f"{self.file}:{columns}"
-        return source_of(path, read_foreign(path, column_map, None, atmosphere, map_name, gas))
+        recordings = read_trials(path, column_map, None, atmosphere, map_name, gas)
+        return tuple(source_of(path, one, one.label.removeprefix(path.stem)) for one in recordings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +130,7 @@ def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
     return [
         _Task(
             procedure,
-            tuple(given.source(name, procedure.columns, before) for name in procedure.recordings),
+            tuple(one for name in procedure.recordings for one in given.sources(name, procedure.columns, before)),
             f"{given.file}: procedure {number}, {procedure.kind}",
         )
         for number, procedure in sorted(numbered, key=lambda pair: PROCEDURES.index(pair[1].kind))

@@ -129,7 +129,8 @@ def equilibrium(scenario: Scenario) -> Point:
             line = f"no equilibrium found for the command {values['command']:g}"
             raise ScenarioError(f"{scenario.name}: {line}; take --at with a time")
         line = f"no equilibrium at {wanted:.4g} N m, the last value of the reference"
-        full = dict.fromkeys(("command", *opening_names(values)), 1.0 if wanted > 0.0 else -1.0)
+        open_way = 1.0 if (wanted > 0.0) != scenario.device.supply.is_vacuum else -1.0
+        full = dict.fromkeys(("command", *opening_names(values)), open_way)
         most = _steady(run, held, {**values, **full}, None)
         if most is not None:
             at = run.plant, most["angle"], most["pressure_1"], most["pressure_2"]

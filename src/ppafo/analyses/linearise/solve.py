@@ -62,7 +62,8 @@ def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
     valve = "closed"
     if any(openings):
         chamber = 1 if openings.source_1 > 0.0 else 2
-        valve = f"feeds chamber {chamber}, open by {max(openings):.4g}"
+        is_vacuum = min(at["supply_pressure"], at["dorsiflexion_pressure"]) < room
+        valve = f"{'evacuates' if is_vacuum else 'feeds'} chamber {chamber}, open by {max(openings):.4g}"
     return {"valve": valve, joint.name: vane, **said}
 
 

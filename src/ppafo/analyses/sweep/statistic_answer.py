@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic
+from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, FURTHEST_UNSEEN, Statistic
 from ppafo.analyses.sweep.stopping import Estimate, Look, StoppingRule
 from ppafo.report.finding import Finding, Part, columns_of
 from ppafo.report.kind import Interval, Kind, of_metric
@@ -44,10 +44,10 @@ def remarks_on(last: Look, values: Floats, statistic: Statistic, kind: Kind, noi
             "probability"
         )
     if statistic.is_of_replicates and known:
-        share, span = _RULE_OF_THREE / known, float(np.ptp(values))
+        share, furthest = _RULE_OF_THREE / known, FURTHEST_UNSEEN * float(np.std(values))
         moved = (
-            f"if it lay beyond the others by their range, {kind.change(span)}, the mean would move by up to "
-            f"{kind.change(share * span)}, and more the further it lies"
+            f"up to {FURTHEST_UNSEEN:g} standard deviations, {kind.change(furthest)}, from the mean it would move it "
+            f"by up to {kind.change(last.unseen)}, which the target width allows for; further off by more"
         )
         if are_equal:
             moved = f"it would move the mean by up to {share:.2g} times its distance"
@@ -65,8 +65,10 @@ def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) ->
     kind, of_values, looks = kind_of(estimated.metric, statistic), of_metric(estimated.metric), estimated.looks
     unit = kind.shown_unit if kind.quantity else ""
     ending = ""
-    if not rule.is_narrow(estimated.interval):
+    if not rule.is_narrow(looks[-1]):
         ending = f"; the target width was not reached with the maximum of {rule.maximum:,} draws"
+    elif statistic.is_of_replicates and estimated.draws < FEWEST_SEEN:
+        ending = f"; a mean is believed from {FEWEST_SEEN:,} draws on, and the maximum is {rule.maximum:,}"
     verdict = (
         f"{estimated.statistic} of {estimated.metric}: {kind.interval(estimated.interval)} {unit}".rstrip()
         + f" after {estimated.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"
@@ -115,7 +117,7 @@ def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) ->
 def _row_of(look: Look, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
     """Return a look as texts: draws, those without a value, estimate and interval, its width, and what it lacks."""
     interval = look.interval
-    met = ["narrow enough"] if rule.is_narrow(interval) else []
+    met = ["narrow enough"] if rule.is_narrow(look) else []
     if not look.is_carried:
         met.append("its effective sample size is small")
     ends = (kind.number(value) for value in (interval.value, interval.low, interval.high))

@@ -5,6 +5,7 @@ independent draws; its interval is never narrower than theirs, as nobody knows b
 The intervals of quantiles and probabilities are exact for independent draws, and get those.
 """
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -24,8 +25,10 @@ from ppafo.studies.distributions import (
 )
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, level_of
 
-FEWEST_SEEN = 3000
-"""Draws from which a mean is believed: one in a thousand that differs would have come (95 %)."""
+FEWEST_SEEN = 10_000
+"""Draws from which a mean is believed: one in 3,300 that differs would have come (95 %)."""
+FURTHEST_UNSEEN = 100.0
+"""Distance from the mean, over the standard deviation [-], up to which values that were not drawn are allowed for."""
 GRAMMAR = "'mean', 'quantile 0.95', 'probability above VALUE' or 'probability below VALUE'"
 _QUANTILE = re.compile(r"quantile\s+([0-9]*\.?[0-9]+)")
 _PROBABILITY = re.compile(r"probability\s+(above|below)\s+(\S.*)")
@@ -50,6 +53,19 @@ class Statistic:
         """Return the draws from number ``first`` on that its interval is made for: Sobol replicates, or independent."""
         draw = uncertainty.replicated_columns if self.is_of_replicates else uncertainty.random_columns
         return draw(first, count, seed)
+
+    def unseen(self, values: Floats, confidence: float) -> float:
+        """Change of a mean [SI] by values that no draw had, at most; 0 of other statistics, whose intervals are exact.
+
+        No interval of a mean holds without a bound on its values (Bahadur and Savage, 1956). Of n draws without it an
+        event has a probability up to 1 - (1 - confidence)^(1/n) (Clopper and Pearson), and its values are assumed to
+        lie within ``FURTHEST_UNSEEN`` standard deviations of the mean.
+        """
+        known = values[np.isfinite(values)]
+        if not self.is_of_replicates or not known.size:
+            return 0.0
+        share = -math.expm1(math.log1p(-confidence) / known.size)
+        return share * FURTHEST_UNSEEN * float(np.std(known))
 
     def effective_size(self, values: Floats) -> float:
         """Return how many of the values determine the estimate; all where its interval is exact.

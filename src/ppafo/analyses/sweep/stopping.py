@@ -60,9 +60,10 @@ class StoppingRule:
         """Confidence of each single look, so that all of them together keep ``confidence``."""
         return 1.0 - (1.0 - self.confidence) / len(self.sizes)
 
-    def is_narrow(self, interval: Interval) -> bool:
-        """Tell whether an interval is narrow enough."""
-        return interval.width <= self.width * (abs(interval.value) if self.is_relative else 1.0)
+    def is_narrow(self, look: "Look") -> bool:
+        """Tell whether an interval is narrow enough, with what values that were not drawn would add to it."""
+        allowed = self.width * (abs(look.interval.value) if self.is_relative else 1.0)
+        return look.interval.width + look.unseen <= allowed
 
 
 def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingRule) -> StoppingRule:
@@ -84,12 +85,14 @@ class Look:
     """Interim estimate: number of draws, number without a value, and the interval [SI].
 
     ``effective_size`` is how many of them determine the estimate: fewer than there are where a few large values decide.
+    ``unseen`` [SI] is the change of a mean by values that were not drawn, at most.
     """
 
     draws: int
     missing: int
     interval: Interval
     effective_size: float
+    unseen: float = 0.0
 
     @property
     def is_carried(self) -> bool:

@@ -84,6 +84,8 @@ def shortfall(scenario: Scenario) -> Floats:
     angles = [first + fraction * travel for fraction in fractions]
     highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
     lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
+    if supply.is_vacuum:
+        highest, lowest = lowest, highest
     least, most = profile_bounds(scenario.reference)
     above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
     return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.analyses.validate.result import Validation, kind_of_channel, verdict
 from ppafo.errors import count_of
-from ppafo.report.display_units import display_value, gauge_shift
+from ppafo.report.display_units import display_value
 from ppafo.report.finding import Finding, Part, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
@@ -39,9 +39,9 @@ def panels_across(agreement: RecordingAgreement) -> int:
     return 1 if len(agreement.channels) == 1 else 2
 
 
-def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[Panel]:
-    """Return two panels for each channel of a recording; gauge pressures count from ``atmosphere`` [Pa absolute]."""
-    pairs = [_channel_panels(agreement, channel, atmosphere) for channel in agreement.channels]
+def agreement_panels(agreement: RecordingAgreement) -> list[Panel]:
+    """Return two panels for each channel of a recording."""
+    pairs = [_channel_panels(agreement, channel) for channel in agreement.channels]
     across = panels_across(agreement)
     rows = [pairs[first : first + across] for first in range(0, len(pairs), across)]
     empty = (Panel(TIME, TIME, ()), Panel(TIME, TIME, (), tall=0.5))
@@ -49,7 +49,7 @@ def agreement_panels(agreement: RecordingAgreement, atmosphere: float) -> list[P
     return [panel for row in filled for line in zip(*row, strict=True) for panel in line]
 
 
-def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, atmosphere: float) -> list[Panel]:
+def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) -> list[Panel]:
     """Return samples and model over time, and below them their residual."""
     name, measured, model = channel.channel, agreement.measured, agreement.model
     measurement = measured_values(measured, name)
@@ -68,7 +68,6 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement, at
         model=np.interp(measured.time - agreement.delay.correction, model.time, model[name]),
         names=(KIND_WORDS[measured.kind], "model on the recorded inputs") if is_first else ("", ""),
         colour=_LOOKS.get(name, ACTUAL).colour,
-        above=gauge_shift(atmosphere) if is_chamber else 0.0,
     )
     is_near = float(np.abs(course.model - measurement).max()) >= _NEAR_LIMIT * limit
     return course_panels(course, "dots", "figure" if is_first else "", (-limit, limit) if is_near else ())
@@ -105,7 +104,7 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         said=said,
         parts=(
             Part(said=[_method(validation)], is_detail=True),
-            *(_part(validation, name, agreement) for name, agreement in pairs),
+            *(_part(name, agreement) for name, agreement in pairs),
             Part("Files" if hashes else "", facts(hashes), is_detail=True),
         ),
         found=validation,
@@ -136,7 +135,7 @@ def recording_names(files: Sequence[str]) -> list[str]:
     ]
 
 
-def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> Part:
+def _part(name: str, agreement: RecordingAgreement) -> Part:
     """Section with the errors of one recording in a table, and its panels; ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
     late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
@@ -150,7 +149,7 @@ def _part(validation: Validation, name: str, agreement: RecordingAgreement) -> P
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
         [replayed],
         remarks=[f"note: {remark}" for remark in agreement.remarks],
-        panels=partial(agreement_panels, agreement, validation.device.supply.atmospheric_pressure),
+        panels=partial(agreement_panels, agreement),
         name=f"{name}-agreement",
         caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
         "model, the limit of its RMS value dashed where it is in range.",

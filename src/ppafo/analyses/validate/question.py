@@ -99,6 +99,7 @@ def validate(
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)
+    device.check_pressurised("a validation, which counts in parts of the gauge supply pressure,")
     if volume is not None and not volume > 0.0:
         raise DataError(f"volume of {volume:g} m^3: must be above 0")
     if not 0.0 <= longest_delay <= LARGEST_DELAY:

@@ -80,9 +80,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     ):
         largest = float(worn.recording[channel].max()) if channel in worn.recording else 0.0
         if largest > _FAR_ABOVE * given:
-            reached, fed = (
-                quantity_text(value, "pressure", ".3g", supply.atmospheric_pressure) for value in (largest, given)
-            )
+            reached, fed = (quantity_text(value, "pressure") for value in (largest, given))
             remarks.append(
                 f"the pressure in {words} reaches {reached}, and its supply is set to {fed}: "
                 "actuator, valves and tubing must withstand that"

@@ -65,7 +65,7 @@ def rig_record(
     >>> rig_record(port="udp:127.0.0.1:49317", patience=0.2, out=Path("bench.csv"))  # no bench sends there
     Traceback (most recent call last):
     ...
-    ppafo.errors.DataError: no sample came within 0.2 s; what came in: nothing
+    ppafo.errors.DataError: no sample received within 0.2 s; received: nothing
     """
     from ppafo.cli import output
     from ppafo.errors import DataError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -77,5 +78,15 @@ def export_fmu(
 
     # A folder may be named like a unit too; it then gets the unit among its files.
     if out.suffix == ".fmu" and not out.is_dir():
-        return export_file(out, lambda: next(iter(unit().values())), next_step(out))
-    return export(out, "export fmu", unit, lambda files: next_step(out / files[0]))
+        said = export_file(out, lambda: next(iter(unit().values())), next_step(out))
+    else:
+        said = export(out, "export fmu", unit, lambda files: next_step(out / files[0]))
+    compared = [name for name in chosen if name == host_platform()]
+    not_run = [name for name in chosen if name not in compared]
+    lines = [said.text]
+    if not_run:
+        lines.append(f"not run here, and so not compared with Python: the library for {', '.join(not_run)}")
+    elif not compared:
+        lines.append("not run here, and so not compared with Python: a unit of sources alone")
+    document = {**said.document, "compared": compared, "not_run": not_run}
+    return replace(said, text="\n".join(lines), document=document)

@@ -25,7 +25,7 @@ from ppafo.control.angle_loop import (
 )
 from ppafo.control.kind import NOMINAL, ControllerKind
 from ppafo.control.torque_loop import beyond_dead_band
-from ppafo.model.controlled import ANGLE
+from ppafo.model.controlled import ANGLE, steered
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.plant import gravity_torque
 from ppafo.model.sensors import Measurement
@@ -183,7 +183,7 @@ def cascade_update(
     own = parameters.angle_stiffness * acting + parameters.angle_damping * (asked - rate)
     needed = load + breakaway + own + gravity + parameters.inertia * quickening + friction
     wanted = before if rests_within else needed
-    unlimited = parameters.torque_gain * (wanted - measurement.torque)
+    unlimited = parameters.torque_gain * steered(wanted - measurement.torque)
     command = beyond_dead_band(max(-1.0, min(1.0, unlimited)), parameters.dead_band)
     return command, CascadeState(
         reference=reference,

@@ -38,6 +38,44 @@ CONSTANT = ControllerKind(
 )
 
 
+class OrderedParameters(NamedTuple):
+    """Orders [-] from outside: the command, and the level of help, from 0 to 3, at which a shut-off valve shuts."""
+
+    command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 2.0)]
+    safe_state: Annotated[float, Number("", "level of help, 3 has stopped", 0.0, 0.0, 3.0)]
+
+
+class Help(NamedTuple):
+    """Level of help, where the safety of a controller of walking has it."""
+
+    level: float
+
+
+class OrderedState(NamedTuple):
+    """State of a controller that is told its level of help."""
+
+    safety: Help
+
+
+def ordered_update(
+    parameters: OrderedParameters, state: OrderedState, reference: float, measurement: Measurement, period: float
+) -> tuple[float, OrderedState]:
+    """Command [-] and state, which are what was ordered whatever is measured."""
+    return parameters.command, OrderedState(Help(parameters.safe_state))
+
+
+ORDERED = ControllerKind(
+    name="ordered",
+    summary="Command and level of help from outside, for a plant whose shut-off valve goes by the latter.",
+    source="chosen here",
+    quantities=quantities_of(OrderedParameters),
+    parameters=OrderedParameters,
+    initial=OrderedState(Help(0.0)),
+    update=ordered_update,
+    needs_reference=False,
+)
+
+
 ROUNDING = 1.0e-9
 """N m: an error this small counts as zero, so that rounding does not decide the first command."""
 

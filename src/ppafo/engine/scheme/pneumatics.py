@@ -435,9 +435,10 @@ def pressure_that_matters(plant: PlantParameters, pressure: float) -> float:
 
 
 def supply_range(plant: PlantParameters) -> float:
-    """Pressure [Pa] of the higher supply over the atmosphere, not less than a fraction of the latter."""
-    supplied = max(plant.supply_pressure, plant.dorsiflexion_pressure) - plant.atmospheric_pressure
-    return max(supplied, MINIMUM_PRESSURE * plant.atmospheric_pressure)
+    """Pressure [Pa] between the atmosphere and the supply farther from it, not less than a fraction of the former."""
+    room = plant.atmospheric_pressure
+    supplied = max(abs(plant.supply_pressure - room), abs(plant.dorsiflexion_pressure - room))
+    return max(supplied, MINIMUM_PRESSURE * room)
 
 
 # Found by trying: with fewer steps for a filling the error of a plain step passes 1e-3 (docs/decisions/0002).

@@ -489,7 +489,7 @@ def _fixed_of_device(device: Device, is_thermal: bool, has_lines: bool) -> list[
     lines = "with lines behind the regulators" if has_lines else "constant supply pressures"
     effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
     gas = "thermal" if is_thermal else "isothermal"
-    let = "let" if device.supply.relieving else "do not let"
+    let = "let" if device.supply.takes_back else "do not let"
     return [
         *(
             f"the form of the {name}, `sonic_conductance, critical_ratio`"

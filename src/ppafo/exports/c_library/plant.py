@@ -45,6 +45,16 @@ WALKING_COMMAND = Input(
 )
 
 
+SAFE_STATE = Input(
+    "safe_state",
+    "-",
+    "level of help, 0 to 3; at 3, where the controller has stopped, the shut-off valve shuts",
+    0.0,
+    0.0,
+    3.0,
+)
+
+
 class Assignment(NamedTuple):
     """A field in C and what it becomes: an expression in which ``{angle}`` stands for the input of that name.
 
@@ -98,7 +108,7 @@ class PlantAlone:
 
 STEPS, SAMPLES = "run.step", "controller.period"
 """Settings that may be the step of the inputs."""
-_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command")
+_WITHOUT_EFFECT = ("run.duration", "run.output_interval", "controller.command", "controller.safe_state")
 """Times of a run mean nothing to a plant that is stepped from outside."""
 _REPLACED = ("sensors.", "motion.external_torque", "motion.ankle_torque")
 _PATH = "motion.profile."
@@ -134,9 +144,13 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 
 @singledispatch
-def _drive_of(_motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
-    """External drive of a plant with this motion, within the ranges of its settings by path: here a walk."""
-    return Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
+def _drive_of(motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
+    """Return how a plant that moves so is driven, within the ranges of its settings by path: here that of a walk."""
+    walks = Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
+    if not (isinstance(motion, WalkMotion) and motion.shut_off):
+        return walks
+    safe_state = Assignment("controller.safe_state", "{safe_state}")
+    return replace(walks, inputs=(SAFE_STATE,), parameters=(safe_state,))
 
 
 _FIRST_RAMP = 0.0078125
@@ -212,7 +226,7 @@ EXAMPLE = 0.5
 def half_open(scenario: Scenario) -> Scenario:
     """Return the run of the example by Python: the plant for a tenth of a second or longer under a constant command."""
     plant = _commanded(scenario.motion, scenario)
-    command = replace(plant.controller, settings={"command": EXAMPLE})
+    command = replace(plant.controller, settings={**plant.controller.settings, "command": EXAMPLE})
     duration = max(0.1, declared_numbers(plant)["run.duration"].minimum)
     return replace(plant, controller=command, run=replace(plant.run, duration=duration))
 
@@ -326,13 +340,17 @@ def _commanded_walk(motion: WalkMotion, walk: Scenario) -> Scenario:
     # What fails with the controller, a shut-off valve and a slow valve go by its samples, and so do commands then.
     goes_by_samples = bool(motion.shut_off) or not {"controller", "valve"}.isdisjoint(motion.broken)
     period = walk.controller.period if goes_by_samples else step
+    control = Control(switching.CONSTANT.name, {"command": 0.0}, period)
+    if motion.shut_off:
+        # Such a valve shuts where the controller has stopped, which a command does not say.
+        control = Control(switching.ORDERED.name, {"command": 0.0, "safe_state": 0.0}, period)
     # The forces under the foot are among the outputs.
     forces = dict.fromkeys(FORCES, 0.0) | {"force_bandwidth": motion.forces["force_bandwidth"]}
     return replace(
         walk,
         name=f"{walk.name}-plant",
         description=f"The plant alone of this walk, on its leg: {walk.description}",
-        controller=Control(switching.CONSTANT.name, {"command": 0.0}, period),
+        controller=control,
         run=replace(walk.run, step=step, output_interval=period),
         # Which samples a controller misses is drawn by the same seed.
         sensors=Sensors(seed=walk.sensors.seed),

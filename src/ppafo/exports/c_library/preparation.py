@@ -1,4 +1,4 @@
-"""From the settings of a scenario to the numbers of a run: plain functions, in the form of those of the step.
+"""Preparation of a run from its settings: plain functions in the form of those of the step.
 
 ``parts`` is what the settings do not decide (``Preparation``), ``settings`` has a number for each of them, in SI units,
 and ``lane`` takes the groups of the run. Python runs these functions as they stand; a library has them in C, one after
@@ -12,7 +12,7 @@ from typing import Any
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.engine.program import Program
-from ppafo.engine.rows import numbers, rebuilt
+from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import Pace
 from ppafo.engine.scheme.pneumatics import is_slow
@@ -74,6 +74,12 @@ class Preparation:
     def leg(self) -> Leg | None:
         """Leg on a prescribed shank that the vane carries; None in a walk too."""
         return None if self.program.walks else vane_motion(self.scenario).leg
+
+    @property
+    def shank_numbers(self) -> dict[str, float]:
+        """Numbers of a shank that a gait leads, by path."""
+        assert self.leg is not None, "a shank is of a leg"
+        return dict(zip(leaf_paths(ShankSeries, "shank"), numbers(self.leg.curves), strict=True))
 
     @property
     def bare(self) -> str:
@@ -177,7 +183,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane["supply"] = parts.section("supply", "relieving")(
         *(getattr(settings, name) for name in parts.names("supply")),
         # Lines have a check valve of their own, so that the valve may push gas back into them.
-        float(parts.device.supply.relieving or parts.scenario.supply_lines is not None),
+        float(parts.device.supply.takes_back or parts.scenario.supply_lines is not None),
     )
     lane.device = parts.row("Device", SEEN_BY_EFFECTS)(*(lane[section] for section in SEEN_BY_EFFECTS))
     for section, orifice in (("valve", "valve"), ("leak", "actuator.leak")):
@@ -208,7 +214,7 @@ def set_plant(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         0.0 if is_led else (settings.motion_external_torque if parts.leg is None else -settings.motion_ankle_torque),
     )
     if parts.program.actuator.shape is not None:
-        stops = Range(*(getattr(settings, name) for name in parts.names("actuator", Range._fields)))
+        stops = rebuilt(Range, (getattr(settings, name) for name in parts.names("actuator", Range._fields)))
         # What came from a file that the set names is constant.
         shape = parts.program.actuator.prepare(
             parts.row("ActuatorSettings", parts.device.actuator.settings)(
@@ -247,17 +253,14 @@ def put_leg_on(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
                 (getattr(settings, name) for name in parts.names("motion.shank", named(shank.quantities))),
             )
         else:
-            lane.shank = ShankSeries(
-                *(
+            lane.shank = rebuilt(
+                ShankSeries,
+                (
                     settings.motion_shank_start
-                    if name == "start"
-                    else (
-                        settings.motion_toe_lever
-                        if name == "toe_lever"
-                        else getattr(parts.constant(parts.leg.curves), name)
-                    )
-                    for name in ShankSeries._fields
-                )
+                    if path == "shank.start"
+                    else (settings.motion_toe_lever if path == "shank.toe_lever" else parts.shank_numbers[path])
+                    for path in parts.shank_numbers
+                ),
             )
 
 
@@ -283,11 +286,11 @@ def set_timing(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         lane.signal_delay if parts.program.walks else settings.sensors_delay, lane.step
     )
     lane.timing = LaneTiming(
-        lane.step,
-        lane.step * lane.counts_of_steps.steps_per_sample,
-        command_lag,
-        signal_lag,
-        1.0 if parts.program.walks else lane.tolerance,
+        step=lane.step,
+        period=lane.step * lane.counts_of_steps.steps_per_sample,
+        command_lag=command_lag,
+        signal_lag=signal_lag,
+        tolerance=1.0 if parts.program.walks else lane.tolerance,
     )
 
 
@@ -344,9 +347,8 @@ def set_laws(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
 
 def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set noise of the sensors, uptake of heat by the gas, and supply lines."""
-    lane.sensors = SensorParameters(
-        *(getattr(settings, name) for name in parts.names("sensors", SensorParameters._fields))
-    )
+    flaws = parts.names("sensors", SensorParameters._fields)
+    lane.sensors = rebuilt(SensorParameters, (getattr(settings, name) for name in flaws))
     if parts.program.is_thermal:
         lane.thermal = thermal_gas(
             parts.row("Walls", parts.wall_settings)(
@@ -356,8 +358,9 @@ def set_gas(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
         )
     if parts.scenario.supply_lines is not None:
         relieving = parts.scenario.supply_lines.relieving
-        lane.lines = SupplyLines(
-            *(relieving if name == "relieving" else getattr(settings, name) for name in parts.line_settings)
+        lane.lines = rebuilt(
+            SupplyLines,
+            (relieving if name == "relieving" else getattr(settings, name) for name in parts.line_settings),
         )
 
 

@@ -1,4 +1,4 @@
-"""From the settings of a walk to the numbers of a run: plain functions that call the planning.
+"""Preparation of a walk from its settings: plain functions that call the planning.
 
 What a gait comes to (series, events, how its heel rolls) and a task sequence in time are numbers written out. Rows that
 the planning reads as mappings are structs in C: Python runs the functions of ``preparation`` alone.

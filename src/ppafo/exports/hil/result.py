@@ -18,6 +18,7 @@ from ppafo.report.recording_figure import recording_figure
 from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -181,8 +182,8 @@ class HardwareRun:
             else f"vented (command 2) from {exchange.vented_at:.6g} s on: {exchange.vented}"
         )
         remark = vented if status.is_completed else status.message
-        atmosphere = self.plant.scenario.device.supply.atmospheric_pressure
-        return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark, atmosphere)
+        with shown_in(self.plant.scenario.device.shown):
+            return recording_figure(self.result.recording, f"{self.plant.scenario.name}, at the wire", remark)
 
     def plot(self) -> "Figure":
         """Histograms of how late samples were sent, and after how long they were answered."""

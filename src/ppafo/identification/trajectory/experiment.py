@@ -107,6 +107,7 @@ def check_experiment(experiment: Experiment) -> None:
     )
     if COMMAND in inputs:
         check_command(recording, said)
+    experiment.scenario.device.check_pressurised(f"{said}: a fit of motion")
     if inputs:
         check_gaps(recording, said)
         check_absolute(recording, experiment.scenario.device.supply.atmospheric_pressure, said)

@@ -201,13 +201,29 @@ def _fitted_runs(
 def _remarks(fitted: Fit, runs: Sequence[_FittedRun], estimates: Sequence[Estimate]) -> tuple[str, ...]:
     """Return what a fitted device breaks of the rules of devices, and that the search did not converge."""
     remarks = [text for text in dict.fromkeys(broken_rule(run.scenario.device) for run in runs) if text]
-    if not fitted.has_converged:
+    if fitted.edge:
+        remarks.append(_at_edge(fitted.edge, estimates))
+    elif not fitted.has_converged:
         starts = ", ".join(map(_start_of, estimates))
         remarks.append(
             f"the search stopped after {fitted.evaluations} runs before it converged; give the parameters {starts}, "
             "where it ended"
         )
     return tuple(remarks)
+
+
+def _at_edge(edge: Mapping[str, int], estimates: Sequence[Estimate]) -> str:
+    """Return the numbers that end where no run succeeds beyond them, and the bounds with which a fit ends before."""
+    wanted, bounds = [], []
+    for estimate in (one for one in estimates if one.path in edge):
+        side = edge[estimate.path]
+        wanted.append(f"{estimate.path} {'above' if side > 0 else 'below'} {_in_unit(estimate.value, estimate)}")
+        inside = estimate.value - side * _INSIDE * abs(estimate.value)
+        bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
+    return (
+        f"the recordings want {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, or "
+        f"give {' and '.join(bounds)}, and the fit ends there as at a bound"
+    )
 
 
 def _left_out(fitted: Fit, blocks: Sequence[Block], times: Mapping[str, Floats]) -> Iterator[str]:
@@ -223,9 +239,16 @@ def _left_out(fitted: Fit, blocks: Sequence[Block], times: Mapping[str, Floats])
 
 def _start_of(estimate: Estimate) -> str:
     """Return an estimate as the start that a problem file may give for it."""
-    number = f"{estimate.value:.4g}"
-    text = number if estimate.unit in ("", "-") else f"{number} {estimate.unit}"
-    return f'start = "{text}" of {estimate.path}'
+    return f'start = "{_in_unit(estimate.value, estimate)}" of {estimate.path}'
+
+
+_INSIDE = 1.0e-3
+"""Fraction of a number by which a bound lies on the side of an edge on which runs succeed."""
+
+
+def _in_unit(value: float, estimate: Estimate) -> str:
+    """Return a value with the unit of an estimate, as a problem file reads it."""
+    return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 
 def _known(fitted: Fit, number: Number, row: int, error: float, estimates: Sequence[Estimate]) -> Known:

@@ -138,9 +138,15 @@ def share_of(rise: Rise, gauge: float) -> float:
 
 
 def filled_share(rise: Rise, gauge: float) -> float:
-    """Integral of ``share_of`` over the pressure, from 0 to a gauge pressure [Pa]."""
+    """Integral of ``share_of`` over the pressure, from the lower end of its stretch to a gauge pressure [Pa]."""
     inside = share_of(rise, gauge)
     return rise.length * 0.5 * inside * inside + max(gauge - rise.lower - rise.length, 0.0)
+
+
+def filled_from_vented(rise: Rise, gauge: float) -> float:
+    """Integral of ``share_of`` over the pressure, from 0 to a gauge pressure [Pa]."""
+    # A stretch below the atmosphere is filled in part where the chamber is vented.
+    return filled_share(rise, gauge) - filled_share(rise, 0.0)
 
 
 def volume_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
@@ -167,8 +173,8 @@ def compliance_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
 def turning(chamber: Chamber, levels: Levels, gauge: float) -> float:
     """Torque [N m] at a gauge pressure [Pa]: the integral of the volume's slope over the pressure."""
     rises, gains = chamber.rises, levels.gains
-    low = gains[0].slope * filled_share(rises[0], gauge) + gains[1].slope * filled_share(rises[1], gauge)
-    high = gains[2].slope * filled_share(rises[2], gauge) + gains[3].slope * filled_share(rises[3], gauge)
+    low = gains[0].slope * filled_from_vented(rises[0], gauge) + gains[1].slope * filled_from_vented(rises[1], gauge)
+    high = gains[2].slope * filled_from_vented(rises[2], gauge) + gains[3].slope * filled_from_vented(rises[3], gauge)
     return levels.lowest.slope * gauge + (low + high)
 
 

@@ -19,7 +19,7 @@ from ppafo.parameters.audit.chambers import (
 from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.audit.evidence import Evidence, Finding, NamedValue, Severity, Side
 from ppafo.parameters.audit.flow import check_bores, check_choked_flow, check_flow, check_orifices, check_sonic_flow
-from ppafo.parameters.audit.torque import check_inertia, check_published_torque, check_torque_ceiling
+from ppafo.parameters.audit.torque import check_inertia, check_published_torque, check_torque_ceiling, check_vacuum
 from ppafo.parameters.audit.values import (
     check_dimensions,
     check_gas_data,
@@ -51,6 +51,7 @@ CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
     "rounded table": check_rounded_table,
     "rotation": check_rotation,
     "filling": check_filling,
+    "vacuum": check_vacuum,
     "torque ceiling": check_torque_ceiling,
     "published torque": check_published_torque,
     "ideal gas": check_ideal_gas,

@@ -84,18 +84,21 @@ def check_bores(evidence: Evidence) -> Iterator[Finding]:
 
 def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]:
     gas, supply, atmosphere = evidence.gas(), evidence.number(_SUPPLY), evidence.atmosphere()
-    if gas is None or supply is None or supply <= atmosphere or both_forms(evidence.parameter_set, section):
+    if gas is None or supply is None or both_forms(evidence.parameter_set, section):
         return
-    ratio = atmosphere / supply
+    upstream, downstream = max(supply, atmosphere), min(supply, atmosphere)
+    if not upstream > downstream > 0.0:
+        return
+    ratio = downstream / upstream
     area = evidence.numbers(*(f"{section}.{quantity.name}" for quantity in AREA_FORM))
     sonic = evidence.numbers(*(f"{section}.{quantity.name}" for quantity in SONIC_FORM))
     if area is not None and min(area) > 0.0:
         conductance = orifice_conductance(Orifice(*area), gas)
-        flow = conductance * supply * isentropic_flow_function(ratio, gas.heat_capacity_ratio)
+        flow = conductance * upstream * isentropic_flow_function(ratio, gas.heat_capacity_ratio)
         form, origin = AREA_FORM, "by its Cd A"
     elif sonic is not None and min(sonic) > 0.0 and sonic[1] < 1.0:
         conductance = orifice_conductance(SonicOrifice(*sonic), gas)
-        flow = conductance * supply * iso6358_flow_function(ratio, sonic[1])
+        flow = conductance * upstream * iso6358_flow_function(ratio, sonic[1])
         form, origin = (
             SONIC_FORM,
             (
@@ -106,16 +109,18 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
         )
     else:
         return
+    shown = evidence.in_set_unit(_SUPPLY, supply)
+    is_vacuum = supply < atmosphere
+    way = "from atmosphere to vacuum" if is_vacuum else "from supply to atmosphere"
+    ends = f"the atmosphere to {shown}" if is_vacuum else f"{shown} to the atmosphere"
     yield Finding(
         id=f"open-flow-of-{name}",
         severity="note",
         title=f"valve '{name}' passes {_GRAMS * flow:#.3g} g/s of {gas.species}",
         values=evidence.values_of(*(f"{section}.{quantity.name}" for quantity in form), _SUPPLY),
-        sides=(Side("flow from supply to atmosphere", flow, "kg/s"), Side("conductance", conductance, "kg/(s Pa)")),
+        sides=(Side(f"flow {way}", flow, "kg/s"), Side("conductance", conductance, "kg/(s Pa)")),
         paragraph=(
-            f"Fully open from {evidence.in_set_unit(_SUPPLY, supply)} to the atmosphere it passes "
-            f"{_GRAMS * flow:#.3g} g/s "
-            f"{origin}. Compare this with the data sheet."
+            f"Fully open from {ends} it passes {_GRAMS * flow:#.3g} g/s {origin}. Compare this with the data sheet."
         ),
     )
 

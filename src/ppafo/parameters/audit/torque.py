@@ -8,6 +8,7 @@ from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters.audit.evidence import Evidence, Finding, Interval, Severity, Side
 from ppafo.parameters.device import VANE, Gas
+from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
 from ppafo.units.shown import shown_in, shown_unit
@@ -132,7 +133,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
         yield from _ceiling_by_angle(evidence)
     if constant is None or constant <= 0.0 or not supplies:
         return
-    ceilings = {path: constant * (value - evidence.atmosphere()) for path, value in supplies.items()}
+    ceilings = {path: constant * abs(value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
     # Torque constants are quoted per psi in the field, or per bar where the set has bar.
     with shown_in(evidence.parameter_set.shown):
@@ -151,6 +152,28 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
             f"the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
         ),
     )
+
+
+def check_vacuum(evidence: Evidence) -> Iterator[Finding]:
+    """Yield for each supply below the atmosphere how deep it is: a warning where its unit is an absolute one."""
+    for path in _SUPPLIES[:2]:
+        entry, pressure = evidence.parameter_set.numbers.get(path), evidence.number(path)
+        if entry is None or pressure is None or not 0.0 < pressure < evidence.atmosphere():
+            continue
+        depth, chamber = evidence.atmosphere() - pressure, 1 if path == _SUPPLIES[0] else 2
+        way = "lowers" if chamber == 1 else "raises"
+        doubt = f" If {entry.value:g} {entry.unit} was read from a gauge, write '_g' for '_a'."
+        yield Finding(
+            id=f"vacuum-{chamber}",
+            severity="warning" if entry.unit.endswith("_a") else "note",
+            title=f"{path} is a vacuum, {depth / 1e3:.3g} kPa below the atmosphere",
+            values=evidence.values_of(path, ATMOSPHERE_PATH),
+            sides=(Side("depth of the vacuum", depth, "Pa"),),
+            paragraph=(
+                f"A valve that joins chamber {chamber} to it draws its gas out, and the room fills it again: that "
+                f"{way} the torque.{doubt if entry.unit.endswith('_a') else ''}"
+            ),
+        )
 
 
 def _ceiling_by_angle(evidence: Evidence) -> Iterator[Finding]:

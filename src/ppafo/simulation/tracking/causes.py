@@ -81,7 +81,7 @@ def oscillation(case: Case) -> Cause | None:
     slower = Cause(f"`{names[0]}` is this device's: {why}", slower_loops(scenario, law, (2.0, 4.0)))
     if quicker > _QUICKER:
         text = (
-            f"at {level_text('rad', angle, scenario)} the chambers are so small that it changes {quicker:.2g} times "
+            f"at {level_text('rad', angle)} the chambers are so small that it changes {quicker:.2g} times "
             f"quicker than where `{names[0]}` is taken"
         )
         slower = Cause(text, slower_loops(scenario, law, (quicker, 2.0 * quicker)))
@@ -123,8 +123,8 @@ def _static_friction(case: Case) -> Cause | None:
     lost = band / gain
     if asked > holding + lost:
         return None
-    held, wanted = level_text("N m", holding, scenario), level_text("N m", asked, scenario)
-    kept = f" and `valve.dead_band` keeps {level_text('N m', lost, scenario)} from it" if asked > holding else ""
+    held, wanted = level_text("N m", holding), level_text("N m", asked)
+    kept = f" and `valve.dead_band` keeps {level_text('N m', lost)} from it" if asked > holding else ""
     text = f"static friction holds the joint with {held}{kept}, and the law asks for {wanted} at this error"
     remedies = [] if believed >= holding else [remedy(scenario, {"controller.static_torque": holding})]
     if "static_torque" not in settings:

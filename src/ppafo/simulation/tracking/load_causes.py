@@ -5,7 +5,8 @@ import numpy as np
 from ppafo.metrics.metric import Floats, followed
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.plant import gravity_torque
-from ppafo.parameters.reach import static_torque, supply_for, torque_reach
+from ppafo.parameters.graph import PRESSURE_PATH
+from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import FreeMotion, Scenario
 from ppafo.simulation.tracking.case import Case, Cause
@@ -34,10 +35,10 @@ def torque_beyond_reach(case: Case) -> Cause | None:
     lowest, highest = torque_reach(scenario.device, there)
     if lowest <= wanted <= highest:
         return None
-    reach, supply = (highest, "supply.pressure") if wanted > highest else (lowest, "supply.dorsiflexion_pressure")
+    reach, supply = highest if wanted > highest else lowest, supply_that_moves(scenario.device, wanted > highest)
     text = (
-        f"at {level_text('rad', there, scenario)} and {level_text('Pa', number_at(scenario, supply), scenario)} the "
-        f"actuator gives {level_text('N m', reach, scenario)} at most"
+        f"at {level_text('rad', there)} and {level_text('Pa', number_at(scenario, supply))} the "
+        f"actuator gives {level_text('N m', reach)} at most"
     )
     remedies = []
     needed = supply_for(scenario.device, there, 1.05 * wanted)
@@ -64,15 +65,12 @@ def load_beyond_reach(case: Case) -> Cause | None:
     needed_torque = load if not is_within else load + holding if is_high else load - holding
     if lowest <= needed_torque <= highest:
         return None
-    reach, supply = (highest, "supply.pressure") if is_high else (lowest, "supply.dorsiflexion_pressure")
+    reach, supply = highest if is_high else lowest, supply_that_moves(device, is_high)
     stop = stop_of(scenario, angle)
     rests = f"the joint lies on its {stop} stop: " if stop else ""
-    works, gives = (level_text("N m", torque, scenario) for torque in (needed_torque, reach))
-    against = "" if not is_within else f" to break its static friction of {level_text('N m', holding, scenario)}"
-    text = (
-        f"{rests}it needs {works} at {level_text('rad', wanted, scenario)}{against}, where the actuator gives {gives} "
-        "at most"
-    )
+    works, gives = (level_text("N m", torque) for torque in (needed_torque, reach))
+    against = "" if not is_within else f" to break its static friction of {level_text('N m', holding)}"
+    text = f"{rests}it needs {works} at {level_text('rad', wanted)}{against}, where the actuator gives {gives} at most"
     needed = supply_for(device, wanted, 1.3 * needed_torque)
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
     advice = ""
@@ -114,12 +112,13 @@ def flung_at_start(case: Case) -> Cause | None:
     room = float(device.supply.atmospheric_pressure)
     needed = supply_for(device, start, load)
     text = (
-        f"at the start its chambers give {level_text('N m', load - lacking, scenario)} for a load of "
-        f"{level_text('N m', load, scenario)}: the joint is flung {change_text(ANGLE, flung)} away before "
+        f"at the start its chambers give {level_text('N m', load - lacking)} for a load of "
+        f"{level_text('N m', load)}: the joint is flung {change_text(ANGLE, flung)} away before "
         "they are filled"
     )
     pressures = {"initial.pressure_1": room, "initial.pressure_2": room}
     if needed is not None:
-        pressures["initial.pressure_1" if load > own(start, room, room) else "initial.pressure_2"] = needed
+        is_first = supply_that_moves(device, load > own(start, room, room)) == PRESSURE_PATH
+        pressures["initial.pressure_1" if is_first else "initial.pressure_2"] = needed
     remedies = [] if needed is None else [remedy(scenario, pressures)]
     return Cause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")

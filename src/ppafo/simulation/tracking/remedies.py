@@ -54,16 +54,16 @@ def remedy(scenario: Scenario, numbers: Mapping[str, float]) -> Remedy:
     """Remedy in the units of the device."""
     declared = declared_numbers(scenario)
     overrides = (
-        f"{path}={level_text(declared[path].unit, number, scenario)}"
+        f"{path}={level_text(declared[path].unit, number)}"
         for path, number in numbers.items()
         if not path.endswith(_KEPT_OF_ORIFICE)
     )
     return Remedy(dict(numbers), tuple(overrides))
 
 
-def level_text(unit: str, number: float, scenario: Scenario) -> str:
+def level_text(unit: str, number: float) -> str:
     """Value in the unit a person is shown, for a number in a unit in SI; pressures count from the atmosphere."""
-    value, shown = metric_level(float(number), unit, float(scenario.device.supply.atmospheric_pressure))
+    value, shown = metric_level(float(number), unit)
     return f"{value:.3g} {shown}".rstrip()
 
 

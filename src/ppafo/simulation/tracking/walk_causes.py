@@ -33,7 +33,7 @@ def _request_beyond_reach(case: Case) -> Cause | None:
     share = float(np.mean((above > 0.0) | (below > 0.0)))
     if share <= _OFTEN:
         return None
-    most = [level_text("N m", float(np.max(np.abs(numbers))), scenario) for numbers in (reaches, reference)]
+    most = [level_text("N m", float(np.max(np.abs(numbers)))) for numbers in (reaches, reference)]
     text = (
         f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, {most[0]} "
         f"at most of {most[1]} asked for"

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.valves.kind import VENTS_ABOVE
-from ppafo.report.display_units import axis_unit, display_value
+from ppafo.report.display_units import axis_unit, display_value, display_values
 from ppafo.report.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
@@ -314,18 +314,12 @@ def _legs(axes: "Axes", result: WalkResult) -> None:
     axes.set_axis_off()
 
 
-def _shown_pressures(pressures: Floats, atmosphere: float) -> Floats:
-    """Return pressures [Pa absolute] in the unit in which they are shown; gauge counts from ``atmosphere`` [Pa]."""
-    zero, one = (display_value(value, "pressure", atmosphere) for value in (0.0, 1.0))
-    return zero + (one - zero) * pressures
-
-
 def _pressures(axes: "Axes", result: WalkResult) -> None:
     atmosphere = result.scenario.device.supply.atmospheric_pressure
     for channel, name, colour in _CHAMBERS:
         if channel in result.averages:
-            axes.plot(_PERCENT, _shown_pressures(result.averages[channel].mean, atmosphere), color=colour, label=name)
-    axes.axhline(display_value(atmosphere, "pressure", atmosphere), color=GREY, linewidth=0.8)
+            axes.plot(_PERCENT, display_values(result.averages[channel].mean, "pressure"), color=colour, label=name)
+    axes.axhline(display_value(atmosphere, "pressure"), color=GREY, linewidth=0.8)
     axes.set_ylabel(f"Chambers\n({axis_unit('pressure')})", rotation=0, ha="right", va="center")
     axes.yaxis.set_label_coords(-0.045, 0.5)
     axes.locator_params(axis="y", nbins=4)
@@ -405,9 +399,9 @@ def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Sc
     for channel, name, colour in _CHAMBERS:
         times = fine * walk_of(configuration).gait.stride_time
         pressures = np.interp(times, worn.recording.time, worn.recording[channel])
-        traces.plot(fine - turns[0], _shown_pressures(pressures, atmosphere), color=colour, linewidth=1.3, label=name)
+        traces.plot(fine - turns[0], display_values(pressures, "pressure"), color=colour, linewidth=1.3, label=name)
     traces.set_xlim(0.0, turns[-1] - turns[0])
-    least = display_value(atmosphere + 10.0 * PASCALS_PER_PSI, "pressure", atmosphere)
+    least = display_value(atmosphere + 10.0 * PASCALS_PER_PSI, "pressure")
     traces.set_ylim(top=max(least, traces.get_ylim()[1]))
     traces.set_xlabel("strides", fontsize=8.5, labelpad=1.0)
     traces.set_ylabel(f"pressure\n({axis_unit('pressure')})", fontsize=8.5)

@@ -48,11 +48,11 @@ def failing(share: float) -> Model:
 
 
 def test_it_stops_at_the_first_look_that_is_narrow_enough() -> None:
-    rule = StoppingRule(0.05, is_relative=False, first=64, maximum=2**16)
+    rule = StoppingRule(0.03, is_relative=False, first=64, maximum=2**16)
     found = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, 1)
-    widths = [look.interval.width for look in found.looks]
+    widths = [look.interval.width + look.unseen for look in found.looks]
     assert found.is_met
-    assert widths[-1] <= 0.05 < min(widths[:-1])
+    assert widths[-1] <= 0.03 < min(widths[:-1])
     assert [look.draws for look in found.looks] == [64 * 2**number for number in range(len(widths))]
     assert found.values.size == found.draws
     assert np.array_equal(found.values, UNCERTAIN.replicated_columns(0, found.draws, 1)["x"])
@@ -76,16 +76,18 @@ def test_a_width_that_is_out_of_reach_is_said_and_not_hidden() -> None:
 def test_all_looks_together_hold_the_truth_as_often_as_is_said(
     statistic: Statistic, truth: float, width: float
 ) -> None:
-    rule = StoppingRule(width, is_relative=False, first=64, maximum=8192, confidence=0.9)
+    # A mean is not believed after so few, and is looked at each time.
+    most = 2048 if statistic.is_of_replicates else 8192
+    rule = StoppingRule(width, is_relative=False, first=64, maximum=most, confidence=0.9)
     found = [drawn_until(value, UNCERTAIN, statistic, rule, seed) for seed in range(300)]
     held = [all(look.interval.low <= truth <= look.interval.high for look in item.looks) for item in found]
-    assert all(item.is_met for item in found)
+    assert all(item.is_met is not statistic.is_of_replicates for item in found)
     assert np.mean(held) >= 0.9
     assert max(len(item.looks) for item in found) >= 3
 
 
 def test_without_the_correction_they_would_not() -> None:
-    rule = StoppingRule(0.08, is_relative=False, first=64, maximum=8192, confidence=0.9)
+    rule = StoppingRule(0.08, is_relative=False, first=64, maximum=2048, confidence=0.9)
     held = []
     for seed in range(300):
         looks = drawn_until(value, UNCERTAIN, mean_of("N m"), rule, seed).looks
@@ -106,7 +108,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=4096)
     found = [drawn_until(heavy, NORMALS, mean_of("N m"), rule, seed) for seed in range(60)]
     wrong = [not item.interval.low <= math.exp(2.0) <= item.interval.high for item in found]
-    narrow = [any(rule.is_narrow(look.interval) for look in item.looks) for item in found]
+    narrow = [any(look.interval.width <= 0.5 * look.interval.value for look in item.looks) for item in found]
     assert np.mean(narrow) > 0.3, "an interval that is narrow enough comes often"
     assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
     warned = [item for item in found if not item.looks[-1].is_carried]
@@ -115,7 +117,8 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
     quiet = drawn_until(value, UNCERTAIN, mean_of("N m"), StoppingRule(0.05, False, first=512), 1)
     assert quiet.is_met
     (unseen,) = quiet.remarks
-    assert "fewer than 0.037 % of the runs may be missing" in unseen
+    assert "fewer than 0.018 % of the runs may be missing" in unseen
+    assert "up to 100 standard deviations" in unseen
 
 
 def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> None:
@@ -128,9 +131,9 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
 
         return run
 
-    rule = StoppingRule(0.2, is_relative=False, first=64, maximum=4096)
-    found = [drawn_until(outcomes(0.001), rare, mean_of("N m"), rule, seed) for seed in range(60)]
-    wrong = [not item.interval.low <= 0.1 <= item.interval.high for item in found]
+    rule = StoppingRule(0.2, is_relative=False, first=64, maximum=2**14)
+    found = [drawn_until(outcomes(0.0003), rare, mean_of("N m"), rule, seed) for seed in range(20)]
+    wrong = [not item.interval.low <= 0.03 <= item.interval.high for item in found]
     # Each of these was met at its first look, with an interval from 0 to 0.
     assert np.mean([item.is_met and is_wrong for item, is_wrong in zip(found, wrong, strict=True)]) <= 0.05
     few = drawn_until(outcomes(0.0), rare, mean_of("N m"), StoppingRule(0.2, False, 64, 1024), 1)
@@ -139,7 +142,7 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
     many = drawn_until(outcomes(0.0), rare, mean_of("N m"), rule, 1)
     assert many.is_met
     (unseen,) = many.remarks
-    assert "would move the mean by up to 0.00073 times its distance" in unseen
+    assert "would move the mean by up to 0.00018 times its distance" in unseen
 
 
 def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:
@@ -156,6 +159,27 @@ def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:
         assert found.is_met
         assert float(np.max(found.values)) > 10.0
         assert found.interval.low <= truth <= found.interval.high
+
+
+@pytest.mark.parametrize(("share", "size"), [(0.0003, 100.0), (0.0003, 1000.0), (0.0001, 25.0)])
+def test_a_mean_that_is_met_holds_beside_a_jump_that_hardly_ever_comes(share: float, size: float) -> None:
+    """A jump that is missing among the draws lies further than the width says, or moves the mean by less."""
+
+    def jumps(columns: Mapping[str, Floats]) -> dict[str, Floats]:
+        return {METRIC: 3.0 + columns["x0"] + size * (columns["x1"] < share)}
+
+    uncertain = Uncertainty(tuple(Drawn(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
+    rule, truth = StoppingRule(0.01, is_relative=True, first=256, maximum=2**15), 3.5 + size * share
+    found = [drawn_until(jumps, uncertain, mean_of("N m"), rule, seed) for seed in range(20)]
+    wrong = [item for item in found if item.is_met and not abs(item.interval.value - truth) < 0.01 * truth]
+    assert len(wrong) <= 1
+
+
+def test_a_mean_of_fewer_draws_than_would_show_a_rare_value_is_not_met_and_says_so() -> None:
+    rule = StoppingRule(0.5, is_relative=True, first=64, maximum=1024)
+    finding = draw_until(Runs.of_model(value, [METRIC]), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
+    assert not finding.found.is_met
+    assert "a mean is believed from 10,000 draws on, and the maximum is 1,024" in finding.said[0]
 
 
 def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independent_draws() -> None:
@@ -236,11 +260,21 @@ def test_widths_are_read_in_the_unit_of_the_metric() -> None:
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
-    found = estimate(STUDY, metric=METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
+    def asked() -> Estimate:
+        return estimate(
+            STUDY,
+            metric=METRIC,
+            statistic="quantile 0.5",
+            width="10 %",
+            configuration="proportional",
+            first_draws=64,
+            draws=1024,
+        ).found
+
+    found = asked()
     assert found.is_met
     assert found.interval.low < 0.875 < found.interval.high
-    again = estimate(STUDY, metric=METRIC, width="10 %", configuration="proportional", first_draws=64, draws=1024).found
-    assert again == found
+    assert asked() == found
 
 
 def test_further_metrics_are_means_over_the_same_draws_that_have_a_value() -> None:

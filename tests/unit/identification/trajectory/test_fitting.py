@@ -10,7 +10,7 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryFit, TrajectoryProblem, fit
+from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryFit, TrajectoryProblem, fit, fitting
 from ppafo.identification.trajectory.numbers import number_at, with_numbers
 from ppafo.identification.trajectory.problem import numbers_of
 from ppafo.identification.trajectory.runs import FIT_TOLERANCE, prepare, run_with, signals_of
@@ -52,6 +52,18 @@ def test_the_noise_that_was_put_on_the_samples_is_found(three: TrajectoryFit, ex
         assert channel.rms == pytest.approx(channel.noise, rel=0.12)
     assert three.conflict == ""
     assert three.remarks == ()
+
+
+def test_a_search_that_ends_where_no_run_succeeds_says_which_bound_keeps_it_from_there(
+    three: TrajectoryFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ended = dataclasses.replace(three.fit, has_converged=False, edge={"foot_plate.inertia": 1})
+    monkeypatch.setattr(fitting, "fit_residuals", lambda *_arguments, **_settings: ended)
+    (remark,) = fit(three.problem).remarks
+    value = three.estimate("foot_plate.inertia").value
+    assert f"the recordings want foot_plate.inertia above {value:.4g} kg m^2, where no run succeeds" in remark
+    assert f'give high = "{0.999 * value:.4g} kg m^2" of foot_plate.inertia' in remark
+    assert "before it converged" not in remark
 
 
 def test_fitted_runs_are_those_of_a_simulation_with_the_estimates(three: TrajectoryFit) -> None:
