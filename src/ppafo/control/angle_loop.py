@@ -46,6 +46,10 @@ LOAD_PERIODS = 4.0
 LEAST_TOLERANCE = math.radians(0.5)
 STEPS_OF_TOLERANCE = 2.0
 """Resolutions of the angle sensor that a tolerance is at least; and as many standard deviations of its noise, twice."""
+NOISE_IN_FILTER = 6.0
+"""Standard deviations of the angle's noise that the filter of its rate takes for a step."""
+NOISE_AT_REST = 7.0
+"""Standard deviations of the angle's noise that show motion: fewer come by chance several times a second."""
 REST_RATE = 0.02
 """Rate [rad/s] below which a joint counts as resting."""
 
@@ -116,19 +120,21 @@ def tolerance(_loop: TorqueLoop, joint: Joint) -> float:
 
 def rest_distance(loop: TorqueLoop, joint: Joint) -> float:
     """Turn [rad] that shows motion: more than a step of the sensor or its noise, and than ``REST_RATE`` in 2 theta."""
-    unseen = 1.5 * joint.resolution + 4.0 * joint.noise
+    unseen = 1.5 * joint.resolution + NOISE_AT_REST * joint.noise
     return max(REST_RATE * torque_lag(loop, joint), unseen)
 
 
 def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
     """Time constant [s] of the filter on the measured rate: as late as the torque loop, at most 0.1/w.
 
-    A step of a coarse sensor may open the valve by half: for that the filter is slower, up to 0.3/w.
+    A step of a coarse sensor may open the valve by half, and its noise by a tenth in the mean: for that the filter is
+    slower, up to 0.3/w and 0.5/w.
     """
-    step = max(joint.resolution, 2.0 * joint.noise)
-    smoothing = 2.0 * inner_gain(loop, joint) * angle_damping(loop, joint) * step
+    per_angle = 2.0 * inner_gain(loop, joint) * angle_damping(loop, joint)
     frequency = stiffened(loop, joint)
-    return max(min(loop.dead_time, 0.1 / frequency), min(smoothing, 0.3 / frequency))
+    coarse = min(per_angle * joint.resolution, 0.3 / frequency)
+    noisy = min(NOISE_IN_FILTER * per_angle * joint.noise, 0.5 / frequency)
+    return max(min(loop.dead_time, 0.1 / frequency), coarse, noisy)
 
 
 def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:

@@ -102,6 +102,9 @@ class Gathering(Protocol):
         """Keep that a name was looked up."""
 
 
+_COMPREHENSIONS = ast.GeneratorExp | ast.ListComp | ast.SetComp | ast.DictComp
+
+
 @dataclass(slots=True)
 class Definition:
     """The syntax tree of a function, names that its nodes read, and expressions compiled so far."""
@@ -118,7 +121,7 @@ class Definition:
                 known = frozenset({node.id})
             else:
                 known = frozenset().union(*map(self.read_in, ast.iter_child_nodes(node)))
-                if isinstance(node, ast.GeneratorExp):
+                if isinstance(node, _COMPREHENSIONS):
                     known -= {name.id for loop in node.generators for name in names_in(loop.target)}
             self.names[id(node)] = known
         return known
@@ -127,12 +130,12 @@ class Definition:
         """The value of an expression."""
         if id(node) not in self.codes:
             whole = ast.fix_missing_locations(ast.Expression(node))
-            is_nested = any(isinstance(inner, ast.GeneratorExp) for inner in ast.walk(node))
+            is_nested = any(isinstance(inner, _COMPREHENSIONS) for inner in ast.walk(node))
             self.codes[id(node)] = compile(whole, "<parts>", "eval"), is_nested
         code, is_nested = self.codes[id(node)]
         # Evaluated is the text of a function that Python has loaded, with its own globals, as a call of it would: calls
         # and generators too, so that no smaller evaluator would do. No file, setting or argument comes in as text.
-        # What stands in a generator sees no local names.
+        # What stands in a comprehension sees no local names before Python 3.12.
         return eval(code, {**scope, **known}) if is_nested else eval(code, scope, known)
 
 

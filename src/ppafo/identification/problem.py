@@ -112,6 +112,10 @@ class StaticTorqueProblem(StrictTable):
         return static_torque(sources, self.confidence, setting.tolerances)
 
 
+_MOST_OF_STOPS = 10.0
+"""Way of a decay over the way between the stops of its set, beyond which its unit is another one."""
+
+
 class FreeDecayProblem(StrictTable):
     """Free decay after an impulse: viscous damping and Coulomb friction."""
 
@@ -135,7 +139,16 @@ class FreeDecayProblem(StrictTable):
         return inertia, 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
 
     def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
-        """Return what the procedure makes of recordings."""
+        """Return what the procedure makes of recordings; IdentificationError for an angle that no such device turns."""
+        low, high = (number_in_si(setting.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
+        for source in sources:
+            angles = source.recording["angle"] if "angle" in source.recording else source.recording.time[:1]
+            turned = float(angles.max() - angles.min())
+            if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
+                raise IdentificationError(
+                    f"{source.name}: free-decay: 'angle' goes over {turned:.4g} rad, {turned / math.tau:.3g} turns, "
+                    f"and the stops of the set are {math.degrees(high - low):.4g} deg apart: is it in deg?"
+                )
         paths = ("friction.static_torque", "friction.dynamic_torque")
         static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)
         # Near standstill a seal grips as hard as at rest at most.

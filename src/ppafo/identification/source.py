@@ -114,8 +114,8 @@ _LARGEST_NUMBER = 1.0e12
 """Size of a number above which no bench has measured it, in any SI unit."""
 _MOST_IMPOSSIBLE = 0.1
 """Share of the readings of a flow meter that may be impossible; more are a mistake of signs or columns."""
-_GROSS_SAMPLE, _GROSS_READING = 1.0 / 6.0, 0.25
-"""Shares of the usual range from which a sample over time, by 6 of them, and a reading are grossly wrong.
+_FINE_SAMPLE, _GROSS_SAMPLE, _GROSS_READING = 0.01, 1.0 / 6.0, 0.25
+"""Shares of the usual range from which a sample over time, by 6 of them, and a reading are wrong, or grossly so.
 
 A real logger's glitch of a third of the range is one of many samples, and no reason to refuse the recording.
 """
@@ -265,9 +265,18 @@ def without_wrong_samples(
 
 
 def _far_off(values: Floats, most: int) -> NDArray[np.bool_]:
-    """Return which samples are far off those around them; where more than ``most`` are, a converter may step so."""
+    """Return which samples are far off those around them; where more than ``most`` are, a converter may step so.
+
+    Where few are a sixteenth of the usual range off, these are; else those that are off by all of it.
+    """
+    fine = _off_by(values, most, _FINE_SAMPLE)
+    return fine if np.count_nonzero(fine) <= most else _off_by(values, most, _GROSS_SAMPLE)
+
+
+def _off_by(values: Floats, most: int, share: float) -> NDArray[np.bool_]:
+    """Return which samples are off those around them by 6 times a share of the usual range, and of the noise."""
     # Of samples that stand still the noise is 0, and what moves first among them is no error.
-    noise = max(noise_of(values), _GROSS_SAMPLE * usual_range(values))
+    noise = max(noise_of(values), share * usual_range(values))
     is_out = outlying_samples(values, noise)
     # One wrong sample among samples that stand still is no step of their converter.
     step = resolution_of(values if np.count_nonzero(is_out) > most else values[~is_out])

@@ -117,9 +117,12 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons why the run is useless for its purpose, one sentence each: a loop that misses its reference."""
+        """Reasons why the run is of little use, a sentence each: coarse valves, a loop that misses its reference."""
+        from ppafo.simulation.tracking.pair_step import coarse_pair
+
         verdict = self.tracking
-        return () if verdict is None else (verdict.sentence,)
+        said = (coarse_pair(self.scenario), "" if verdict is None else verdict.sentence)
+        return tuple(sentence for sentence in said if sentence)
 
     def __repr__(self) -> str:
         """Return name, status, duration and one line a metric, in SI units."""

@@ -70,6 +70,9 @@ def parse_header(cells: list[str]) -> list[Column]:
         if match is None:
             shown = cell if len(cell) <= 40 else f"{cell[:36]} ..."
             remedy = next((f"; {one} need a column map with {key}" for mark, one, key in _OTHERS if mark in cell), "")
+            known = CHANNELS.get(cell.strip())
+            if known is not None:
+                remedy = f": write '{cell.strip()} [{known.unit}]'"
             raise DataError(
                 f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
                 f"{remedy or (_OWN_COLUMNS if cell.strip() else '; does the line end with a comma?')}"

@@ -1,5 +1,6 @@
 """The text of a lane loop: how many lanes a block has, and what a rare phase costs where no lane needs it."""
 
+import ast
 import re
 from dataclasses import replace
 from typing import Any
@@ -11,6 +12,7 @@ from ppafo.engine.lane_rows import FIRST_CACHE, LANES, VECTOR, lanes_of
 from ppafo.engine.loop_rows import RowsOfLanes, RowsOfRun
 from ppafo.engine.loop_text import LoopText, _unparsed
 from ppafo.engine.program import Program
+from ppafo.engine.reduction import Definition
 from ppafo.engine.source_text import SourceCollector
 from ppafo.engine.step import meters, phases, sample
 from ppafo.engine.step.lane import Lane
@@ -89,3 +91,17 @@ def test_a_single_run_shows_its_sample_with_one_channel_as_with_several(channels
     assert "samples.before = samples.last" in text
     (values,) = re.findall(r"samples\.last = outputs\(0\.0, ([\w., ]+)\)", text)
     assert len(values.split(", ")) == len(channels)
+
+
+@pytest.mark.parametrize(
+    "text", ["[part + x for x in 'ab']", "{part + x for x in 'ab'}", "{part + x: 1 for x in 'ab'}"]
+)
+def test_a_comprehension_of_any_form_sees_the_names_that_are_known(text: str) -> None:
+    (function,) = ast.parse(f"def found(parts): return {text}").body
+    assert isinstance(function, ast.FunctionDef)
+    (line,) = function.body
+    assert isinstance(line, ast.Return)
+    assert line.value is not None
+    definition = Definition(function)
+    assert definition.read_in(line.value) == {"part"}
+    assert set(definition.value(line.value, {}, {"part": "heel"})) == {"heela", "heelb"}

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from ppafo.analyses.identify.answer import Identification, finding_of
@@ -24,6 +25,7 @@ from ppafo.parameters.audit.changes import changes
 from ppafo.parameters.loading import load_device, load_parameter_set, parameter_set_toml, parse_parameter_set
 from ppafo.report.finding import files_of, text_of
 from ppafo.running import simulate
+from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.storage import write_csv
 from ppafo.storage.result_folder import read_recording
@@ -83,6 +85,56 @@ def test_trials_below_each_other_are_recordings_of_one_procedure(bench: Path, so
     assert [path for path, _ in values[0]] == [path for path, _ in values[1]]
     assert [value for _, value in values[0]] == pytest.approx([value for _, value in values[1]], rel=1e-9)
     assert "logged.csv trial 3 sha256:" in " ".join(found[0][0].recordings)
+
+
+def test_an_angle_in_degrees_that_is_called_radians_is_refused(bench: Path, solved: Solve) -> None:
+    one = planted.decay().recording
+    write_csv(bench / "turned.csv", one.with_channel("angle", np.degrees(one["angle"]), "rad"))
+    with pytest.raises(
+        IdentificationError, match=r"turned.csv: free-decay: 'angle' goes over 2.* turns, .* is it in deg\?"
+    ):
+        solved(DECAY.replace("decay.csv", "turned.csv"))
+
+
+def test_drop_outs_within_a_decay_are_left_out_before_the_push_is_looked_for(bench: Path, solved: Solve) -> None:
+    one, base = planted.decay().recording, solved(DECAY).results[0].estimates
+    lost = np.where(np.arange(len(one)) % 101 == 50, 0.0, one["angle"])
+    write_csv(bench / "lost.csv", one.with_channel("angle", lost, "rad"))
+    result = solved(DECAY.replace("decay.csv", "lost.csv")).results[0]
+    assert result.remarks[0].startswith("left out: 16 of 1600 samples with 'angle' far off")
+    for estimate, right in zip(result.estimates, base, strict=True):
+        assert estimate.value == pytest.approx(right.value, rel=0.02)
+        assert estimate.verdict == "identified"
+
+
+def test_a_valve_map_that_was_swept_one_way_tells_what_its_dead_band_holds(bench: Path, solved: Solve) -> None:
+    one = planted.sweep().recording
+    write_csv(bench / "rising.csv", one.between(0.0, 10.0))
+    remarks = solved(MAP.replace("sweep.csv", "rising.csv")).results[0].remarks
+    assert any("half of its width is in the dead band" in remark for remark in remarks)
+    both = solved(MAP).results[0].remarks
+    assert not any("half of its width" in remark for remark in both)
+
+
+def test_a_discharge_coefficient_above_one_is_doubted(bench: Path, solved: Solve) -> None:
+    one = planted.flow().recording
+    write_csv(bench / "minutes.csv", one.with_channel("mass_flow", 60.0 * one["mass_flow"], "kg/s"))
+    result = solved(FLOW.replace("flow.csv", "minutes.csv")).results[0]
+    assert result.remarks[0].startswith("Cd = ")
+    assert "a flow per minute is 60 times one per second" in result.remarks[0]
+    assert result.estimates[0].verdict == "holds for this model only"
+
+
+def test_readings_before_the_air_is_on_are_left_out_and_no_swapped_columns(bench: Path, solved: Solve) -> None:
+    one, right = planted.flow().recording, solved(FLOW).results[0].estimates[0].value
+    channels = {}
+    for name in ("upstream_pressure", "downstream_pressure", "mass_flow"):
+        before = one["downstream_pressure"][0] if name != "mass_flow" else 0.0
+        channels[name] = Channel(np.concatenate([np.full(40, before), one[name]]), one.unit(name))
+    write_csv(bench / "rest.csv", Recording("rest", np.arange(100.0), channels, "synthetic"))
+    result = solved(FLOW.replace("flow.csv", "rest.csv")).results[0]
+    assert result.remarks[0] == "left out: 40 of 100 readings without flow and pressure difference"
+    assert result.estimates[0].value == pytest.approx(right, rel=1e-9)
 
 
 def test_procedures_run_in_the_recommended_order_whatever_the_order_of_the_file(solved: Solve) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import ppafo
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.parameters.reach import supply_for, torque_reach
@@ -196,3 +197,12 @@ def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_
     assert told.over_promise > 1.0
     assert f"`run.tolerance = {told.tolerance:.1g}` makes it less" in told.sentence
     assert simulate("cylinder-servo", [*coarse[:2], f"run.tolerance={told.tolerance:.1g}"]).error().over_promise < 1.0
+
+
+def test_a_pair_that_is_too_coarse_is_told_by_result_and_comparison() -> None:
+    changes = ["reference.level=4 N m", "run.duration=0.3 s"]
+    result = simulate("torque-task-solenoid", changes)
+    told = coarse_pair(result.scenario)
+    assert result.warnings[0] == told
+    assert told in str(result)
+    assert told in ppafo.compare(["torque-task-slow-valve", "torque-task-solenoid"], overrides=changes).found.remarks

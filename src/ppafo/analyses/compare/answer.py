@@ -20,6 +20,7 @@ from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Status
 from ppafo.simulation.tracking import Tracking
+from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units import without_exponent
@@ -263,6 +264,7 @@ def remarks_of(comparison: Compared) -> list[str]:
             )
         for case in task.cases:
             where = f"{case.configuration}, {task.task}"
+            said += [coarse] if (coarse := coarse_pair(case.scenario)) else []
             failed += [] if case.status.is_completed else [f"{where}: {case.status.message}"]
             if case.tracking is not None and not case.follows:
                 said.append(f"{where}: {case.tracking.sentence}; it is not among the best")

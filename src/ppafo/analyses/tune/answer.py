@@ -19,6 +19,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
 from ppafo.report.style import BLACK, BLUE, COLOURS, GREY, VERMILION
 from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage, without_exponent
 from ppafo.units.shown import in_units, quantity_of_unit
@@ -308,6 +309,8 @@ def _remarks(
         f"candidates, {runs:,} runs; {settled} of {len(starts)} converged before the maximum number of "
         "generations"
     ]
+    if coarse := coarse_pair(problem.scenario):
+        said.append(coarse)
     for path, bound in reached.items():
         said.append(
             f"{path} ended at its {bound}: a better value may lie beyond; widen the bounds if the device allows it"

@@ -95,7 +95,7 @@ def open_valve_flow(
     shown, fitted = (1.0e8 * one / upstream for one in (flow, model))
     marks = readings_mark("measured", ratio, shown), curve_mark(law, ratio, fitted)
     axes = Kind("Downstream over upstream pressure"), Kind("Flow over upstream pressure", "g/s per bar")
-    return result_of(
+    result = result_of(
         PROCEDURE,
         sources,
         found,
@@ -106,6 +106,27 @@ def open_valve_flow(
         f"{NEXT_LAW[law]}, or leave those readings out",
         remarks,
     )
+    return result if area is None else _doubted(result, size.path, area)
+
+
+_MOST = 1.0
+"""Discharge coefficient [-] that no opening exceeds: the flow would be more than that of a loss-free nozzle."""
+
+
+def _doubted(result: BenchResult, path: str, area: float) -> BenchResult:
+    """Return a result that tells of a discharge coefficient above 1, which has one of three causes."""
+    found = next((one for one in result.estimates if one.path == path and one.unit == ""), None)
+    if found is None or found.low <= _MOST:
+        return result
+    doubt = (
+        f"Cd = {found.value:.3g} is above 1, which no opening has: the unit of mass_flow or of a pressure is another "
+        f"one (a flow per minute is 60 times one per second), or the valve is larger than the set's {area * 1e6:.4g} "
+        f"mm^2; Cd A is {found.value * area * 1e6:.4g} mm^2"
+    )
+    estimates = tuple(
+        replace(one, verdict="holds for this model only") if one is found else one for one in result.estimates
+    )
+    return replace(result, estimates=estimates, remarks=(doubt, *result.remarks))
 
 
 _BESIDE = Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
@@ -145,7 +166,15 @@ def open_readings(
             f"{sources[0].name}: {PROCEDURE} needs {MINIMUM_SAMPLES} readings with the valve fully open, "
             f"command 1 or -1; there are {int(is_open.sum())}"
         )
-    upstream, downstream, flow = (pool(sources, name)[is_open] for name in CHANNELS)
+    upstream, downstream, flow = (pool(sources, name) for name in CHANNELS)
+    # A log that begins before the air is on says nothing there, and no column of it is wrong.
+    limit = tolerances.zero_of_flow * float(np.abs(flow[is_open]).max())
+    rests = is_open & (downstream >= upstream) & (np.abs(flow) <= limit)
+    told: tuple[str, ...] = ()
+    if rests.sum() > is_open.sum() // 10 and (is_open & ~rests).sum() >= MINIMUM_SAMPLES:
+        told = (f"left out: {rests.sum()} of {is_open.sum()} readings without flow and pressure difference",)
+        is_open = is_open & ~rests
+    upstream, downstream, flow = upstream[is_open], downstream[is_open], flow[is_open]
     wrong = np.flatnonzero(downstream >= upstream)
     # A few readings may cross by noise where both pressures are nearly equal.
     if wrong.size > flow.size // 10:
@@ -161,4 +190,4 @@ def open_readings(
     read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
     possible = read.possible[is_open]
     kept = [label for label, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
-    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, read.remarks
+    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, (*told, *read.remarks)

@@ -110,6 +110,7 @@ def valve_map(
     scatter = np.std(residuals) / np.abs(sweep.flow).max()
     is_clear = bool((sweep.command > _CLEAR_COMMAND).any() and (sweep.command < -_CLEAR_COMMAND).any())
     one_way = "only one direction was recorded: whether the other behaves the same is unknown"
+    no_play = "the command went one way only, so no hysteresis shows: half of its width is in the dead band"
     axes = Kind("Command"), Kind("Flow", "kg/s", "mass flow")
     return result_of(
         PROCEDURE,
@@ -120,7 +121,7 @@ def valve_map(
         f"scatter {scatter:.2%} of the largest flow",
         with_residuals("Valve map", *axes, _marks(sweep, model), sweep.command, residuals),
         "the opening is not the same in both directions, or not linear in the command",
-        (*read.remarks, *(() if is_clear else (one_way,))),
+        (*read.remarks, *(() if is_clear else (one_way,)), *(() if sweep.is_two_way else (no_play,))),
     )
 
 
