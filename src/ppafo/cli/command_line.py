@@ -84,7 +84,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class CommandGroup:
     """Commands that share their first word, as ``sets audit`` and ``sets show`` do."""
 
     summary: str
@@ -103,7 +103,7 @@ _PARAMETER = re.compile(r"(\w+): (.*)")
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class OptionType:
     """Option type: how an annotation turns the text of a parameter into its value."""
 
     word: Word
@@ -130,7 +130,7 @@ def _help_by_parameter(verb: Verb, names: Sequence[str]) -> dict[str, str]:
     return found
 
 
-def reading_of(annotation: Any) -> Reading:
+def reading_of(annotation: Any) -> OptionType:
     """Return how the text of a parameter with an annotation is read."""
     word, is_repeated = None, False
     while True:
@@ -144,14 +144,14 @@ def reading_of(annotation: Any) -> Reading:
         elif isinstance(origin, type) and issubclass(origin, Iterable):
             is_repeated, annotation = True, inner[0]
         elif origin is typing.Literal:
-            return Reading(word or Word("|".join(inner)), choices=inner)
+            return OptionType(word or Word("|".join(inner)), choices=inner)
         else:
             is_flag = annotation is bool
             word = word or _PLAIN.get(annotation, Word("TEXT"))
-            return Reading(word, is_flag, is_repeated or word.is_repeated)
+            return OptionType(word, is_flag, is_repeated or word.is_repeated)
 
 
-def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, Reading]]:
+def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, OptionType]]:
     """Return each parameter that words of the line fill, with how its text is read."""
     for name, parameter in annotated_parameters(verb).items():
         if name not in (PROGRESS, PLUGINS):
@@ -170,7 +170,7 @@ def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return reader
 
 
-def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
+def option_of(parameter: inspect.Parameter, reading: OptionType) -> str:
     """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
         return reading.word.option
@@ -211,7 +211,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
 def _add_parameter(
     parser: argparse.ArgumentParser,
     parameter: inspect.Parameter,
-    reading: Reading,
+    reading: OptionType,
     help_text: str,
     may_be_missing: bool,
     is_listing: bool,

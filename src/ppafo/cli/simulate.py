@@ -90,7 +90,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
 def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str]) -> "Finding[None]":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
     from ppafo.report.display_units import metric_text, metric_words
-    from ppafo.report.finding import Finding, Part, columns_of
+    from ppafo.report.finding import Finding, Section, columns_of
     from ppafo.report.live_parts import live_part
 
     scenario, status = result.scenario, result.status
@@ -107,11 +107,11 @@ def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tu
         title=scenario.name,
         said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         parts=(
-            Part(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *follows)),
-            Part("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
-            Part("Over time", name=FIGURE, caption=caption, draw=result.plot),
-            Part() if check is None else Part("What can be repeated", code=repr(check)),
-            Part(remarks=tuned),
+            Section(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *follows)),
+            Section("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
+            Section("Over time", name=FIGURE, caption=caption, draw=result.plot),
+            Section() if check is None else Section("What can be repeated", code=repr(check)),
+            Section(remarks=tuned),
         ),
         found=None,
         live=lambda: live_part([scenario]),

@@ -13,7 +13,7 @@ from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_progr
 from ppafo.engine.program import FaultPhases, LegPhases, Program
 from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
-from ppafo.engine.scheme.motion import Pace
+from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
 from ppafo.model.columns import larger, truncated
 from ppafo.model.effects.kind import Moment
@@ -224,7 +224,7 @@ def _states_of(run: Run) -> dict[str, Any]:
     program = run.program
     return {
         "result": AT_REST,
-        "pace": Pace(run.step),
+        "pace": StepControl(run.step),
         "state": run.initial,
         "masses": gas_at_start(run),
         "valve_state": program.valve.initial(),

@@ -22,7 +22,7 @@ _NEUTRAL = 90.0
 """Angle of a neutral ankle [deg]."""
 
 
-class Moment(NamedTuple):
+class EpisodeFrame(NamedTuple):
     """Frame of a picture: time [s], angle of the vane [rad], and error in the unit of the task."""
 
     time: float
@@ -30,7 +30,7 @@ class Moment(NamedTuple):
     error: float
 
 
-def picture(moments: Sequence[Moment], unit: str, period: float) -> NDArray[np.uint8]:
+def picture(moments: Sequence[EpisodeFrame], unit: str, period: float) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of the moments of an episode, in order; at least one.
 
     ``unit`` is the unit of their errors, "rad" or "N m"; ``period`` [s] is the shortest span of time that is shown.

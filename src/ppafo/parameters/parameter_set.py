@@ -23,7 +23,7 @@ from ppafo.parameters.graph import (
     follows,
     gauge_link,
 )
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units import base_value, format_quantity, to_si
 from ppafo.units.shown import pressure_units
 
@@ -119,7 +119,7 @@ class ParameterSet:
     texts: Mapping[str, TextEntry]
     flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
-    joint: Joint = ANKLE
+    joint: JointNames = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:

@@ -53,7 +53,7 @@ def axis_unit(quantity: str, given: str = "") -> str:
 def display_value(value: float, quantity: str, atmosphere: float | None = None, unit: str = "") -> float:
     """Return a value in SI in the unit in which it is shown.
 
-    Gauge counts from ``atmosphere`` [Pa absolute], that of the device in force unless given (``units/shown.py``).
+    Gauge counts from ``atmosphere`` [Pa absolute], of the device in force unless given (``units/shown.py``).
 
     What is zero within the accuracy of a run is 0. ``unit`` is the one in which it was given, where that is known.
     """

@@ -24,7 +24,7 @@ from ppafo.units.shown import quantity_of_unit
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class ConfidenceInterval:
     """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
 
     value: float
@@ -100,12 +100,12 @@ class Kind:
         """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
         return without_exponent(display_difference(value, self.quantity, self.given), form)
 
-    def interval(self, interval: Interval, form: str = "") -> str:
+    def interval(self, interval: ConfidenceInterval, form: str = "") -> str:
         """Return an estimate and the ends of its interval as text without unit."""
         value, low, high = (self.number(each, form) for each in (interval.value, interval.low, interval.high))
         return f"{value} [{low}, {high}]"
 
-    def change_interval(self, interval: Interval, form: str = "") -> str:
+    def change_interval(self, interval: ConfidenceInterval, form: str = "") -> str:
         """Return a difference and the ends of its interval as text without unit."""
         ends = (interval.value, interval.low, interval.high)
         value, low, high = (self.change_number(each, form or self.form) for each in ends)

@@ -331,7 +331,7 @@ OF_A_VANE = Declared(
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class DocumentReader:
     """A document with what messages call it; ``overridden`` are the paths that an override has set."""
 
     file: str

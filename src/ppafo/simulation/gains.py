@@ -7,7 +7,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.model.ports import load_torque
-from ppafo.parameters.graph import Term
+from ppafo.parameters.graph import LinkFunction
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
@@ -86,7 +86,7 @@ def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]
     return law_settings(law, scenario.controlled)
 
 
-def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, Term]:
+def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, LinkFunction]:
     """Return what the gains of a law follow on the device of a scenario, by name."""
     return loop_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
 

@@ -49,7 +49,7 @@ from ppafo.simulation.declaration import (
     THERMAL_GAS,
     WALL_AREA,
     Declared,
-    Reading,
+    DocumentReader,
     changes_reach,
     controlled_in,
     controller_settings,
@@ -61,7 +61,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
-from ppafo.simulation.motion_kind import MOTIONS, Clock
+from ppafo.simulation.motion_kind import MOTIONS, RunTimes
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, is_of_device
@@ -122,7 +122,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     ScenarioError or ParameterError for the first value that cannot be used.
     """
     document = changed.document
-    reading = Reading(request.file, document, changed.paths)
+    reading = DocumentReader(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     # Refusals are in the units of the set.
@@ -130,7 +130,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         clock = read_clock(reading)
         section = MOTIONS[kind_at(document, "motion")].section
         assert section is not None, "walks are built from another layout"
-        before = Reading(request.file, request.content)
+        before = DocumentReader(request.file, request.content)
         run = RunSettings(
             clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
         )
@@ -184,7 +184,7 @@ def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str,
     return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
 
 
-def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
+def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then the caller's."""
     section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
@@ -226,7 +226,7 @@ def set_name(name: str, folder: Path) -> str:
     return str(folder / name) if is_path and name not in list_sets() else name
 
 
-def read_device(reading: Reading, hardware: Hardware) -> Device:
+def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
     """Return the device of a parameter set with its overrides; ParameterError for what is missing or contradicts."""
     try:
         return build_device(hardware.parameter_set, hardware.valve, hardware.links)
@@ -234,12 +234,12 @@ def read_device(reading: Reading, hardware: Hardware) -> Device:
         raise _of_device(reading, error) from error
 
 
-def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
+def _of_device(reading: DocumentReader, error: ParameterError) -> ParameterError:
     """Return the error with the scenario it happened in, on one line whatever the names are."""
     return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
-def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
+def _initial(reading: DocumentReader, supply: Supply) -> tuple[Initial, Graph]:
     """Return the pressures [Pa absolute] of the chambers at the start, and which pressures of the supply they follow.
 
     Each is a number or a word; a word follows its pressure, a number in gauge the atmosphere.
@@ -265,7 +265,7 @@ def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
 
 
 def _control(
-    reading: Reading,
+    reading: DocumentReader,
     device: Device,
     period: float,
     sensors: Sensors,
@@ -294,7 +294,7 @@ def _control(
     return Control(kind, {path.partition(".")[2]: number for path, number in followed.items()}, period), links
 
 
-def _controlled(reading: Reading) -> str:
+def _controlled(reading: DocumentReader) -> str:
     """Return what the reference is of; ScenarioError where the controller cannot follow it."""
     controlled, kind = controlled_in(reading.document), kind_at(reading.document, "controller")
     law = CONTROLLERS[kind]
@@ -310,7 +310,7 @@ def _controlled(reading: Reading) -> str:
     )
 
 
-def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
+def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
     """Return what the controller follows, and which levels of it follow the atmosphere [Pa absolute].
 
     ScenarioError where the controller needs a reference and none is given.
@@ -332,13 +332,13 @@ def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[Pr
     return choice, {path: follow for path, follow in links.items() if follow}
 
 
-def _purpose(reading: Reading, overrides: Iterable[Override]) -> str:
+def _purpose(reading: DocumentReader, overrides: Iterable[Override]) -> str:
     """Return why a file asks for a reference beyond reach; "" where an override makes it another reference or reach."""
     purpose = "" if changes_reach(override.typed for override in overrides) else value_at(reading.document, PURPOSE)
     return str(purpose or "")
 
 
-def _sensors(reading: Reading, clock: Clock) -> Sensors:
+def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:
     values: dict[str, Any] = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
@@ -349,7 +349,7 @@ def _sensors(reading: Reading, clock: Clock) -> Sensors:
 
 
 def read_assumptions(
-    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[Override]
+    before: DocumentReader, reading: DocumentReader, hardware: Hardware, overrides: Iterable[Override]
 ) -> tuple[Assumption, ...]:
     """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
 
@@ -372,7 +372,7 @@ def read_assumptions(
     return tuple(assumptions)
 
 
-def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
+def _value(reading: DocumentReader, hardware: Hardware, path: str) -> str | None:
     """Return the value at a path as written in the file or, where it has none, the default; None without either."""
     written = value_at(reading.document, path)
     if written is not None and path in OF_A_VANE.paths(reading.document):
@@ -392,7 +392,7 @@ def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
     return None if quantity is None or quantity.default is None else written_text(quantity.default, quantity.unit)
 
 
-def read_gas_model(reading: Reading) -> GasModel | None:
+def read_gas_model(reading: DocumentReader) -> GasModel | None:
     """Return how the gas takes up heat in SI, None where it keeps its temperature."""
     if kind_at(reading.document, "gas_model") != THERMAL:
         return None
@@ -404,7 +404,7 @@ def read_gas_model(reading: Reading) -> GasModel | None:
     return model
 
 
-def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
+def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | None:
     """Return the lines of a file in SI, None where it has no such section: then supply pressures are constant.
 
     ScenarioError where dorsiflexion is set to more than the line has that feeds its regulator.
@@ -425,7 +425,7 @@ def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
     return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})
 
 
-def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:
+def assumed_lines(reading: DocumentReader) -> tuple[Assumption, ...]:
     """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
     if value_at(reading.document, SUPPLY_LINE) is None:
         return ()
@@ -556,7 +556,7 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
-        raise Reading(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
+        raise DocumentReader(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
     return layout.build(request, changed)
 
 

@@ -12,7 +12,7 @@ from ppafo.model.columns import at, over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, Controlled, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
-from ppafo.simulation.declaration import Reading, kind_at, profile_settings
+from ppafo.simulation.declaration import DocumentReader, kind_at, profile_settings
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
 from ppafo.units.shown import in_units, shown_text
 
@@ -43,7 +43,7 @@ def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
     return lowest, highest
 
 
-def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
+def read_profile(reading: DocumentReader, section: str, prescribed: Quantity) -> ProfileChoice:
     """Return a function of time with all its settings in SI."""
     kind = kind_at(reading.document, section)
     return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))

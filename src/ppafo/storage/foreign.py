@@ -24,7 +24,7 @@ from ppafo.storage.column_map import (
     in_map,
     shown_names,
 )
-from ppafo.storage.comma_separated import Column, check_clock, in_si
+from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si
 from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes
 from ppafo.storage.frames import remedy_for
@@ -250,7 +250,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
     if mapped.constant is not None:
         with refused_as(DataError, f"channels.{name}.constant = {mapped.constant!r}", UnitError):
             value, unit = split_number(mapped.constant)
-            column = Column(name, _flow_unit(name, unit, mapped, surroundings.gas) or PLAIN_NUMBER)
+            column = HeaderColumn(name, _flow_unit(name, unit, mapped, surroundings.gas) or PLAIN_NUMBER)
             values = in_si(column, np.full(table.size, value), surroundings.atmosphere)
             return Channel(values, column.si_unit, mapped.between, column.unit)
     numbers = table.numbers.get(name, np.empty(0))
@@ -262,7 +262,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
         values, unit = values * multiple, f"{unit} {unit_of_multiple}".removeprefix(f"{PLAIN_NUMBER} ").strip()
         key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
-        column = Column(name, _flow_unit(name, unit, mapped, surroundings.gas))
+        column = HeaderColumn(name, _flow_unit(name, unit, mapped, surroundings.gas))
         return Channel(in_si(column, values, surroundings.atmosphere), column.si_unit, mapped.between, column.unit)
 
 
@@ -270,7 +270,7 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel, with reference condition and gas where it is a volume flow for a mass flow."""
     from ppafo.units import is_volume_flow, with_condition
 
-    is_flow = Column(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
+    is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
             raise UnitError("at and gas belong to a volume flow, such as 'L/min', in the place of a mass flow")

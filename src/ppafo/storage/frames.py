@@ -14,7 +14,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, one_line, refused_as
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, recording_kind
-from ppafo.storage.comma_separated import Column, check_clock, in_si, parse_header
+from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si, parse_header
 
 PANDAS_READERS = {
     ".xlsx": "read_excel({path!r})",
@@ -152,7 +152,7 @@ def _numbers(name: str, values: Any) -> Any:
 def _recording(
     cells: Sequence[str], values: Sequence[Any], label: str, kind: RecordingKind, atmosphere: float
 ) -> Recording:
-    columns: list[Column] = parse_header(list(cells))
+    columns: list[HeaderColumn] = parse_header(list(cells))
     if not len(values[0]):
         raise DataError("has a header but no samples")
     series = []

@@ -16,7 +16,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
-from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
+from ppafo.studies.study import Configuration, Drawn, SamplingPlan, Study, with_followers
 from ppafo.units import parse_quantity
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
@@ -53,7 +53,7 @@ class Uncertainty:
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
         """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
-        sample = Sample("random", first + count, seed)
+        sample = SamplingPlan("random", first + count, seed)
         return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
 
     def replicated_columns(self, first: int, count: int, seed: int) -> Columns:
@@ -69,7 +69,7 @@ class Uncertainty:
             own = numbers % REPLICATES == replicate
             if own.any():
                 start, length = int(numbers[own][0]) // REPLICATES, int(np.count_nonzero(own))
-                sample = Sample("sobol", start + length, replicate_seed(seed, replicate))
+                sample = SamplingPlan("sobol", start + length, replicate_seed(seed, replicate))
                 uniform[own] = uniform_numbers(sample, len(self.drawn), start, length)
         return self.columns(uniform)
 
@@ -242,7 +242,7 @@ def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class MetricLimit:
     """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``, and its text."""
 
     metric: str

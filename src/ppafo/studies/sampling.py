@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
-from ppafo.studies.study import Drawn, Sample
+from ppafo.studies.study import Drawn, SamplingPlan
 
 Words = NDArray[np.uint64]
 Factor = tuple[tuple[float, ...], ...]
@@ -38,7 +38,7 @@ MAXIMUM_SOBOL_DIMENSIONS = 21201
 """Dimensions for which SciPy has direction numbers (Joe and Kuo, 2008)."""
 
 
-def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
+def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:
     """Return numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
     if sample.method == "sobol":
         return _sobol(sample, dimensions, first, count)
@@ -66,7 +66,7 @@ _MAXIMUM_ENGINES = 64
 """Engines that are remembered; the one that was made first goes first."""
 
 
-def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
+def _sobol(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:
     """Return scrambled Sobol numbers, moved by half of their last bit so that none is 0."""
     from scipy.stats import qmc
 

@@ -56,7 +56,7 @@ _BYTES_OF_FILE = 12_000
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class ChunkTask:
     """Work for a process beside the number of a chunk: study, address of the folder, threads, plug-in modules."""
 
     study: Study
@@ -75,14 +75,14 @@ class Finished:
 
 
 @dataclass(frozen=True, slots=True)
-class Store:
+class StudyStore:
     """The results of a study at a place, written chunk by chunk."""
 
     study: Study
     place: Place
 
     @classmethod
-    def claim(cls, study: Study, location: Place, agreed: bool, threads: int | None) -> "Store":
+    def claim(cls, study: Study, location: Place, agreed: bool, threads: int | None) -> "StudyStore":
         """Give a place to a study, or refuse it: of another study, of an earlier version, without room."""
         names = location.names()
         if MANIFEST in names:
@@ -174,7 +174,7 @@ def check_types(table: "pa.Table", name: str) -> None:
             raise DataError(f"{name}: column '{one_line(field.name)}' is of type {kind}")
 
 
-def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
+def compute_chunk(task: ChunkTask, number: int) -> tuple[Finished, bytes]:
     """Return the file of a chunk, computed here and not yet written: a row for every run, in SI units, nan for none."""
     study, part = task.study, chunk(task.study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
@@ -259,10 +259,10 @@ def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dic
     return columns
 
 
-def work_on_chunk(task: Task, number: int) -> Finished:
+def work_on_chunk(task: ChunkTask, number: int) -> Finished:
     """Compute and write a chunk: what a worker of a cluster does."""
     take_plugins(task.plugins)
-    return Store(task.study, place_at(task.address)).write(*compute_chunk(task, number))
+    return StudyStore(task.study, place_at(task.address)).write(*compute_chunk(task, number))
 
 
 def trace_column(channel: str) -> str:

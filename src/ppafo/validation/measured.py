@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredRecording:
     """A recording with the name and the checksum of its file, and what is to be said of it."""
 
     file: str
@@ -72,7 +72,7 @@ def read_measured(
     device: Device,
     columns: ColumnMap | None = None,
     map_name: str = "",
-) -> Measured:
+) -> MeasuredRecording:
     """Return a recording, or the one of a file or result folder; DataError where it cannot be compared with a model.
 
     A file with columns of its own is read through a column map, which messages call ``map_name``.
@@ -96,7 +96,7 @@ def read_measured(
 
 
 @in_units(lambda _recording, device, *_: device.shown)
-def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> Measured:
+def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> MeasuredRecording:
     """Return a recording as evidence with its remarks, or refuse it in one line that begins with ``file``."""
     count = len(recording)
     if count < MINIMUM_SAMPLES:
@@ -112,7 +112,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     if wide.size:
         noun, first = "gap" if wide.size == 1 else "gaps", float(recording.time[wide[0]])
         remarks += (f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were kept across",)
-    return Measured(file, sha256, recording, remarks)
+    return MeasuredRecording(file, sha256, recording, remarks)
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:

@@ -20,10 +20,10 @@ from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXT
 from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
-from ppafo.simulation.recorded.rest import Start
+from ppafo.simulation.recorded.rest import ReplayStart
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
 from ppafo.validation.compared import ANGLE
-from ppafo.validation.measured import Measured
+from ppafo.validation.measured import MeasuredRecording
 
 Motion = Literal["free", "measured", "locked", "leg"]
 """Motion of the vane in a replay: free by the model, as recorded, locked, or with a foot."""
@@ -53,9 +53,9 @@ class Replay:
     The motion ``leg`` is that with ``leg``, or on the fixture of figure 7.
     """
 
-    measured: Measured
+    measured: MeasuredRecording
     device: Device
-    start: Start
+    start: ReplayStart
     motion: Motion
     extra: float
     leg: Leg | None = None
@@ -146,7 +146,7 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
     return Replayed(_recording(request.measured, run, rows, record), run.step, followed)
 
 
-def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
+def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
     """Return the channels that a replay follows; the torque on a prescribed vane is what moves it, not an input."""
     followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
     followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
@@ -191,7 +191,7 @@ def _plan(request: Replay) -> Run:
     return with_prescribed_angle(run, request.start.angle) if request.motion == "measured" else run
 
 
-def _recording(measured: Measured, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
+def _recording(measured: MeasuredRecording, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
     """Return a record of states as channels, on the clock of the recording that was replayed."""
     angle = record[:, rows["state.angle"]]
     mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]

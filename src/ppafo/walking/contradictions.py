@@ -16,7 +16,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings, venting_valve
-from ppafo.simulation.declaration import Reading, value_at
+from ppafo.simulation.declaration import DocumentReader, value_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 from ppafo.walking.declaration import OF_A_WALK
@@ -84,7 +84,7 @@ class Contradiction(NamedTuple):
         return f"{self.path}: {self.reason(run)}"
 
 
-def check_walk(scenario: Scenario, reading: Reading) -> None:
+def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
     """Raise ScenarioError with the first contradiction; ``reading`` says how a value was given."""
     for path, is_bad, reason in _contradictions(scenario):
         if is_bad:

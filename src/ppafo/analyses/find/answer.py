@@ -5,17 +5,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.analyses.find.solve import Outcome
+from ppafo.analyses.find.solve import FindResult
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.report.display_units import metric_words
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREEN, GREY, VERMILION
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class FindSample:
     """A value [SI] that was tried, the metric there [SI], nan where the run failed, and by what it was judged [SI].
 
     ``judged`` is the metric, where the loop oscillates on the hold the larger one of it and of the RMS error there, and
@@ -55,10 +55,10 @@ class Threshold:
     runs: int
     failed: int
     unsettled: int
-    tried: list[Tried]
+    tried: list[FindSample]
 
 
-def finding_of(outcome: Outcome) -> Finding[Threshold]:
+def finding_of(outcome: FindResult) -> Finding[Threshold]:
     """Return the search in words, a table of where the condition is met, and the metric over the value."""
     wanted = "highest" if outcome.highest else "lowest"
     kind = _varied(outcome)
@@ -72,8 +72,8 @@ def finding_of(outcome: Outcome) -> Finding[Threshold]:
         title=f"The {wanted} {outcome.path.path} such that {outcome.condition.text}",
         said=(_verdict(outcome), *remarks),
         parts=(
-            Part("Met in the range that was tried", columns),
-            Part(
+            Section("Met in the range that was tried", columns),
+            Section(
                 "Metric over the value",
                 panels=(_panel(outcome),),
                 name="find",
@@ -98,29 +98,29 @@ def finding_of(outcome: Outcome) -> Finding[Threshold]:
             runs=outcome.runs,
             failed=outcome.failed,
             unsettled=outcome.unsettled,
-            tried=list(map(Tried, *(row.tolist() for row in rows))),
+            tried=list(map(FindSample, *(row.tolist() for row in rows))),
         ),
         passed=outcome.value is not None,
     )
 
 
-def _varied(outcome: Outcome) -> Kind:
+def _varied(outcome: FindResult) -> Kind:
     """Return what is varied, in the unit of the range that was given."""
     return of_path(outcome.path.path, outcome.path.quantity.unit, given=outcome.path.given)
 
 
-def _range(outcome: Outcome) -> str:
+def _range(outcome: FindResult) -> str:
     kind = _varied(outcome)
     return f"{kind.text(outcome.values[0])} to {kind.text(outcome.values[-1])}"
 
 
-def _metric_at_value(outcome: Outcome) -> float | None:
+def _metric_at_value(outcome: FindResult) -> float | None:
     if outcome.value is None:
         return None
     return float(outcome.metrics[np.searchsorted(outcome.values, outcome.value)])
 
 
-def _verdict(outcome: Outcome) -> str:
+def _verdict(outcome: FindResult) -> str:
     """Return the value, or where none meets the condition the one that comes nearest."""
     path, condition = outcome.path.path, outcome.condition
     kind, of_condition = _varied(outcome), of_metric(condition.metric)
@@ -142,12 +142,12 @@ def _verdict(outcome: Outcome) -> str:
     return f"{lead}: {there} (bracketed to {kind.change(abs(outcome.value - outcome.beyond), '.1g')})"
 
 
-def _not_followed(outcome: Outcome) -> int:
+def _not_followed(outcome: FindResult) -> int:
     """Number of values at which the condition is met, but the reference is not followed."""
     return int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.judged)))
 
 
-def _remarks(outcome: Outcome) -> Iterator[str]:
+def _remarks(outcome: FindResult) -> Iterator[str]:
     """Yield what else is to be known: runs, other stretches, noise, oscillation and failures."""
     condition, is_met = outcome.condition, outcome.is_met
     evenly, closer = np.count_nonzero(outcome.is_of_grid), np.count_nonzero(~outcome.is_of_grid)
@@ -193,7 +193,7 @@ def _remarks(outcome: Outcome) -> Iterator[str]:
         )
 
 
-def _larger(outcome: Outcome) -> list[Mark]:
+def _larger(outcome: FindResult) -> list[Mark]:
     """Return the RMS error on the hold where that is larger, and what the condition is asked of."""
     larger = np.where(outcome.judged > outcome.metrics, outcome.judged, np.nan)
     if not np.isfinite(larger).any():
@@ -205,7 +205,7 @@ def _larger(outcome: Outcome) -> list[Mark]:
     ]
 
 
-def _panel(outcome: Outcome) -> Panel:
+def _panel(outcome: FindResult) -> Panel:
     """Return the metric over the value, with the limit, where it is met, and the value that was found."""
     values, metrics, is_of_grid = outcome.values, outcome.metrics, outcome.is_of_grid
     kind = _varied(outcome)

@@ -12,7 +12,7 @@ from ppafo.progress import Report
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
+from ppafo.studies.draws import MetricLimit, atmosphere_of, check_metrics, level_of, seeds_of_noise
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import Runs, Tally, follows, oscillating, settled, with_companions
@@ -34,10 +34,10 @@ _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
-class Search:
+class FindProgress:
     """Values tried so far; of each the metric, its judged value, and its standard deviation over the noise."""
 
-    def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
+    def __init__(self, base: Scenario, path: str, condition: MetricLimit, runs: Runs, seeds: Floats) -> None:
         self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
@@ -114,7 +114,7 @@ def range_of(text: str, base: Scenario) -> SearchedRange:
     return SearchedRange(path, low, high)
 
 
-def condition_of(text: str, base: Scenario, path: str) -> Limit:
+def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
     """Return the condition of a text ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; StudyError for any other text.
 
     The ambient pressure behind a gauge pressure is the scenario's, unless ``path``, which varies, is that pressure.
@@ -128,11 +128,11 @@ def condition_of(text: str, base: Scenario, path: str) -> Limit:
     metric, sign, limit = parts.groups()
     check_metrics([metric], base)
     level = level_of(limit, metric, quoted, atmosphere_of(base, [path]))
-    return Limit(metric, level, sign == "<=", f"{metric} {sign} {limit}")
+    return MetricLimit(metric, level, sign == "<=", f"{metric} {sign} {limit}")
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class FindResult:
     """A finished search; numbers in SI.
 
     ``values`` (values,) ascend, ``metrics`` are the metric at each, nan where the run failed, and ``spread`` its
@@ -145,7 +145,7 @@ class Outcome:
 
     scenario: str
     path: VariedPath
-    condition: Limit
+    condition: MetricLimit
     highest: bool
     values: Floats
     metrics: Floats
@@ -185,7 +185,7 @@ def outermost(
     grid: int,
     threads: int | None = None,
     progress: Report | None = None,
-) -> Outcome:
+) -> FindResult:
     """Return the search for the outermost value; StudyError for bad input, and where no run has the metric.
 
     ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; ``grid`` values
@@ -199,7 +199,7 @@ def outermost(
     seeds = seeds_of_noise([base], [searched.path.path], 0, _STREAMS, _SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
-    search = Search(base, searched.path.path, condition, runs, seeds)
+    search = FindProgress(base, searched.path.path, condition, runs, seeds)
     search.run(np.linspace(searched.low, searched.high, grid))
     _check_has_metric(search, base, searched)
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
@@ -209,7 +209,7 @@ def outermost(
         search.run(np.linspace(value, beyond, _PARTS + 1)[1:-1])
         value, beyond = search.ends(highest)
     order = np.argsort(search.values)
-    return Outcome(
+    return FindResult(
         scenario=base.name,
         path=searched.path,
         condition=condition,
@@ -232,7 +232,7 @@ def outermost(
     )
 
 
-def _check_has_metric(search: Search, base: Scenario, searched: SearchedRange) -> None:
+def _check_has_metric(search: FindProgress, base: Scenario, searched: SearchedRange) -> None:
     """Refuse a search in which no run has the metric of the condition."""
     if np.isfinite(search.judged).any():
         return

@@ -11,15 +11,14 @@ from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import (
     PROCEDURES,
     ProblemFile,
+    ProcedureContext,
     ProcedureProblem,
-    Setting,
     run_procedure,
     window_of,
 )
-from ppafo.identification.source import Source, Use, double_use, source_of
+from ppafo.identification.source import RecordingSource, Use, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
-from ppafo.identification.trajectory.section import Setting as FitSetting
-from ppafo.identification.trajectory.section import solve_section
+from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -45,14 +44,16 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         tolerances = tolerances_of(problem.bench, file)
         current, results = before, list[BenchResult]()
         for task in tasks:
-            result = run_procedure(task.sources, task.procedure, Setting(current, valve, task.place, tolerances))
+            result = run_procedure(
+                task.sources, task.procedure, ProcedureContext(current, valve, task.place, tolerances)
+            )
             results.append(result)
             # The next procedure leans on what this one found; the new set is made of the old one at the end.
             current = with_estimates(current, result.estimates).parameter_set
         estimates = [estimate for result in results for estimate in result.estimates]
         fitted = None
         if problem.trajectory is not None:
-            setting = FitSetting(
+            setting = SectionContext(
                 read=lambda experiment: given.source(experiment.recording, experiment.columns, current),
                 folder=folder,
                 file=f"{file}: trajectory",
@@ -78,7 +79,7 @@ class _Given:
     folder: Path
     file: str
 
-    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> Source:
+    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> RecordingSource:
         """Return the only recording in a file; IdentificationError where a map takes several trials of it."""
         found = self.sources(name, columns, parameter_set)
         if len(found) > 1:
@@ -87,7 +88,7 @@ class _Given:
             )
         return found[0]
 
-    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[Source, ...]:
+    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[RecordingSource, ...]:
         """Return the recordings in a file that the problem names, read through one of its column maps if it says one.
 
         The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
@@ -110,7 +111,7 @@ class _Task:
     """A procedure with its recordings, and what messages call it."""
 
     procedure: ProcedureProblem
-    sources: tuple[Source, ...]
+    sources: tuple[RecordingSource, ...]
     place: str
 
 
@@ -147,7 +148,7 @@ def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -
         of_kind: list[Use] = []
         for task in tasks:
             if task.procedure.kind == kind:
-                first, last = window_of(task.procedure, Setting(before, valve, task.place))
+                first, last = window_of(task.procedure, ProcedureContext(before, valve, task.place))
                 of_kind += [
                     Use(
                         by=f"recording {number} of procedure {kind}",

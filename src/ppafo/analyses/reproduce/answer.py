@@ -28,15 +28,15 @@ from ppafo.analyses.reproduce.claim import (
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH, InterpretationOfU
-from ppafo.analyses.reproduce.publication import ALL, SEED, Study
-from ppafo.analyses.reproduce.step_response import Levels, StepEvents
+from ppafo.analyses.reproduce.publication import ALL, SEED, PublicationClaims
+from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import Finding as AuditFinding
+from ppafo.parameters.audit import AuditFinding
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.display_units import metric_level
-from ppafo.report.finding import Cell, Finding, Part, columns_of
+from ppafo.report.finding import Cell, Finding, Section, columns_of
 from ppafo.report.live_parts import live_part
 from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 from ppafo.simulation.simulate import Result
@@ -91,7 +91,7 @@ class Reproduction:
 class Studies:
     """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
 
-    studies: tuple[Study, ...]
+    studies: tuple[PublicationClaims, ...]
     reproduction: Reproduction | None = None
 
     @property
@@ -291,7 +291,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
-    details = [] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
+    details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for study in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
         for claim in study.claims:
@@ -304,7 +304,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
             stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
         heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
         columns = columns_of(_DETAILS_HEAD, stated_claims)
-        details.append(Part(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
+        details.append(Section(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
     name = solved.studies[0].publication.name
     return Finding(
         name="claims",
@@ -312,12 +312,12 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
         title=f"{name}, run again" if reproduction is None else "Published studies, run again",
         said=(),
         parts=(
-            Part(
+            Section(
                 columns=columns_of(_STUDIES_HEAD, rows),
                 remarks=("", count_sentence(solved.verdicts)),
                 left=len(_STUDIES_HEAD),
             ),
-            Part("How to read it", said=(_RULE,), is_detail=True),
+            Section("How to read it", said=(_RULE,), is_detail=True),
             *details,
         ),
         found=solved,
@@ -367,13 +367,13 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         for claim in missed
         if claim.window is not None
     ]
-    claims = Part(
+    claims = Section(
         columns=columns_of(_HEAD, _paper_rows(reproduction)),
         remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
         left=len(_HEAD),
     )
     head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
-    of_u = [Part(columns=columns_of(head, _reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
+    of_u = [Section(columns=columns_of(head, _reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return Finding(
         name="claims",
@@ -394,10 +394,10 @@ def _page_bytes(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes
     return reproduction_page(reproduction, drawn).encode()
 
 
-def _figures(reproduction: Reproduction) -> list[Part]:
+def _figures(reproduction: Reproduction) -> list[Section]:
     """Return the figures of the page, each drawn where it is wanted."""
     supply = reproduction.step.scenario.device.supply
-    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, synthetic = None, None, reproduction.synthetic
@@ -417,4 +417,4 @@ def _figures(reproduction: Reproduction) -> list[Part]:
     }
     if not isinstance(synthetic, NoEvidence):
         drawn[IDENTIFICATION_FIGURE] = partial(figure_3, synthetic.torque, synthetic.decay)
-    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
+    return [Section(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]

@@ -12,7 +12,7 @@ from ppafo.analyses.sweep.results import SUMMARY, StudyResults, metric_kind
 from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError
-from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
+from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
@@ -29,13 +29,13 @@ def _fraction(text: str) -> str:
     return text
 
 
-class _Table(BaseModel):
+class _OpenTable(BaseModel):
     """A table of which more may be written than is read."""
 
     model_config = ConfigDict(strict=True)
 
 
-class _Described(_Table):
+class _Described(_OpenTable):
     """A metric over the runs of a configuration: ``count`` of them have it."""
 
     count: _Count
@@ -50,7 +50,7 @@ class _Described(_Table):
         return self
 
 
-class _Failure(_Table):
+class _Failure(_OpenTable):
     """A run without metrics, and why."""
 
     run: _Count
@@ -58,7 +58,7 @@ class _Failure(_Table):
     reason: str
 
 
-class _Summary(_Table):
+class _Summary(_OpenTable):
     """Guaranteed fields of a study summary."""
 
     completed: _Count
@@ -114,11 +114,11 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         parts=(
             figure_of(results, [described] if described else [], failures),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
-            Part("How to read it", said=[quantile], is_detail=True),
+            Section("How to read it", said=[quantile], is_detail=True),
             _varied(document["study"]),
-            Part(said=_sampling(document["study"]), is_detail=True),
+            Section(said=_sampling(document["study"]), is_detail=True),
             _assumed(document["scenarios"]),
-            Part("Files", facts(files), is_detail=True),
+            Section("Files", facts(files), is_detail=True),
         ),
         found=results,
         passed=summary["completed"] > 0,
@@ -145,13 +145,13 @@ def _useless_runs(results: StudyResults) -> list[str]:
     ]
 
 
-def _varied(study: Mapping[str, Any]) -> Part:
+def _varied(study: Mapping[str, Any]) -> Section:
     """Return a row for each number that a study varies: its path, how, and the keys of that."""
     rows = []
     for number in study.get("vary", ()):
         keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
         rows.append((number["path"], number["kind"], ", ".join(keys)))
-    return Part("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
+    return Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
 
 
 def _sampling(study: Mapping[str, Any]) -> list[str]:
@@ -167,13 +167,13 @@ def _sampling(study: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _assumed(scenarios: Mapping[str, Any]) -> Part:
+def _assumed(scenarios: Mapping[str, Any]) -> Section:
     """Return what the base scenarios assume, once where several assume the same."""
     names: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in scenarios.items():
         for number in scenario["assumptions"]:
             names.setdefault((number["path"], number["value"], number["note"]), []).append(name)
-    return Part(
+    return Section(
         "What the base scenarios assume" if names else "",
         columns_of(
             ("value", "", "why", "in"), [(*assumption, ", ".join(having)) for assumption, having in names.items()]
@@ -183,7 +183,7 @@ def _assumed(scenarios: Mapping[str, Any]) -> Part:
     )
 
 
-def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
+def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Section:
     """Return the table of the metrics of a configuration: how many runs have each, mean, deviation and quantiles."""
     described = [
         description for own in results.metrics.values() for description in own.values() if description["count"]
@@ -199,7 +199,7 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
             cells += [kind.number(description["mean"]), deviation, *map(kind.number, description["quantiles"].values())]
         rows.append([*cells, *[""] * (len(head) - len(cells))])
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
-    return Part(columns=columns_of(head, rows), said=[completed], left=2)
+    return Section(columns=columns_of(head, rows), said=[completed], left=2)
 
 
 def write_report(results: StudyResults) -> None:

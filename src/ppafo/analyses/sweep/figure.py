@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.analyses.sweep.results import StudyResults, metric_kind
-from ppafo.report.finding import Part
+from ppafo.report.finding import Section
 from ppafo.report.kind import TIME, Kind, of_channel, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -97,13 +97,13 @@ def _content_of(results: StudyResults) -> _Content:
     )
 
 
-def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:
+def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
     """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
     content = _content_of(results)
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not content.is_mapped and len(content.varied) > 1:
         title += f" over {len(content.varied)} values: {_listed(content.varied)}"
-    return Part(
+    return Section(
         said=said,
         remarks=remarks,
         panels=partial(_panels, results, content),

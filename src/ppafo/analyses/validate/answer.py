@@ -10,10 +10,10 @@ import numpy as np
 from ppafo.analyses.validate.result import Validation, kind_of_channel, verdict
 from ppafo.errors import count_of
 from ppafo.report.display_units import display_value
-from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
-from ppafo.report.residuals import Course, course_panels
+from ppafo.report.residuals import FittedCurve, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units.shown import in_units
@@ -58,7 +58,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
     time, scale = (Kind("Time", "ms"), MILLISECONDS) if is_short else (TIME, 1.0)
     shown, limit = COMPARED[name], channel.limit * channel.full_range
     is_first = channel is agreement.channels[0]
-    course = Course(
+    course = FittedCurve(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
         change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
@@ -103,9 +103,9 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
         said=said,
         parts=(
-            Part(said=[_method(validation)], is_detail=True),
+            Section(said=[_method(validation)], is_detail=True),
             *(_part(name, agreement) for name, agreement in pairs),
-            Part("Files" if hashes else "", facts(hashes), is_detail=True),
+            Section("Files" if hashes else "", facts(hashes), is_detail=True),
         ),
         found=validation,
         passed=validation.passes,
@@ -135,7 +135,7 @@ def recording_names(files: Sequence[str]) -> list[str]:
     ]
 
 
-def _part(name: str, agreement: RecordingAgreement) -> Part:
+def _part(name: str, agreement: RecordingAgreement) -> Section:
     """Section with the errors of one recording in a table, and its panels; ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
     late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
@@ -144,7 +144,7 @@ def _part(name: str, agreement: RecordingAgreement) -> Part:
         f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
     )
     across = panels_across(agreement)
-    return Part(
+    return Section(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
         [replayed],

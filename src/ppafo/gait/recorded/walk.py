@@ -407,7 +407,7 @@ _RIGHT_ANGLE = 0.5 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
+class Subject:
     """Body mass [kg], by which moments and forces are divided, and stature [m], which gives the length of the thigh."""
 
     body_mass: float
@@ -415,7 +415,7 @@ class Person:
 
 
 def walk_signals(
-    tables: Sequence[MotionTable], columns: GaitMap, person: Person, is_default: bool, wrong: list[PpafoError]
+    tables: Sequence[MotionTable], columns: GaitMap, person: Subject, is_default: bool, wrong: list[PpafoError]
 ) -> dict[str, Signal]:
     """Return the signals that a map finds in tables; all that is wrong with their columns is added to ``wrong``.
 

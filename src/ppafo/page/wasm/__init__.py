@@ -82,8 +82,8 @@ from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
 from ppafo.exports.c_library.files import (
     OUTPUTS,
+    ExportParameter,
     Library,
-    Setting,
     c_identifier,
     conditions_of,
     conditions_of_program,
@@ -182,7 +182,7 @@ def _kept(library: Library) -> dict[str, str]:
     return kept
 
 
-def _setting(setting: Setting, atmosphere: float) -> dict[str, Any]:
+def _setting(setting: ExportParameter, atmosphere: float) -> dict[str, Any]:
     quantity = setting.quantity
     group, _, name = setting.path.rpartition(".")
     return {
@@ -249,7 +249,9 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     return origins
 
 
-def _of_set(parameter_set: ParameterSet | None, device: Device, setting: Setting, *, follows: bool) -> dict[str, Any]:
+def _of_set(
+    parameter_set: ParameterSet | None, device: Device, setting: ExportParameter, *, follows: bool
+) -> dict[str, Any]:
     """Origin of a number of the device: the set's where it has this very value, the default's where it ``follows``."""
     if parameter_set is None:
         return _CHANGED

@@ -17,8 +17,8 @@ from ppafo.parameters.building import actuator_problem, beyond_pressures, consis
 from ppafo.parameters.declaration import limits_text
 from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.ensemble.columns import Columns
-from ppafo.simulation.motion_kind import Clock, MotionKind
+from ppafo.simulation.ensemble.columns import ScenarioColumns
+from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.numbers import declared_numbers, with_numbers
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
@@ -38,10 +38,10 @@ class Screen:
     Without a ``clock`` it is the scenario's.
     """
 
-    columns: Columns
+    columns: ScenarioColumns
     members: Members
     reasons: dict[int, str]
-    clock: Clock | None = None
+    clock: RunTimes | None = None
 
     @property
     def scenario(self) -> Scenario:
@@ -63,7 +63,7 @@ class Screen:
         if clock is not None:
             times = clock.duration, clock.step, clock.output_interval, clock.period
             kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
-            clock = Clock(*kept)
+            clock = RunTimes(*kept)
         values = {path: column[places] for path, column in self.columns.values.items()}
         return Screen(replace(self.columns, values=values), self.members[places], self.reasons, clock)
 
@@ -78,7 +78,7 @@ class Screen:
         self.members, self.columns, self.clock = left.members, left.columns, left.clock
 
 
-def screen_columns(columns: Columns) -> Screen:
+def screen_columns(columns: ScenarioColumns) -> Screen:
     """The runs whose values are in range and fit together."""
     screen = Screen(columns, np.arange(columns.runs), {})
     for path in columns.values:
@@ -100,7 +100,7 @@ def screen_columns(columns: Columns) -> Screen:
     return screen
 
 
-def _out_of_range(columns: Columns, path: str) -> Problem:
+def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
     values, quantity = columns.values[path], columns.declared[path]
     unit = quantity.unit
 
@@ -125,7 +125,7 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
-def plan_ensemble(columns: Columns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
+def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
     """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []

@@ -13,7 +13,7 @@ from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import LED_SHANK, WALK
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
 from ppafo.simulation.declaration import LOCKED_ANGLE
-from ppafo.simulation.motion_kind import Clock
+from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.profiles import Limits, limits_of, profile_bounds, profile_problem, stops_of
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
@@ -84,7 +84,7 @@ def _profile_beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, 
     return outside, lambda run: problems[run]
 
 
-def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
+def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
     """Return the clock with columns of times [s] by path, and what does not fit together.
 
     Times are read as those of a file are, once for each combination of them.
@@ -102,7 +102,7 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Proble
         else:
             table[number] = read.duration, read.step, read.output_interval, read.period
     refused = np.array([bool(reason) for reason in reasons])[places]
-    return Clock(*table[places].T.copy()), ((refused, lambda run: reasons[places[run]]),)
+    return RunTimes(*table[places].T.copy()), ((refused, lambda run: reasons[places[run]]),)
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

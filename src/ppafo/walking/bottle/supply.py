@@ -13,7 +13,7 @@ from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_d
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
-from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, value_at
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, DocumentReader, kind_at, value_at
 from ppafo.simulation.scenario import SupplyLine
 from ppafo.units import format_quantity, to_si
 from ppafo.units.shown import shown_text
@@ -117,7 +117,7 @@ class BottleSupply:
         }
 
 
-def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply | None:
+def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> BottleSupply | None:
     """Return the bottle of a walk file, None where it has none; ScenarioError or ParameterError for a mistake."""
     section = value_at(reading.document, BOTTLE)
     if section is None:
@@ -165,7 +165,7 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
     return supply
 
 
-def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
+def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
     """Return the numbers of the section; the bottle starts at the temperature of the room unless one is given."""
     room = replace(TEMPERATURE, default=bottle.room_temperature)
     items = (
@@ -187,7 +187,7 @@ def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> di
     return numbers
 
 
-def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
+def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> None:
     """Refuse what does not go with a bottle."""
     fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
     if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:

@@ -11,14 +11,23 @@ from numpy.typing import NDArray
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.report.display_units import axis_unit, display_value, display_values
-from ppafo.report.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
+from ppafo.report.style import (
+    BLACK,
+    CHAMBER_1,
+    CHAMBER_2,
+    GREY,
+    FigureMargins,
+    figure_of_panels,
+    house_style,
+    mark_kind,
+)
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, settled, times_of_phases
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,7 +50,7 @@ _SLOT = 0.62
 """Width of the ground under one frame [m]."""
 
 _PHASES_SIZE = (9.4, 6.0)
-_MARGINS = Margins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
+_MARGINS = FigureMargins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
 _HEIGHTS = (1.75, 0.7, 0.7, 0.7, 1.35)
 _PERCENT = 100.0 * PHASES
 _STRIP_FRAMES = 8
@@ -152,7 +161,7 @@ def drags(legs: Legs, index: int) -> bool:
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
 
 
-def frames_figure(comparison: Comparison) -> "Figure":
+def frames_figure(comparison: WalkComparison) -> "Figure":
     """Return ten instants of one stride, without the device above and with it below."""
     from matplotlib.figure import Figure
 
@@ -193,7 +202,7 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class StateBand:
     """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
 
     name: str
@@ -207,32 +216,34 @@ def _is(value: float) -> Callable[[Floats], NDArray[np.bool_]]:
 
 
 _FREE, _DORSI, _PLANTAR = "#e4e4e4", "#f0b48a", "#8fbfe0"
-_ROWS: Mapping[str, tuple[str, tuple[State, ...]]] = {
+_ROWS: Mapping[str, tuple[str, tuple[StateBand, ...]]] = {
     "Controller": (
         "controller_phase",
         (
-            State("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
-            State("4 free motion", "4 free", _FREE, _is(2.0)),
-            State("2 push-off", "2 push", _PLANTAR, _is(3.0)),
-            State("3 swing", "3 swing", _DORSI, _is(0.0)),
+            StateBand("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
+            StateBand("4 free motion", "4 free", _FREE, _is(2.0)),
+            StateBand("2 push-off", "2 push", _PLANTAR, _is(3.0)),
+            StateBand("3 swing", "3 swing", _DORSI, _is(0.0)),
         ),
     ),
     "Foot": (
         "contact",
         (
-            State("on the heel", "heel", "#cfe3c9", _is(1.0)),
-            State("flat", "flat", "#9fcf94", _is(2.0)),
-            State("on the toes", "toes", "#63ad59", _is(3.0)),
-            State("in the air", "air", "#f3f3f3", _is(0.0)),
+            StateBand("on the heel", "heel", "#cfe3c9", _is(1.0)),
+            StateBand("flat", "flat", "#9fcf94", _is(2.0)),
+            StateBand("on the toes", "toes", "#63ad59", _is(3.0)),
+            StateBand("in the air", "air", "#f3f3f3", _is(0.0)),
         ),
     ),
     "Valve": (
         "command",
         (
-            State("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
-            State("closed", "closed", "#ffffff", _is(0.0)),
-            State("plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)),
-            State("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
+            StateBand("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
+            StateBand("closed", "closed", "#ffffff", _is(0.0)),
+            StateBand(
+                "plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)
+            ),
+            StateBand("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
         ),
     ),
 }
@@ -258,7 +269,7 @@ def strip_figure(result: WalkResult) -> "Figure":
         return figure
 
 
-def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
+def _shares(result: WalkResult, channel: str, states: tuple[StateBand, ...]) -> Floats:
     """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
     chosen = settled(result.helped)
     if channel not in result.recording or not chosen.any():
@@ -269,7 +280,7 @@ def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floa
     return np.array([np.mean(state.holds(values), axis=0) for state in states])
 
 
-def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]) -> None:
+def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[StateBand, ...]) -> None:
     below = np.zeros(PHASES.size)
     for state, fraction in zip(states, fractions, strict=True):
         axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
@@ -350,7 +361,7 @@ class _Scene:
         return [self.ticks, *parts]
 
 
-def animation(comparison: Comparison) -> bytes:
+def animation(comparison: WalkComparison) -> bytes:
     """Return the GIF; two strides at half speed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
@@ -383,7 +394,7 @@ def animation(comparison: Comparison) -> bytes:
         return _gif(images, stride_time)
 
 
-def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
+def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_ANIMATION_SIZE, dpi=_RESOLUTION)

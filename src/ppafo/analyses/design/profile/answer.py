@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Margins:
+class SizingMargins:
     """Reserves of a sized valve to its limits, as fractions [-].
 
     ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
@@ -82,7 +82,7 @@ class SizedValve:
     gas_in_all: float
     bottle: Part | None
     mass: float | None
-    margins: Margins | None
+    margins: SizingMargins | None
     limit: Limit
     notes: Notes
     curve: tuple[Floats, Floats, Floats]
@@ -288,8 +288,8 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         said=(*([problem.description] if problem.description else []), _wanted(sizing)),
         parts=(
             *_tables(sizing),
-            finding.Part(remarks=_remarks(sizing)),
-            finding.Part(
+            finding.Section(remarks=_remarks(sizing)),
+            finding.Section(
                 "Error and gas over pressure",
                 panels=partial(pressure_panels, sizing),
                 name="profile",
@@ -298,7 +298,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(4.5, 3.3),
                 is_detail=True,
             ),
-            finding.Part(
+            finding.Section(
                 "The torque",
                 panels=partial(_torque_panels, sizing),
                 name="torque",
@@ -307,7 +307,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 is_detail=True,
             ),
             *parts_to_check(sizing.doubtful),
-            finding.Part("How to read it", said=(*_READING, *_method(problem)), is_detail=True),
+            finding.Section("How to read it", said=(*_READING, *_method(problem)), is_detail=True),
             part_titles([sized.valve for sized in sizing.valves]),
         ),
         found=sizing,
@@ -360,7 +360,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
     return [torque_panel(sizing)]
 
 
-def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
+def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
     """Return a row for each valve, and the margins and gains of those that work."""
     rows: list[tuple[Cell, ...]] = []
     margins: list[tuple[Cell, ...]] = []
@@ -387,8 +387,8 @@ def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
     chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
-        finding.Part("Valves", columns_of(_HEAD, rows), marked=chosen),
-        finding.Part("Margins" if margins else "", columns_of(head, margins), marked=marked),
+        finding.Section("Valves", columns_of(_HEAD, rows), marked=chosen),
+        finding.Section("SizingMargins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
 

@@ -4,7 +4,7 @@ Of a torque controller the lowest torque is requested that gives the one wanted;
 where the toes would not clear the ground.
 """
 
-from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
+from ppafo.analyses.design.wearer.wish import WALKS, WalkedDevice, Wish
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.model.catalog import VALVES
@@ -41,13 +41,13 @@ def of_wearer(wish: Wish) -> tuple[str, ...]:
     return f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={wish.height:.6g} m"
 
 
-def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
+def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[WalkedDevice]:
     """Return a few strides with a pair of parts that have the torque and the clearance, else those that come nearest.
 
     Nearest are the most torque, and the highest toes with enough of it: one or two, none where no walk has help.
     """
     common = _common_overrides(wish, valve, actuator)
-    strides: list[Tried] = []
+    strides: list[WalkedDevice] = []
     for request in _requests(wish, valve, actuator):
         for lift in _lifts(request, wish, valve, actuator):
             tried = _strides_of(valve, actuator, (*common, *_request_overrides(request, valve), *lift))
@@ -110,11 +110,11 @@ def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tupl
     return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
 
 
-def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
+def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> WalkedDevice | None:
     """Return a few strides with some overrides; None where they lack help, or the torque loop oscillates."""
     result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
     if not result.status.is_completed or not result.is_helped or not result.averages or result.tracking:
         return None
     flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
     torque = float(result.averages["torque"].mean.max())
-    return Tried(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)
+    return WalkedDevice(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)

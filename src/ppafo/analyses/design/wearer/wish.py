@@ -119,7 +119,7 @@ def shown_clearance(toes: float) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tried:
+class WalkedDevice:
     """Valve, actuator and overrides of a walk; peak torque of the mean stride [N m], mean flow of gas [kg/s].
 
     ``toes`` is the lowest height of the toes over the ground in mid-swing [m]; below 0 they would drag.
@@ -143,13 +143,13 @@ class Tried:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Device:
+class SizedDevice:
     """A device that was walked with on its bottle for the time that is wanted, how long it lasts, what it takes.
 
     ``bottle_name`` is what ``--bottle`` takes for the bottle.
     """
 
-    tried: Tried
+    tried: WalkedDevice
     bottle: Part
     bottle_name: str
     walked: WalkResult
@@ -181,7 +181,7 @@ class Offer:
     """A wish that can be met in place of another, with the parts that walked."""
 
     wish: Wish
-    tried: Tried
+    tried: WalkedDevice
     bottle: Part
 
     def text(self, asked: Wish) -> str:
@@ -206,8 +206,8 @@ class WearerSizing:
 
     wish: Wish
     healthy_toes: float
-    tried: tuple[Tried, ...]
-    device: Device | None
+    tried: tuple[WalkedDevice, ...]
+    device: SizedDevice | None
     instead: tuple[str, ...]
 
     @property

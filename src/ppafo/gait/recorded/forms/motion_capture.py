@@ -13,7 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import DataError, one_line
-from ppafo.gait.recorded.delimited import Block, Cells, Clock, PerFrame, PerRow, cells_of, lines_of, rows_of, table_of
+from ppafo.gait.recorded.delimited import (
+    Cells,
+    Clock,
+    NumberBlock,
+    PerFrame,
+    PerRow,
+    cells_of,
+    lines_of,
+    rows_of,
+    table_of,
+)
 from ppafo.gait.recorded.form import FileReader, GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, MotionTable
@@ -64,7 +74,7 @@ class _NexusBlock(NamedTuple):
     labels: list[str]
     axes: list[str]
     units: list[str]
-    rows: Block
+    rows: NumberBlock
 
 
 def _read_nexus(path: str | Path) -> MotionTable:
@@ -112,7 +122,7 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     units = [*cells_of(head[3], delimiter), *[""] * len(axes)][: len(axes)]
     rate = _rate_in(path, cells_of(head[0], delimiter)[0], start + 2)
     end = next((n for n in range(start + 5, len(lines)) if not lines[n].strip(",;\t ")), len(lines))
-    rows = Block(lines[:end], start + 5, delimiter)
+    rows = NumberBlock(lines[:end], start + 5, delimiter)
     return _NexusBlock(rate=rate, labels=labels, axes=axes, units=units, rows=rows)
 
 
@@ -168,7 +178,7 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     # Newer exports have a header line, and the number of the frame and the time before the markers.
     is_counted = cells_of(lines[first - 1], "\t")[:2] == ["Frame", "Time"]
     before = ["", "time"] if is_counted else []
-    block = Block(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
+    block = NumberBlock(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
     cells = Cells([*before, *names], [*["", "s"][: len(before)], *["mm"] * len(names)])
     if width < len(before) + len(names) - 2:
         raise DataError(f"{path}: line {first + 1} has {width} values for {len(labels)} markers")
@@ -204,7 +214,11 @@ def _read_motive(path: str | Path) -> MotionTable:
         names.append(f"{_bare(label)}.{axis.lower()}" if is_marker else "")
     names[1] = "time"
     return table_of(
-        path, Block(lines, at + 1, ","), Cells(names, ["", "s", *[unit] * (len(names) - 2)]), "time", noun="markers"
+        path,
+        NumberBlock(lines, at + 1, ","),
+        Cells(names, ["", "s", *[unit] * (len(names) - 2)]),
+        "time",
+        noun="markers",
     )
 
 
@@ -218,7 +232,7 @@ def _read_dflow(path: str | Path) -> MotionTable:
         names.append(f"{_bare(column[1])}.{column[3].lower()}" if column is not None and is_marker else cell)
         units.append(_DFLOW[column[2]] if column is not None else "")
     names = ["" if name == "FrameNumber" else name for name in names]
-    return table_of(path, Block(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
+    return table_of(path, NumberBlock(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
 
 
 def _form(name: str, summary: str, first: Sequence[str], read: FileReader) -> GaitForm:
