@@ -238,7 +238,7 @@ def _single(value: Any) -> Any:
 
     A time of NumPy would count as a whole number otherwise, and a masked value as the one that it hides.
     """
-    if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
+    if type(value) is float or getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
         return value
     is_hidden = bool(getattr(value, "mask", False))
     return None if is_hidden or getattr(value.dtype, "kind", "") in "mM" else value.item()

@@ -52,22 +52,17 @@ def update_reversals(state: Reversals, _course: Course, sample: Sample) -> Rever
 REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
 
 
-def reversals_of(command: Floats, task: Floats) -> int:
-    """Return how often a command [-] turns within a task; both (samples,)."""
+def command_reversals(recording: Recording) -> float:
+    """Reversals of the command in a recording."""
+    command = recording["command"]
+    task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
     ways = np.where((command > HALF_OPEN) & (command <= VENTS_ABOVE), 1, 0) - np.where(command < -HALF_OPEN, 1, 0)
     # What begins anew has a number of its own: reversals count between two ways of one number.
     begins = (np.diff(task, prepend=task[:1]) != 0.0) | (command > VENTS_ABOVE)
     number = np.cumsum(begins)
     open_at = np.flatnonzero(ways)
     turns = np.diff(ways[open_at]) != 0
-    return int(np.count_nonzero(turns & (np.diff(number[open_at]) == 0)))
-
-
-def command_reversals(recording: Recording) -> float:
-    """Reversals of the command in a recording."""
-    command = recording["command"]
-    task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
-    return float(reversals_of(command, task))
+    return float(np.count_nonzero(turns & (np.diff(number[open_at]) == 0)))
 
 
 class Peak(NamedTuple):

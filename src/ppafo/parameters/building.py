@@ -60,7 +60,11 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     name = chosen_valve(parameter_set, valve)
     links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_followers(parameter_set)
-    _check_complete(parameter_set, name)
+    missing = missing_values(parameter_set, name)
+    if missing:
+        completed = parameter_set.completed_by
+        remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
+        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     species = _species(parameter_set)
@@ -265,14 +269,6 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.
     missing = [path for path in needed if path not in (*parameter_set.numbers, SECOND_PRESSURE_PATH, DISPLACEMENT_PATH)]
     return missing + [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
-
-
-def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
-    missing = missing_values(parameter_set, valve)
-    if missing:
-        completed = parameter_set.completed_by
-        remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
-        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
 
 
 def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:

@@ -141,6 +141,11 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
         controlled = _controlled(reading)
         reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
         control, of_control = _control(reading, device, clock.period, sensors, lines, motion, reference)
+        purpose = (
+            ""
+            if changes_reach(override.typed for override in request.overrides)
+            else value_at(reading.document, PURPOSE)
+        )
         scenario = Scenario(
             name=document["name"],
             description=document.get("description", ""),
@@ -157,7 +162,7 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
             supply_line=lines,
             links={**links, **of_reference, **of_control},
             controlled=controlled,
-            beyond_reach=_purpose(reading, request.overrides),
+            beyond_reach=str(purpose or ""),
         )
         problem = reference_problem(scenario)
         if problem:
@@ -330,12 +335,6 @@ def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> t
     links = {path: gauge_link(path, *split_quantity(str(text))) for path, text in written.items() if text is not None}
     choice = ProfileChoice(kind, reading.section("reference", settings, atmosphere))
     return choice, {path: follow for path, follow in links.items() if follow}
-
-
-def _purpose(reading: DocumentReader, overrides: Iterable[Override]) -> str:
-    """Return why a file asks for a reference beyond reach; "" where an override makes it another reference or reach."""
-    purpose = "" if changes_reach(override.typed for override in overrides) else value_at(reading.document, PURPOSE)
-    return str(purpose or "")
 
 
 def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:

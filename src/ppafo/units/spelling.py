@@ -144,7 +144,8 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
         is_clear = len(normal) <= LONGEST_UNIT and _EXPRESSION.fullmatch(below) is not None
         example = f"'{below}'" if is_clear else "it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'"
         raise UnitError(f"{quote(unit)} is not a unit; write {example}")
-    normal = in_products(normal)
+    spaced = re.sub(r"[A-Za-zµ]+(?![A-Za-zµ]|_[gad])", lambda word: as_product(word[0]) or word[0], normal)
+    normal = re.sub(rf"/({FACTOR}(?: {FACTOR})+)", r"/(\1)", spaced) if spaced != normal else normal
     return _FORCES.get(normal, normal), kind
 
 
@@ -164,15 +165,6 @@ def _kind_of_pressure(text: str) -> tuple[str, str]:
         return text, ""
     word = word.lower()
     return match["unit"], next(kind for kind, words in _KIND_WORDS.items() if word in words)
-
-
-def in_products(unit: str) -> str:
-    """Return a unit whose joined names have their spaces, ``N m`` for ``Nm``; a product below a stroke in parentheses.
-
-    A unit without joined names stays as it is.
-    """
-    spaced = re.sub(r"[A-Za-zµ]+(?![A-Za-zµ]|_[gad])", lambda word: as_product(word[0]) or word[0], unit)
-    return re.sub(rf"/({FACTOR}(?: {FACTOR})+)", r"/(\1)", spaced) if spaced != unit else unit
 
 
 def as_product(name: str) -> str:

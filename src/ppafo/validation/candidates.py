@@ -242,7 +242,10 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
     scenario = replace(replayed_scenario(request), device=request.device)
     followed = _followed_by(measured, request.device)
     declared = declared_numbers(scenario)
-    for path in _tried_paths(declared, request.device, followed):
+    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
+    left_out = {*_NOT_TRIED, *other_forms, *followed}
+    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
+    for path in (path for path in by_section if path not in left_out):
         value, quantity = number_at(scenario, path), declared[path]
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
@@ -259,14 +262,6 @@ def _followed_by(measured: MeasuredRecording, device: Device) -> set[str]:
     if measured.has(SUPPLY) and device.supply.has_one_pressure:
         return set(_OF_SUPPLY)
     return {path for path, channel in _OF_SUPPLY.items() if measured.has(channel)}
-
-
-def _tried_paths(declared: Iterable[str], device: Device, followed: Collection[str]) -> list[str]:
-    """Return the paths of the numbers that a recording may tell, section by section, each in one of its forms."""
-    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
-    left_out = {*_NOT_TRIED, *other_forms, *followed}
-    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
-    return [path for path in by_section if path not in left_out]
 
 
 def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:

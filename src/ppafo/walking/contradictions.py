@@ -128,7 +128,13 @@ def check_no_bottle(scenario: Scenario) -> None:
 def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     """Yield every pair of numbers that could contradict each other, with whether they do."""
     yield from _of_stops(scenario)
-    yield from _of_pairs(scenario)
+    wearer = walk_of(scenario).wearer
+    numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
+    numbers |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
+    for pair in PAIRS:
+        if pair.path in numbers and pair.other in numbers:
+            number, other = numbers[pair.path], numbers[pair.other]
+            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return
@@ -173,17 +179,6 @@ def _of_stops(scenario: Scenario) -> Iterator[Contradiction]:
         actuator.angle_min > low + _BEYOND_STOP,
         lambda run: f"{needed}, this joint begins at {_text(actuator.angle_min, run, 'rad')}",
     )
-
-
-def _of_pairs(scenario: Scenario) -> Iterator[Contradiction]:
-    """Yield the contradictions of ``PAIRS`` of which a walk has both numbers."""
-    wearer = walk_of(scenario).wearer
-    numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
-    numbers |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
-    for pair in PAIRS:
-        if pair.path in numbers and pair.other in numbers:
-            number, other = numbers[pair.path], numbers[pair.other]
-            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
 
 
 def _reason(pair: Pair, other: Any, run: int) -> str:

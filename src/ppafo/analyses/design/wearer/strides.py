@@ -50,7 +50,9 @@ def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[WalkedDevice]:
     strides: list[WalkedDevice] = []
     for request in _requests(wish, valve, actuator):
         for lift in _lifts(request, wish, valve, actuator):
-            tried = _strides_of(valve, actuator, (*common, *_request_overrides(request, valve), *lift))
+            peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
+            limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
+            tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
             if tried is None:
                 break
             # A request that has all of the torque goes before one that all but reaches it.
@@ -88,13 +90,6 @@ def _requests(wish: Wish, valve: Part, actuator: Part) -> list[float]:
     # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
     held = actuator.values["torque_constant"] * (wish.pressure - STANDARD_ATMOSPHERE)
     return list(dict.fromkeys(min(factor * wish.torque, held) for factor in _REQUESTS))
-
-
-def _request_overrides(request: float, valve: Part) -> tuple[str, ...]:
-    """Return the overrides of a request [N m], and of the limit that has to follow it."""
-    peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
-    limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
-    return (*peak, *limit)
 
 
 def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
