@@ -100,7 +100,7 @@ def shown_in(units: Mapping[str, str]) -> Iterator[None]:
 
 
 def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return what lets a function say and draw in the units that ``units`` returns of its arguments."""
+    """Return a decorator: the function writes and draws in the units that ``units`` returns for its arguments."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -114,7 +114,7 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
 
 
 def pressure_units(level: str) -> dict[str, str]:
-    """Return the units of levels and differences of pressure, by unit in SI, of who writes levels as ``bar_g``."""
+    """Return the display units of pressure levels and differences, by SI unit, for levels written as ``bar_g``."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
@@ -125,13 +125,13 @@ def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
 
 
 def gauge_zero() -> float:
-    """Return the absolute pressure [Pa] from which gauge pressures are counted where they are shown."""
+    """Return the absolute pressure [Pa] from which displayed gauge pressures count."""
     stated = _chosen.get().get(GAUGE_ZERO)
     return STANDARD_ATMOSPHERE if stated is None else float(stated.removesuffix(" Pa_a"))
 
 
 def units_in_force() -> dict[str, str]:
-    """Return the chosen units by unit in SI; empty where the package's own choices hold."""
+    """Return the chosen display units by SI unit; empty for the defaults of the package."""
     return dict(_chosen.get())
 
 

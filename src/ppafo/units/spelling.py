@@ -15,7 +15,7 @@ UNITS = (
     *("L", "in", "ft", "lb", "lbf", "oz", "ozf", "kgf", "percent"),
 )
 PRESSURES = ("Pa", "bar", "psi", "atm", "Torr", "mHg", "inHg", "mWC", "inWC")
-"""Units of pressure that are one word."""
+"""Units of pressure of one word."""
 
 LONGEST_UNIT = 60
 _MOST_FACTORS = 4
@@ -109,7 +109,7 @@ _FORCES = {
     "kg/cm^2": "kgf/cm^2",
     "kg/mm^2": "kgf/mm^2",
 }
-"""A pound, an ounce or a kilogram that turns or presses is a force."""
+"""Spellings in which a pound, an ounce or a kilogram is a force."""
 
 
 _KIND_OF_QUOTIENT = re.compile(
@@ -150,12 +150,12 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
 
 
 def says_kind(unit: str) -> bool:
-    """Tell whether a word behind a unit says which pressure it is."""
+    """Tell whether a word after a unit states the kind of a pressure."""
     return _kind_of_pressure(unit.translate(_CHARACTERS).strip(" "))[1] != ""
 
 
 def _kind_of_pressure(text: str) -> tuple[str, str]:
-    """Return a pressure without the word that says its kind, as in ``psig``, ``bar (abs)``, ``kPa gauge``."""
+    """Return a pressure unit without the word of its kind, and the kind: ``psig``, ``bar (abs)``, ``kPa gauge``."""
     match = _KIND.fullmatch(text)
     word = "" if match is None else match["word"]
     if match is None and "/" in text:
@@ -168,7 +168,7 @@ def _kind_of_pressure(text: str) -> tuple[str, str]:
 
 
 def as_product(name: str) -> str:
-    """Return a name as known units with spaces, ``N m`` for ``Nm``; an empty text where it is known or no product.
+    """Return a joined name as known units with spaces, ``N m`` for ``Nm``; empty if it is known or no product.
 
     No unit is there twice, so that ``Nmm`` is ``N mm``; of the rest short ones come first: ``Nms`` is ``N m s``.
     """
@@ -194,11 +194,11 @@ def as_product(name: str) -> str:
 
 @functools.cache
 def spellings() -> frozenset[str]:
-    """Return the names of units with every prefix that they may have."""
+    """Return the names of units with all their prefixes."""
     return frozenset(prefix + unit for unit in (*UNITS, "l") for prefix in ("", "µ", *PREFIXES))
 
 
 def quote(text: object) -> str:
-    """Return a short quotation of what was given, on one line."""
+    """Return a short quotation of a value, on one line."""
     quoted = repr(text)
     return quoted if len(quoted) <= 50 else f"{quoted[:46]}...'"
