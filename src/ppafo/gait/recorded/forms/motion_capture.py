@@ -48,10 +48,6 @@ def _bare(label: str) -> str:
     return label.rpartition(":")[2].strip()
 
 
-def _delimiter_of(line: str) -> str:
-    return max(",;\t", key=line.count)
-
-
 def _head_of(line: str) -> str:
     """Cell of a line that has one cell alone, without the delimiters behind it."""
     return line.strip().rstrip(",;\t").strip('"').strip()
@@ -111,7 +107,7 @@ def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[st
 def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
     """Return the block that begins at the line of its kind; DataError where its header is no header."""
     head = lines[start + 1 : start + 5]
-    delimiter = _delimiter_of(head[2]) if len(head) == 4 else ","
+    delimiter = max(",;\t", key=head[2].count) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
     if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
         raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame', as Nexus writes it")
