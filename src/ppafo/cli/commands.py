@@ -171,7 +171,12 @@ def check_words(words: list[str]) -> None:
     # Options alone, such as --version, are for the parser.
     if not given:
         return
-    _check_installed(given)
+    one = next((group[given[0]] for group in _EVERY.values() if given[0] in group), None)
+    shown = given[: 2 if isinstance(one, CommandGroup) else 1]
+    if isinstance(one, CommandGroup):
+        one = one.actions.get(shown[-1])
+    if one is not None and not is_installed(one.verb):
+        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(one.verb)}, which is not installed")
     word = given[0]
     name_modules_in(word)
     if word not in COMMANDS and word not in OTHERS:
@@ -188,16 +193,6 @@ def check_words(words: list[str]) -> None:
         if action not in actions:
             hint = nearest_name(action, actions)
             raise UsageError(f"there is no 'ppafo {word} {action}'{hint}; available: {', '.join(actions)}")
-
-
-def _check_installed(given: list[str]) -> None:
-    """Refuse a command of a guest that is not there."""
-    one = next((group[given[0]] for group in _EVERY.values() if given[0] in group), None)
-    shown = given[: 2 if isinstance(one, CommandGroup) else 1]
-    if isinstance(one, CommandGroup):
-        one = one.actions.get(shown[-1])
-    if one is not None and not is_installed(one.verb):
-        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(one.verb)}, which is not installed")
 
 
 def list_commands() -> str:

@@ -139,12 +139,13 @@ def _write(result: "Result", check: "Check | None", follows: Sequence[str], tune
     report = page_of(_finding(result, check, follows, tuned), {FIGURE: figures[f"{FIGURE}.svg"]})
     checks = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **checks})
-    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
+    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     further = result.scenario.motion.motion_kind.further_command(str(result.scenario.origin.file))
     return "\n".join(["", *([further] if further else []), f"written: {folder} ({written})"])
 
 
+@in_units(lambda result, *_: result.scenario.device.shown)
 def _text(
     result: "Result",
     error: "ErrorEstimate | None",
@@ -153,8 +154,10 @@ def _text(
     tuned: Sequence[str],
 ) -> str:
     """Return how the run ended, how it follows its reference, the numbers, how exact they are, and the gains."""
+    from ppafo.report.display_units import metrics_lines
+
     exact = [repr(check)] if check is not None else [] if error is None else [error.sentence]
-    # In place of the result's own verdict, whose remedies were not tried.
-    metrics = str(result).partition("\n\n")[2]
     last = ["", *exact, *tuned] if exact or tuned else []
-    return "\n".join([f"{result.scenario.name}: {result.status.kind}", *follows, "", metrics, *last])
+    # The result's own text has a verdict whose remedies were not tried.
+    head = [f"{result.scenario.name}: {result.status.kind}", *follows, ""]
+    return "\n".join([*head, *metrics_lines(result.metrics), *last])

@@ -443,7 +443,7 @@ class Reduction:
                 break
         return made
 
-    def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:
         """Reduction of a statement."""
         match node:
             case ast.Expr(value=ast.Call() as call):

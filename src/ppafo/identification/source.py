@@ -252,7 +252,8 @@ def without_wrong_samples(
         right = np.ones(len(recording), dtype=np.bool_)
         for name in (name for name in names if name in recording):
             values, most = recording[name][inside], max(1, int(_MOST_LEFT_OUT * inside.size))
-            wrong = np.flatnonzero(_far_off(values, most))
+            fine = _off_by(values, most, _FINE_SAMPLE)
+            wrong = np.flatnonzero(fine if np.count_nonzero(fine) <= most else _off_by(values, most, _GROSS_SAMPLE))
             if not wrong.size:
                 continue
             first = int(wrong[0])
@@ -267,15 +268,6 @@ def without_wrong_samples(
         channels = {name: replace(one, values=one.values[right]) for name, one in recording.channels.items()}
         kept.append(replace(source, recording=replace(recording, time=recording.time[right], channels=channels)))
     return tuple(kept), tuple(said)
-
-
-def _far_off(values: Floats, most: int) -> NDArray[np.bool_]:
-    """Return which samples are far off those around them; where more than ``most`` are, a converter may step so.
-
-    Where few are a sixteenth of the usual range off, these are; else those that are off by all of it.
-    """
-    fine = _off_by(values, most, _FINE_SAMPLE)
-    return fine if np.count_nonzero(fine) <= most else _off_by(values, most, _GROSS_SAMPLE)
 
 
 def _off_by(values: Floats, most: int, share: float) -> NDArray[np.bool_]:

@@ -111,9 +111,5 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
     of_joint = any(gain.computed for gain in gains) and scenario.controlled == ANGLE
-    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, _loads_of(scenario) if of_joint else ())
-
-
-def _loads_of(scenario: Scenario) -> tuple[str, ...]:
-    """Return the sections of the effects that load the joint of a scenario."""
-    return tuple(effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws)
+    loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
+    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())

@@ -505,24 +505,20 @@ _PLACES: dict[str, tuple[tuple[type, type], tuple[str, ...], Callable[[Range, An
 """Rows of a joint and of a leg, and settings of a reference that say between which angles the joint is to be."""
 
 
-def _of_angle(reference: str, has_leg: bool) -> LawSignals:
-    rows, names, places = _PLACES.get(reference, _PLACES[""])
-    return LawSignals(
-        signals=rows[has_leg],
-        late=time_with_angle,
-        paths=(*_ANGLE, *(LEG_PATHS if has_leg else ()), *(f"reference.{name}" for name in names)),
-        places=places,
-        turning=turning_with_foot if has_leg else turning_alone,
-    )
-
-
 def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False, reference: str = "") -> LawSignals:
     """Return how the law of a vane alone sees what is controlled, by its kind of reference.
 
     The joint may have a leg's foot, or be locked.
     """
     if controlled == ANGLE:
-        return _of_angle(reference, has_leg)
+        rows, names, places = _PLACES.get(reference, _PLACES[""])
+        return LawSignals(
+            signals=rows[has_leg],
+            late=time_with_angle,
+            paths=(*_ANGLE, *(LEG_PATHS if has_leg else ()), *(f"reference.{name}" for name in names)),
+            places=places,
+            turning=turning_with_foot if has_leg else turning_alone,
+        )
     return LOCKED if is_locked else IN_SCENARIO
 
 

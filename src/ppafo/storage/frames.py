@@ -41,13 +41,20 @@ def is_frame(value: object) -> bool:
 
 def remedy_for(path: str | Path) -> str:
     """Advice to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
-    suffix = Path(path).suffix.lower()
-    call = (PANDAS_READERS | OTHER_READERS).get(suffix)
-    if call is None:
-        return ""
-    table = f"pandas.{call.format(path=str(path))}"
-    written = f"{table}.to_csv({f'{path}.csv'!r}, index=False)"
-    return f"; in Python give the table itself, {table}, or write it as CSV: {written}"
+    table = _read_by_pandas(path)
+    # The same advice, behind the one to do without a file.
+    return f"; in Python give the table itself, {table}, or{written_as_csv(path)[1:]}" if table else ""
+
+
+def written_as_csv(path: str | Path) -> str:
+    """Advice to write a table of another format as CSV with pandas; empty for an unknown suffix."""
+    table = _read_by_pandas(path)
+    return f"; write it as CSV: {table}.to_csv({f'{path}.csv'!r}, index=False)" if table else ""
+
+
+def _read_by_pandas(path: str | Path) -> str:
+    call = (PANDAS_READERS | OTHER_READERS).get(Path(path).suffix.lower())
+    return "" if call is None else f"pandas.{call.format(path=str(path))}"
 
 
 def recording_of_frame(

@@ -71,7 +71,11 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
         lines = _with_stamps_as_column(lines, columns)
     with in_map(map_name):
         table = _begin(lines, columns)
-        indices = _indices(table, columns, lines)
+        indices = {
+            name: _index_of(f"channels.{name}.column", mapped.column, table, lines)
+            for name, mapped in columns.channels.items()
+            if mapped.column is not None
+        }
         date = columns.channels[TIME].date
         date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table, lines)
     time_index = indices.get(TIME)
@@ -169,15 +173,6 @@ def _cells(line: str, number: int, columns: ColumnMap) -> list[str]:
         return next(csv.reader([line], delimiter=_DELIMITERS[columns.delimiter], strict=True))
     except csv.Error as error:
         raise DataError(f"line {number} cannot be read: {error}") from error
-
-
-def _indices(table: _StartedTable, columns: ColumnMap, lines: list[str]) -> dict[str, int]:
-    """Return the index of the column of each channel that has one."""
-    return {
-        name: _index_of(f"channels.{name}.column", mapped.column, table, lines)
-        for name, mapped in columns.channels.items()
-        if mapped.column is not None
-    }
 
 
 def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str]) -> int:

@@ -212,22 +212,15 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     """
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
     # The same under two atmospheres: an absolute pressure, or no pressure at all.
-    level = common_level(text, METRICS[metric].unit, what, atmospheres)
+    unit = METRICS[metric].unit
+    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
+    level = levels.pop() if len(levels) == 1 else None
     if level is None:
         raise StudyError(
             f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
             "for example '446 kPa_a'"
         )
     return level
-
-
-def common_level(text: str, unit: str, what: str, atmospheres: Collection[float]) -> float | None:
-    """Return a level in a unit of metrics; None for a gauge pressure under several atmospheres [Pa absolute].
-
-    StudyError, whose message ``what`` begins, where the unit does not fit.
-    """
-    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
-    return levels.pop() if len(levels) == 1 else None
 
 
 def difference_of(text: str, metric: str, what: str) -> float:

@@ -23,7 +23,7 @@ from ppafo.simulation.recorded.usual_errors import (
     SensorErrors,
     usual_errors,
 )
-from ppafo.units import from_si
+from ppafo.units.shown import shown_in, shown_unit, shown_value
 from ppafo.validation.agreement import ReplaySettings, replay_of
 from ppafo.validation.change import SENSORS, CandidateCause, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
@@ -242,7 +242,10 @@ def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySetting
     scenario = replace(replayed_scenario(request), device=request.device)
     followed = _followed_by(measured, request.device)
     declared = declared_numbers(scenario)
-    for path in _tried_paths(declared, request.device, followed):
+    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
+    left_out = {*_NOT_TRIED, *other_forms, *followed}
+    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
+    for path in (path for path in by_section if path not in left_out):
         value, quantity = number_at(scenario, path), declared[path]
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
@@ -259,14 +262,6 @@ def _followed_by(measured: MeasuredRecording, device: Device) -> set[str]:
     if measured.has(SUPPLY) and device.supply.has_one_pressure:
         return set(_OF_SUPPLY)
     return {path for path, channel in _OF_SUPPLY.items() if measured.has(channel)}
-
-
-def _tried_paths(declared: Iterable[str], device: Device, followed: Collection[str]) -> list[str]:
-    """Return the paths of the numbers that a recording may tell, section by section, each in one of its forms."""
-    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
-    left_out = {*_NOT_TRIED, *other_forms, *followed}
-    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
-    return [path for path in by_section if path not in left_out]
 
 
 def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:
@@ -286,8 +281,8 @@ def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> Candida
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
     """Return the unit in which a difference of pressures is shown, and how many of it are 1 Pa."""
-    unit = device.shown.get("Pa_d", "kPa_d")
-    return unit.removesuffix("_d"), from_si(1.0, unit, "Pa_d")
+    with shown_in(device.shown):
+        return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
 def _numbered(path: str, value: float, factor: float) -> ModelChange:

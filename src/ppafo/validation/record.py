@@ -94,7 +94,21 @@ def record_of(
         has_few=all(channel.has_few for channel in wrong),
         delay=agreement.delay.correction,
     )
-    return record._replace(starts=_changes_with_start(record, device, settings))
+    request = replay_of(record.measured, device, settings)
+    count = samples_at_rest(record.measured.recording)
+    moved = [
+        _with_moved_start(request, name, noise / math.sqrt(count), device)
+        for name, noise in zip(record.channels, record.noise.tolist(), strict=True)
+        if name in SENSORS and name not in settings.initial
+    ]
+    unmoved, *others = replay_together([request, *moved])
+    return record._replace(
+        starts=tuple(
+            readings_of(record, other, ModelChange(), 0.0) - readings_of(record, unmoved, ModelChange(), 0.0)
+            for other in others
+            if isinstance(unmoved, Replayed) and isinstance(other, Replayed)
+        )
+    )
 
 
 class _Channel(NamedTuple):
@@ -190,23 +204,6 @@ def _clipped_samples(values: Floats) -> _Wrong | None:
         f"{int((values == limit).sum())} samples are exactly its {word} value" for limit, word in limits
     )
     return _Wrong(f"is clipped: {said}", np.isin(values, [limit for limit, _ in limits]))
-
-
-def _changes_with_start(record: Record, device: Device, settings: ReplaySettings) -> tuple[Floats, ...]:
-    """Return how readings (channels, samples) change where a start, read from samples, is off by its standard error."""
-    request = replay_of(record.measured, device, settings)
-    count = samples_at_rest(record.measured.recording)
-    moved = [
-        _with_moved_start(request, name, noise / math.sqrt(count), device)
-        for name, noise in zip(record.channels, record.noise.tolist(), strict=True)
-        if name in SENSORS and name not in settings.initial
-    ]
-    unmoved, *others = replay_together([request, *moved])
-    return tuple(
-        readings_of(record, other, ModelChange(), 0.0) - readings_of(record, unmoved, ModelChange(), 0.0)
-        for other in others
-        if isinstance(unmoved, Replayed) and isinstance(other, Replayed)
-    )
 
 
 def _with_moved_start(request: Replay, name: str, error: float, device: Device) -> Replay:

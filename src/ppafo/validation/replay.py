@@ -79,7 +79,11 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
     alike: dict[Hashable, list[int]] = {}
     for number, request in enumerate(requests):
         try:
-            planned[number] = _planned(request)
+            recording = request.measured.recording
+            followed = followed_channels(request.measured, request.motion)
+            run = _plan(request)
+            inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
+            planned[number] = _Planned(request, run, inputs, batch_of(run))
         except PpafoError as error:
             ended[number] = error
             continue
@@ -103,15 +107,6 @@ class _Planned:
         command = None if self.inputs.command is None else self.inputs.command.tobytes()
         parameters = tuple((path, series.tobytes()) for path, series in self.inputs.parameters.items())
         return self.batch.program, self.batch.clock, command, parameters
-
-
-def _planned(request: Replay) -> _Planned:
-    """Return the plan of a replay; PpafoError where the recording or the device does not allow one."""
-    recording = request.measured.recording
-    followed = followed_channels(request.measured, request.motion)
-    run = _plan(request)
-    inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
-    return _Planned(request, run, inputs, batch_of(run))
 
 
 def _run_together(together: Sequence[_Planned]) -> list[Replayed | SimulationError]:

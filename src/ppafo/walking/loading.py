@@ -206,6 +206,10 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     atmosphere = device.supply.atmospheric_pressure
+    # The path of a file in full means the same from any folder.
+    full = {
+        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
+    }
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -220,7 +224,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=origin_of(request, document, hardware.valve, _named_beside(request)),
+        origin=origin_of(request, document, hardware.valve, tuple(f"{path}={name}" for path, name in full.items())),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -274,15 +278,6 @@ def _motion(
         broken=_broken(reading, line),
         shut_off=_shut_off(reading),
     )
-
-
-def _named_beside(request: ScenarioRequest) -> tuple[str, ...]:
-    """Return the files that were named beside a walk's own as overrides."""
-    # The path of a file in full means the same from any folder.
-    full = {
-        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
-    }
-    return tuple(f"{path}={name}" for path, name in full.items())
 
 
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:

@@ -139,7 +139,17 @@ def _drawn_runs(
     if not uncertainty.drawn:
         return {}
     if study is not None:
-        _check_same(study, scenarios)
+        # Where cases differ in a value that the study draws for all of them, the difference would not count.
+        # Orifices of different valves are meant to differ: what the study draws replaces each one's own.
+        for path in (path for path in study.paths if not path.startswith("valve.") and path != NOISE):
+            own = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
+            values = [value for value in own if value is not None]
+            lowest, highest = min(values, default=0.0), max(values, default=0.0)
+            if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+                raise StudyError(
+                    f"the study draws '{path}' for every configuration, so the different values of the configurations "
+                    f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
+                )
     columns = uncertainty.replicated_columns(0, draws.count, seed)
     renoised = with_new_noise(columns) if uncertainty.has_noise else {}
     tally = Tally((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
@@ -180,20 +190,6 @@ def _cases(
             )
         )
     return cases
-
-
-def _check_same(study: Study, scenarios: Scenarios) -> None:
-    """Refuse cases that differ in a value that the study draws for all of them: the difference would not count."""
-    # Orifices of different valves are meant to differ: what the study draws replaces each one's own.
-    for path in (path for path in study.paths if not path.startswith("valve.") and path != NOISE):
-        own = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
-        values = [value for value in own if value is not None]
-        lowest, highest = min(values, default=0.0), max(values, default=0.0)
-        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
-            raise StudyError(
-                f"the study draws '{path}' for every configuration, so the different values of the configurations "
-                f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
-            )
 
 
 def _on_task(

@@ -36,7 +36,12 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     the errors of ``identify``.
     """
     given = _Given(problem, folder, file)
-    before = _base_set(problem, folder)
+    name = problem.device.set
+    beside = folder / name
+    base = load_parameter_set(beside if beside.suffix == ".toml" else name)
+    valve, overrides = problem.device.valve, read_overrides(problem.device.overrides)
+    check_valve(overrides, valve, f"device.valve = '{valve}'")
+    before = with_overrides(base, overrides, valve)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, problem.device.valve)
         tasks = _tasks(given, before)
@@ -115,16 +120,6 @@ class _Task:
     place: str
 
 
-def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
-    """Return the set on which a problem begins, with its overrides: one beside the problem's file, or one by name."""
-    name = problem.device.set
-    beside = folder / name
-    base = load_parameter_set(beside if beside.suffix == ".toml" else name)
-    valve, overrides = problem.device.valve, read_overrides(problem.device.overrides)
-    check_valve(overrides, valve, f"device.valve = '{valve}'")
-    return with_overrides(base, overrides, valve)
-
-
 def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
     """Return the procedures in the order in which they are applied, each with its recordings."""
     numbered = enumerate(given.problem.procedure, start=1)
@@ -179,7 +174,12 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
     What others report of another device is left out of a set that has values of this one.
     """
     old, new = identification.new_set.parameter_set, identification.new_set
-    files = recording_files(problem)
+    named = [name for procedure in problem.procedure for name in procedure.recordings]
+    if problem.trajectory is not None:
+        named += [experiment.recording for experiment in problem.trajectory.experiments]
+    paths = dict.fromkeys(map(Path, named))
+    names = [path.name for path in paths]
+    files = ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]
     left_out = len(files) - _FILES_IN_TITLE
     shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {left_out} more" if left_out > 0 else "")
     outcome = "identified" if new.written or new.fitted else "no value identified"
@@ -211,13 +211,3 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
         parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),
     )
-
-
-def recording_files(problem: ProblemFile) -> list[str]:
-    """Return the names of the recordings of a problem, with the folder where two have one name."""
-    named = [name for procedure in problem.procedure for name in procedure.recordings]
-    if problem.trajectory is not None:
-        named += [experiment.recording for experiment in problem.trajectory.experiments]
-    paths = dict.fromkeys(map(Path, named))
-    names = [path.name for path in paths]
-    return ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]

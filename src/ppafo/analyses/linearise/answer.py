@@ -12,14 +12,13 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -132,6 +131,8 @@ _STEPS_CAPTION = (
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model in words, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
+    steps, caption = partial(steps_panels, model), _STEPS_CAPTION
+    far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(4.4, 3.4))
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -142,7 +143,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
             Section("Which side was taken", facts(model.sides.items()), remarks=_edges(model)),
             _poles(model),
             *_matrices(model),
-            *([_how_far(model)] if can_step(model) else []),
+            *([far] if can_step(model) else []),
         ],
         found=model,
         files={"linearise.npz": partial(_arrays, model)},
@@ -236,18 +237,6 @@ def _matrices(model: LinearModel) -> list[Section]:
         table = [Column("", [variable.name for variable in rows]), *numbers]
         parts.append(Section(f"Matrix {name} (SI)", table, is_detail=is_detail))
     return parts
-
-
-def _how_far(model: LinearModel) -> Section:
-    """Return the figure of steps on the runs and of the model."""
-    return Section(
-        "How far it holds",
-        panels=partial(steps_panels, model),
-        name="steps",
-        caption=_STEPS_CAPTION,
-        across=2,
-        size=(4.4, 3.4),
-    )
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:

@@ -1,7 +1,7 @@
 """The reproduction: every claim with its verdict, figures, recordings, and the one bespoke page."""
 
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -143,6 +143,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
     runs = (reproduction.solenoid, reproduction.proportional, reproduction.step)
+    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
     values = {
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
@@ -152,7 +153,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
         **_task_values(reproduction),
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
-        "steps": _steps_text(runs),
+        "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
@@ -181,6 +182,10 @@ def _claim_values(reproduction: Reproduction) -> dict[str, Any]:
 def _set_values(reproduction: Reproduction) -> dict[str, Any]:
     """Return what the page says of both parameter sets: findings of the printed one, and those that the other keeps."""
     severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
+    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
+    for value in reproduction.assumed:
+        groups.setdefault(value.used_by, []).append(value)
+    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
     return {
         "printed_set": reproduction.printed_set,
         "completed_set": reproduction.completed_set,
@@ -189,17 +194,8 @@ def _set_values(reproduction: Reproduction) -> dict[str, Any]:
             for severity, name in severities.items()
         },
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        "assumed_groups": _assumed_groups(reproduction.assumed),
+        "assumed_groups": [(_users(users), values) for users, values in ordered],
     }
-
-
-def _assumed_groups(assumed: Iterable[AssumedValue]) -> list[tuple[str, list[AssumedValue]]]:
-    """Return assumed values by the experiments that use them; what all of them rest on comes first."""
-    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
-    for value in assumed:
-        groups.setdefault(value.used_by, []).append(value)
-    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
-    return [(_users(users), values) for users, values in ordered]
 
 
 def _task_values(reproduction: Reproduction) -> dict[str, Any]:
@@ -217,12 +213,6 @@ def _task_values(reproduction: Reproduction) -> dict[str, Any]:
         ],
         "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
     }
-
-
-def _steps_text(runs: Sequence[Result]) -> str:
-    """Return the step of the engine in some runs, or the range of theirs."""
-    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
-    return f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms"
 
 
 def holding_torque(result: Result) -> float:

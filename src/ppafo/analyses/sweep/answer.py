@@ -13,7 +13,7 @@ from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError
 from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
-from ppafo.storage.places import Place, place_at, read_document
+from ppafo.storage.places import place_at, read_document
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
 
@@ -72,25 +72,6 @@ class _Summary(_OpenTable):
     configurations: dict[str, dict[str, _Described]]
 
 
-def read_summary(location: Place, document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the summary of the study with this ``study.json``; DataError where it is not finished, or damaged."""
-    try:
-        summary: dict[str, Any] = read_document(location, SUMMARY)
-    except (OSError, ValueError) as error:
-        raise DataError(
-            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
-        ) from error
-    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
-    described = validate(_Summary, summary, whose, DataError)
-    names = {configuration["name"] for configuration in document["study"]["configurations"]}
-    # A configuration or a metric in one of the two documents alone would be looked up in vain.
-    has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
-    metrics = document["metrics"].keys()
-    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
-        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
-    return summary
-
-
 @in_units(lambda results: results.document.get("shown", {}))
 def finding_of(results: StudyResults) -> Finding[StudyResults]:
     """Return the results in words, tables and panels; they have passed where any run completed."""
@@ -106,6 +87,10 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         ("summary", SUMMARY),
         ("study", f"study.json, sha256 {document['sha256'][:16]}"),
     )
+    rows = []
+    for number in document["study"].get("vary", ()):
+        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
+        rows.append((number["path"], number["kind"], ", ".join(keys)))
     return Finding(
         name="sweep",
         kicker="Study",
@@ -115,7 +100,7 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
             figure_of(results, [described] if described else [], failures),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
             Section("How to read it", said=[quantile], is_detail=True),
-            _varied(document["study"]),
+            Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
             Section(said=_sampling(document["study"]), is_detail=True),
             _assumed(document["scenarios"]),
             Section("Files", facts(files), is_detail=True),
@@ -143,15 +128,6 @@ def _useless_runs(results: StudyResults) -> list[str]:
         for name, count in summary.get(key, {}).items()
         if count
     ]
-
-
-def _varied(study: Mapping[str, Any]) -> Section:
-    """Return a row for each number that a study varies: its path, how, and the keys of that."""
-    rows = []
-    for number in study.get("vary", ()):
-        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
-        rows.append((number["path"], number["kind"], ", ".join(keys)))
-    return Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
 
 
 def _sampling(study: Mapping[str, Any]) -> list[str]:
@@ -224,4 +200,18 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """
     location = place_at(folder)
     document = read_manifest(location)
-    return finding_of(StudyResults(location, document, read_summary(location, document)))
+    try:
+        summary: dict[str, Any] = read_document(location, SUMMARY)
+    except (OSError, ValueError) as error:
+        raise DataError(
+            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+        ) from error
+    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
+    described = validate(_Summary, summary, whose, DataError)
+    names = {configuration["name"] for configuration in document["study"]["configurations"]}
+    # A configuration or a metric in one of the two documents alone would be looked up in vain.
+    has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
+    metrics = document["metrics"].keys()
+    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
+        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
+    return finding_of(StudyResults(location, document, summary))

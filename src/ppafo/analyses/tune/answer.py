@@ -13,7 +13,6 @@ from ppafo.errors import count_of
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
-from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -23,7 +22,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage, without_exponent
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -134,13 +133,18 @@ def finding_of(
     ``scales`` are those of the goals [SI], ``starts`` best first, ``runs`` all that were simulated.
     """
     tuned = _tuned(problem, scales, before, after, starts, runs)
+    rows = []
+    for gain in tuned.problem.searched:
+        numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
+        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
+        rows.append((gain.path, *map(gain.place.quote, numbers), end))
     return Finding(
         name="tune",
         kicker="Tuning",
         title=problem.name,
         said=(tuned.verdict, *([problem.description] if problem.description else [])),
         parts=(
-            _gains_part(tuned),
+            Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)),
             Section(
                 "Before and after",
                 _metric_columns(problem, before, after),
@@ -197,16 +201,6 @@ def _tuned(
         remarks=_remarks(problem, after, starts, runs, reached),
         problem=problem,
     )
-
-
-def _gains_part(tuned: Tuned) -> Section:
-    """Return the gains with their bounds, as people write them."""
-    rows = []
-    for gain in tuned.problem.searched:
-        numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
-        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
-        rows.append((gain.path, *map(gain.place.quote, numbers), end))
-    return Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows))
 
 
 def _options(tuned: Tuned) -> str:

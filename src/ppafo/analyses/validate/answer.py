@@ -1,7 +1,6 @@
 """A validation as a finding: verdict, errors of each recording in a table, its panels, and the replayed recordings."""
 
 import re
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -84,7 +83,12 @@ _WRITTEN_AS_ZERO = 5.0e-4
 @in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation in words, tables and panels; it has passed where every error is within its limit."""
-    names = recording_names([agreement.file for agreement in validation.recordings])
+    stems = [
+        _UNUSUAL.sub("-", Path(agreement.file).stem).strip("-.") or "recording" for agreement in validation.recordings
+    ]
+    names = [
+        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
+    ]
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
     said, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
@@ -125,14 +129,6 @@ def _method(validation: Validation) -> str:
         "angle between the stops, the gauge pressure of the supply, and twice that for the pressure difference. One "
         "common delay was removed before the errors were computed."
     )
-
-
-def recording_names(files: Sequence[str]) -> list[str]:
-    """Return a name for the files of each recording: its file's or folder's, with a number where two are alike."""
-    stems = [_UNUSUAL.sub("-", Path(file).stem).strip("-.") or "recording" for file in files]
-    return [
-        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
-    ]
 
 
 def _part(name: str, agreement: RecordingAgreement) -> Section:

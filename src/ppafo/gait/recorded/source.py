@@ -15,6 +15,7 @@ from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_na
 from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
 from ppafo.gait.recorded.walk import LOADS, Signal, Subject, walk_signals
 from ppafo.kinds import Kinds
+from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
@@ -28,6 +29,7 @@ FORMS: Kinds[GaitForm] = Kinds(
         "nexus": "ppafo.gait.recorded.forms.motion_capture:NEXUS",
         "qualisys": "ppafo.gait.recorded.forms.motion_capture:QUALISYS",
         "motive": "ppafo.gait.recorded.forms.motion_capture:MOTIVE",
+        "bts": "ppafo.gait.recorded.forms.motion_capture:BTS",
         "dflow": "ppafo.gait.recorded.forms.motion_capture:DFLOW",
         "csv": "ppafo.gait.recorded.forms.comma_separated:FORM",
         "c3d": "ppafo.gait.recorded.forms.c3d:FORM",
@@ -55,7 +57,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
         if suffix in form.suffixes and form.recognises(path):
             return form
     *others, last = dict.fromkeys(suffix for form in FORMS.loaded().values() for suffix in form.suffixes)
-    raise DataError(f"{path}: is not a {', '.join(others)} or {last} file")
+    raise DataError(f"{path}: is not a {', '.join(others)} or {last} file{written_as_csv(path)}")
 
 
 def read_table(

@@ -191,14 +191,6 @@ def find_columns(
     raise DataError(f"{_why_missing(curve, bare, tables)} {_said_of_columns(tables)}")
 
 
-def _check_angles(columns: GaitMap, tables: Sequence[MotionTable]) -> None:
-    """Raise DataError where neither angle has its columns: what the files have is said once for both."""
-    named = {name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED}
-    if not any(all(name in table.columns for name in bare) for table in tables for bare in named.values()):
-        why = "; ".join(_why_missing(curve, bare, tables) for curve, bare in named.items())
-        raise DataError(f"{why} {_said_of_columns(tables)}")
-
-
 def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable]) -> str:
     """Return which column of a curve no table has, and the nearest; DataError where several have its name."""
     known = [name for table in tables for name in table.columns]
@@ -424,7 +416,12 @@ def walk_signals(
     where an angle cannot be used, with everything in ``wrong``.
     """
     try:
-        _check_angles(columns, tables)
+        named = {
+            name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED
+        }
+        if not any(all(name in table.columns for name in bare) for table in tables for bare in named.values()):
+            why = "; ".join(_why_missing(curve, bare, tables) for curve, bare in named.items())
+            raise DataError(f"{why} {_said_of_columns(tables)}")
     except DataError as error:
         raise_noted([*wrong, error])
     walk: dict[str, Signal] = {}

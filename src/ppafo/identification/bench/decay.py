@@ -58,7 +58,15 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
         )
     skipped = check_no_gap(source, PROCEDURE, part)
     rows, sign = _falling_part(source, part, start is not None)
-    _check_not_saturated(source, part[ANGLE][rows], skipped + rows.start)
+    angle = part[ANGLE][rows]
+    before = skipped + rows.start
+    for plateau in plateaus(angle):
+        if is_at_limit(angle, plateau):
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
+                f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
+                f"before: the sensor is saturated or the vane is at a stop; give end"
+            )
     if VELOCITY in part:
         _check_velocity(source, part, rows)
     velocity = part[VELOCITY][rows] if VELOCITY in part else None
@@ -84,17 +92,6 @@ def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -
             f"first reversal, {MINIMUM_SAMPLES} are needed; record longer, or give start and end"
         )
     return slice(first, last), sign
-
-
-def _check_not_saturated(source: RecordingSource, angle: Floats, before: int) -> None:
-    """Raise IdentificationError for an angle [rad] that stops at a limit; ``before`` samples of the file precede it."""
-    for plateau in plateaus(angle):
-        if is_at_limit(angle, plateau):
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
-                f"before: the sensor is saturated or the vane is at a stop; give end"
-            )
 
 
 def _check_velocity(source: RecordingSource, part: Recording, rows: slice) -> None:

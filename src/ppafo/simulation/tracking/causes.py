@@ -16,6 +16,7 @@ from ppafo.simulation.tracking.remedies import (
     change_text,
     dead_band,
     gain_of_device,
+    integral_of_device,
     larger_gains,
     level_text,
     remedy,
@@ -29,6 +30,8 @@ from ppafo.simulation.tracking.remedies import (
 
 _MOSTLY = 0.5
 """Share of the settled part that is most of it [-]."""
+_EDGE = 1.05
+"""Command over the dead band up to which it counts as within the band [-]."""
 _QUICKER = 1.3
 """Rate at an angle over the rate the gains are made for, from which it causes oscillation [-]."""
 
@@ -45,15 +48,18 @@ def _unless_oscillating(case: Case) -> TrackingCause | None:
 def _shut_valve(case: Case) -> TrackingCause | None:
     """The command is 0, or stays within the dead band of the valve."""
     scenario, settled = case.scenario, case.settled
-    asked, band = float(np.max(np.abs(case.recording["command"][settled.samples]))), dead_band(scenario)
+    command, band = np.abs(case.recording["command"][settled.samples]), dead_band(scenario)
+    # A loop that rests at the edge of the band is a little beyond it now and then.
+    asked = float(np.max(command)) if np.mean(command <= _EDGE * band) < _MOSTLY else float(np.median(command))
     if asked <= SHUT and case.failure != "overshoots":
         return TrackingCause("its law asks for nothing: its gains are 0, or its dead zone is wider than the error")
-    if asked > band or settled.turns or case.failure == "overshoots":
+    if asked > _EDGE * band or settled.turns or case.failure == "overshoots":
         return None
     remedies = larger_gains(scenario, case.law, (1.5 * band / asked, 3.0 * band / asked))
+    remedies += integral_of_device(scenario, case.law)
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
-    text = f"its command of {asked:.2g} at most stays within `valve.dead_band = {band:.2g}`"
+    text = f"its command of {asked:.2g} stays within `valve.dead_band = {band:.2g}`"
     return TrackingCause(text, tuple(remedies), "give a larger gain")
 
 
@@ -144,7 +150,11 @@ def _fully_open_valve(case: Case) -> TrackingCause | None:
 def gains_of_another_device(case: Case) -> TrackingCause | None:
     """A gain differs from the one the device asks for."""
     right = gain_of_device(case.scenario, case.law)
-    return None if right is None else TrackingCause("its gains are not this device's", (right,))
+    if right is None:
+        return None
+    # Without its integral a loop rests beside its reference with any gain.
+    others = () if case.oscillates else integral_of_device(case.scenario, case.law)
+    return TrackingCause("its gains are not this device's", (right, *others))
 
 
 def _not_settled(case: Case) -> TrackingCause:
@@ -160,7 +170,8 @@ def _not_settled(case: Case) -> TrackingCause:
         return TrackingCause("it has not settled at the end", (), "give it a longer `run.duration`")
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
-        return TrackingCause("what stays is left to an integral, which is 0", (), f"give some `{integral}`")
+        remedies = tuple(integral_of_device(case.scenario, case.law))
+        return TrackingCause("what stays is left to an integral, which is 0", remedies, f"give some `{integral}`")
     return TrackingCause("reach, dead band, friction and opening do not tell why", (), "look at the figure")
 
 

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
-    from PIL.Image import Image
 
 GHOST = "#5a5a5a"
 """The healthy foot: dark enough to be seen on a coloured one, in front of which it is drawn."""
@@ -391,7 +390,21 @@ def animation(comparison: WalkComparison) -> bytes:
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy())
-        return _gif(images, stride_time)
+        sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
+        palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
+        tones = palette.getpalette() or []
+        triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
+        # What is nearly white is white, for averages with its edges would tint the background; a red foot is kept.
+        kept = [[255] * 3 if min(triple) > _NEARLY_WHITE else triple for triple in triples[:_COLOURS]]
+        kept.append([int(DRAGS[digit : digit + 2], 16) for digit in (1, 3, 5)])
+        palette.putpalette([tone for triple in kept for tone in triple])
+        frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+        buffer = io.BytesIO()
+        milliseconds = 10 * round(100.0 * _SLOWED * stride_time / _PER_STRIDE)  # a GIF counts hundredths of a second
+        frames[0].save(
+            buffer, "GIF", save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False
+        )
+        return buffer.getvalue()
 
 
 def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
@@ -453,24 +466,3 @@ def _scene(axes: "Axes", result: WalkResult, turns: np.ndarray, label: str, colo
         artist.set_animated(True)
     start = float(np.mean(legs.healthy.ankle[:_PER_STRIDE, 0] - stride * (turns[:_PER_STRIDE] - turns[0])))
     return _Scene(axes, legs, artists, ticks, colour, start + stride * (turns - turns[0]))
-
-
-def _gif(images: "list[Image]", stride_time: float) -> bytes:
-    """All frames on the palette of one, so that only what moves takes room."""
-    from PIL import Image
-
-    sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
-    palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
-    tones = palette.getpalette() or []
-    triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
-    # What is nearly white is white, for averages with its edges would tint the background; a small red foot is kept.
-    kept = [[255] * 3 if min(triple) > _NEARLY_WHITE else triple for triple in triples[:_COLOURS]]
-    kept.append([int(DRAGS[digit : digit + 2], 16) for digit in (1, 3, 5)])
-    palette.putpalette([tone for triple in kept for tone in triple])
-    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    buffer = io.BytesIO()
-    milliseconds = 10 * round(100.0 * _SLOWED * stride_time / _PER_STRIDE)  # a GIF counts hundredths of a second
-    frames[0].save(
-        buffer, "GIF", save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False
-    )
-    return buffer.getvalue()

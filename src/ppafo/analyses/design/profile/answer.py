@@ -196,20 +196,6 @@ _MAXIMUM_OF_LIMIT = 4.0
 _DOTTED = {"marker": ".", "markersize": 4}
 
 
-def torque_panel(sizing: Sizing) -> Panel:
-    """Return the prescribed torque over time, and the suggestion's."""
-    times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
-    prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
-    profile = sizing.problem.profile.at(times)
-    marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
-    recording, choice = sizing.recording, sizing.choice
-    if recording is not None and choice is not None:
-        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
-        colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
-        marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
-    return Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))
-
-
 def pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
     limit = sizing.problem.largest_error
@@ -357,7 +343,16 @@ def _method(problem: SizingProblem) -> tuple[str, ...]:
 
 
 def _torque_panels(sizing: Sizing) -> list[Panel]:
-    return [torque_panel(sizing)]
+    times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
+    prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
+    profile = sizing.problem.profile.at(times)
+    marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
+    recording, choice = sizing.recording, sizing.choice
+    if recording is not None and choice is not None:
+        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
+        colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
+        marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
+    return [Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
 
 
 def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
