@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ppafo.errors import ArgumentError, UnitError, one_line
-from ppafo.units import SI, number_text, parse_quantity
+from ppafo.units import SI, number_text, parse_quantity, split_number
+from ppafo.units.shown import pressure_units
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _EXAMPLES = {
@@ -30,6 +31,8 @@ _EXAMPLES = {
     "rad": ("an angle", ("deg", "rad")),
 }
 """Description of each quantity, and units in which people write it."""
+_SHOWN_AGAIN = ("Pa_a", "N m", "kg/s", "m^3")
+"""Quantities that differ from laboratory to laboratory, which people are shown in the unit that they gave."""
 _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
@@ -126,6 +129,28 @@ ABOVE_ZERO = NumberRange(above=0.0)
 FROM_ZERO = NumberRange(lowest=0.0)
 
 
+class Given(float):
+    """A number in SI with the unit in which it was given, in which people are shown it again."""
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> "Given":
+        """Return the number with its unit."""
+        given = super().__new__(cls, value)
+        given.unit = unit
+        return given
+
+
+def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
+    """Return the units of the numbers that came with one, by unit in SI; a pressure brings that of differences."""
+    units: dict[str, str] = {}
+    for si_unit, value in by_si_unit.items():
+        if isinstance(value, Given) and value.unit != SI:
+            units |= pressure_units(value.unit) if si_unit == "Pa_a" else {si_unit: value.unit}
+    return units
+
+
 def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]:
     """Return what turns a text with a unit, such as ``10 min``, into a number in SI; ArgumentError for others.
 
@@ -145,7 +170,7 @@ def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]
             raise ArgumentError(f"{text}: {error}") from error
         if value not in allowed:
             raise ArgumentError(f"{text}: must be {allowed.words(si_unit)}")
-        return value
+        return Given(value, split_number(text)[1]) if si_unit in _SHOWN_AGAIN else value
 
     return value_of
 
@@ -250,7 +275,7 @@ def taken_number(allowed: NumberRange = ANY, read: Callable[[str], float] | None
             raise ValueError
         if float(given) not in allowed:
             raise ValueError
-        return float(given)
+        return given if isinstance(given, Given) else float(given)
 
     return take
 

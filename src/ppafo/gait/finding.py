@@ -14,11 +14,12 @@ from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.curves import PHASES
 from ppafo.gait.recorded.footfalls import Stride
 from ppafo.gait.recorded.importing import ImportedGait
-from ppafo.report.display_units import display_unit, display_value, display_values, quantity_of_unit
+from ppafo.report.display_units import display_unit, display_value, display_values
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREY, ORANGE
+from ppafo.units.shown import quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -212,9 +212,8 @@ def _reader(parameter_set: ParameterSet) -> Reader:
             with refused_as(ParameterError, written, UnitError):
                 numbers[member.name] = entry_in_si(entry, declared[path], atmosphere)
             if not declaration.is_within(numbers[member.name], declared[path]):
-                raise ParameterError(
-                    f"{written}: {range_rule(declared[path], declaration.limits_text(declared[path]))}"
-                )
+                allowed = declaration.limits_text(declared[path], entry.unit)
+                raise ParameterError(f"{written}: {range_rule(declared[path], allowed)}")
         return numbers
 
     return read

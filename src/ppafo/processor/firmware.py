@@ -17,13 +17,13 @@ from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts, converter_with
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
-from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.value_types import INT, Row
 from ppafo.translation.walk import walk_module
 from ppafo.translation.widths import IntegerRange, Narrowed, Range, hull, narrowed
+from ppafo.units.shown import written_text
 from ppafo.version import __version__
 
 PRELUDE = "prelude_whole.h"
@@ -228,7 +228,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         "board": chosen.board,
         "own_bits": str(chosen.converter_bits),
         "version": __version__,
-        "period": quantity_text(scenario.controller.period, "s"),
+        "period": written_text(scenario.controller.period, "s"),
         "range": f"{scenario.controller.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
         "step": f"{converter.pressure_step:.4g} Pa",
         "torque_step": f"{converter.torque_step * 1.0e3:.4g} mN m",

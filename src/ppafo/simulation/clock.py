@@ -7,10 +7,11 @@ from ppafo.errors import ScenarioError
 from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
 from ppafo.parameters.graph import Follows, Graph, LinkFunction
 from ppafo.parameters.overrides import read_overrides
-from ppafo.simulation.declaration import PERIOD, RATE, RUN, DocumentReader, quantity_text, value_at
+from ppafo.simulation.declaration import PERIOD, RATE, RUN, DocumentReader, value_at
 from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import shown_text
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6
@@ -55,13 +56,13 @@ def read_clock(reading: DocumentReader) -> RunTimes:
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most "
+            f"with a step of {shown_text(used, 's')} the run has {duration / used:.3g} steps, at most "
             f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
         )
     if duration / output > MAXIMUM_OUTPUTS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"recorded every {quantity_text(output, 's')} the run has {duration / output:.3g} samples, at most "
+            f"recorded every {shown_text(output, 's')} the run has {duration / output:.3g} samples, at most "
             f"{MAXIMUM_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
         )
     return RunTimes(duration, used, output, period)
@@ -125,20 +126,20 @@ def _read_output(reading: DocumentReader, duration: float, step: float) -> float
     if output < step * (1.0 - _RELATIVE):
         raise reading.refusal(
             _OUTPUT_PATH,
-            f"must not be below {_STEP_PATH} = {quantity_text(step, 's')}; take a smaller step or record less often",
+            f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; take a smaller step or record less often",
         )
     _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
     count = duration / output
     if abs(count - round(count)) > _RELATIVE * count:
         raise reading.refusal(
-            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {quantity_text(duration, 's')}, it fits {count:.6g} times"
+            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {shown_text(duration, 's')}, it fits {count:.6g} times"
         )
     return output
 
 
 def _not_above(reading: DocumentReader, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
-        raise reading.refusal(path, f"must not be above {quantity_text(limit, 's')}, which {limit_path} gives")
+        raise reading.refusal(path, f"must not be above {shown_text(limit, 's')}, which {limit_path} gives")
 
 
 TimeTexts = Mapping[str, Mapping[str, Any]]

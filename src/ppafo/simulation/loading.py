@@ -57,7 +57,6 @@ from ppafo.simulation.declaration import (
     line_entries,
     line_quantities,
     quantities,
-    quantity_text,
     reference_settings,
     value_at,
 )
@@ -84,6 +83,7 @@ from ppafo.simulation.scenario import (
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.simulation.torque_loop import LEG_PATHS, PERIOD_PATH, loop_terms, seen_in_scenario
 from ppafo.units import format_quantity, split_quantity
+from ppafo.units.shown import shown_in, shown_text, written_text
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -125,58 +125,62 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     reading = DocumentReader(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    clock = read_clock(reading)
-    section = MOTIONS[kind_at(document, "motion")].section
-    assert section is not None, "walks are built from another layout"
-    before = DocumentReader(request.file, request.content)
-    run = RunSettings(
-        clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
-    )
-    motion = section.read(reading, device, clock.duration, clock.step, request.folder)
-    initial, links = _initial(reading, device.supply)
-    sensors = _sensors(reading, clock)
-    lines = read_supply_line(reading, device)
-    controlled = _controlled(reading)
-    reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
-    control, of_control = _control(reading, device, clock.period, sensors, lines, motion, reference)
-    purpose = (
-        "" if changes_reach(override.typed for override in request.overrides) else value_at(reading.document, PURPOSE)
-    )
-    scenario = Scenario(
-        name=document["name"],
-        description=document.get("description", ""),
-        device=device,
-        run=run,
-        motion=motion,
-        initial=initial,
-        controller=control,
-        reference=reference,
-        sensors=sensors,
-        assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
-        origin=origin_of(request, document, hardware.valve),
-        gas_model=read_gas_model(reading),
-        supply_line=lines,
-        links={**links, **of_reference, **of_control},
-        controlled=controlled,
-        beyond_reach=str(purpose or ""),
-    )
-    problem = reference_problem(scenario)
-    if problem:
-        raise ScenarioError(f"{request.file}: {problem}")
-    # Refuse what only a vane has.
-    try:
-        if lines is not None:
-            device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
-        law = CONTROLLERS[scenario.controller.kind]
-        if law.needs_reference and law.controls == (TORQUE,):
-            # These open the valve by their own idea of the device, where a command above 0 raises the torque.
-            able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
-            device.check_pressurised(f"the controller '{scenario.controller.kind}'", f"; take one of {able}")
-        if law.plan is not None:
-            scenario.device.check_torque_constant("a fixed-point controller")
-    except ParameterError as error:
-        raise _of_device(reading, error) from error
-    return scenario
+    # Refusals are in the units of the set.
+    with shown_in(device.shown):
+        clock = read_clock(reading)
+        section = MOTIONS[kind_at(document, "motion")].section
+        assert section is not None, "walks are built from another layout"
+        before = DocumentReader(request.file, request.content)
+        run = RunSettings(
+            clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
+        )
+        motion = section.read(reading, device, clock.duration, clock.step, request.folder)
+        initial, links = _initial(reading, device.supply)
+        sensors = _sensors(reading, clock)
+        lines = read_supply_line(reading, device)
+        controlled = _controlled(reading)
+        reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
+        control, of_control = _control(reading, device, clock.period, sensors, lines, motion, reference)
+        purpose = (
+            ""
+            if changes_reach(override.typed for override in request.overrides)
+            else value_at(reading.document, PURPOSE)
+        )
+        scenario = Scenario(
+            name=document["name"],
+            description=document.get("description", ""),
+            device=device,
+            run=run,
+            motion=motion,
+            initial=initial,
+            controller=control,
+            reference=reference,
+            sensors=sensors,
+            assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
+            origin=origin_of(request, document, hardware.valve),
+            gas_model=read_gas_model(reading),
+            supply_line=lines,
+            links={**links, **of_reference, **of_control},
+            controlled=controlled,
+            beyond_reach=str(purpose or ""),
+        )
+        problem = reference_problem(scenario)
+        if problem:
+            raise ScenarioError(f"{request.file}: {problem}")
+        # Refuse what only a vane has.
+        try:
+            if lines is not None:
+                device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
+            law = CONTROLLERS[scenario.controller.kind]
+            if law.needs_reference and law.controls == (TORQUE,):
+                # These open the valve by their own idea of the device, where a command above 0 raises the torque.
+                able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
+                device.check_pressurised(f"the controller '{scenario.controller.kind}'", f"; take one of {able}")
+            if law.plan is not None:
+                scenario.device.check_torque_constant("a fixed-point controller")
+        except ParameterError as error:
+            raise _of_device(reading, error) from error
+        return scenario
 
 
 def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
@@ -338,7 +342,7 @@ def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
-        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
         raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
     return Sensors(**values, seed=int(reading.number("sensors.seed", SEED)))
 
@@ -384,7 +388,7 @@ def _value(reading: DocumentReader, hardware: Hardware, path: str) -> str | None
         quantity = hardware.parameter_set.declarations().get(full)
     if quantity is not None and quantity.default is None and quantity.follows:
         return "what follows from the device"
-    return None if quantity is None or quantity.default is None else quantity_text(quantity.default, quantity.unit)
+    return None if quantity is None or quantity.default is None else written_text(quantity.default, quantity.unit)
 
 
 def read_gas_model(reading: DocumentReader) -> GasModel | None:
@@ -409,7 +413,7 @@ def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | No
     supply = device.supply
     if supply.dorsiflexion_pressure > supply.pressure:
         first, second = (
-            quantity_text(pressure, "Pa_a", supply.atmospheric_pressure)
+            shown_text(pressure, "Pa_a", atmosphere=supply.atmospheric_pressure)
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         raise ScenarioError(

@@ -90,7 +90,7 @@ def check_parts(scenario: Scenario) -> None:
         except ValueError:
             is_good = False
         if not is_good:
-            raise refusal(path, value, range_rule(quantity, limits_text(quantity)))
+            raise refusal(path, value, range_rule(quantity, limits_text(quantity, quantity.unit)))
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:

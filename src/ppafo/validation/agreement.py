@@ -20,7 +20,7 @@ from ppafo.simulation.recorded.clock import regular_interval
 from ppafo.simulation.recorded.replay import with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.scenario import Leg
-from ppafo.units import from_si
+from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import (
     ACCEPTABLE_FRACTION,
     ANGLE,
@@ -338,6 +338,7 @@ def _curves(
     return curves
 
 
+@in_units(lambda _, device, *__: device.shown)
 def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
     """Return what was taken otherwise than the set or the recording has it: the supply, the samples, the vane."""
     remarks = []
@@ -353,14 +354,16 @@ def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettin
         used = {"supply.pressure": device.supply.pressure}
         if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
-        atmosphere, unit = device.supply.atmospheric_pressure, device.shown.get("Pa_a", "psi_g")
-        shown = [f"{path} = {from_si(value, unit, 'Pa_a', atmosphere):.4g} {unit}" for path, value in used.items()]
+        atmosphere = device.supply.atmospheric_pressure
+        shown = [f"{path} = {shown_text(value, 'Pa_a', '.4g', atmosphere)}" for path, value in used.items()]
         verb = "was" if len(shown) == 1 else "were"
         remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:
         remarks.append("samples are not regular in time; changes of the command were moved to the nearest step")
     if settings.volume is not None:
-        remarks.append(f"chamber 1 was treated as a fixed volume of {settings.volume * 1e6:.4g} cm^3 without a vane")
+        remarks.append(
+            f"chamber 1 was treated as a fixed volume of {shown_text(settings.volume, 'm^3', '.4g')} without a vane"
+        )
     elif settings.motion == "locked":
         remarks.append("the vane was locked at its initial angle; the angle is not compared")
     if settings.motion == "measured":

@@ -23,7 +23,7 @@ from ppafo.simulation.recorded.usual_errors import (
     SensorErrors,
     usual_errors,
 )
-from ppafo.units import from_si
+from ppafo.units.shown import shown_in, shown_unit, shown_value
 from ppafo.validation.agreement import ReplaySettings, replay_of
 from ppafo.validation.change import SENSORS, CandidateCause, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
@@ -281,8 +281,8 @@ def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> Candida
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
     """Return the unit in which a difference of pressures is shown, and how many of it are 1 Pa."""
-    unit = device.shown.get("Pa_d", "kPa_d")
-    return unit.removesuffix("_d"), from_si(1.0, unit, "Pa_d")
+    with shown_in(device.shown):
+        return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
 def _numbered(path: str, value: float, factor: float) -> ModelChange:

@@ -74,7 +74,7 @@ def share_of_healthy_moment(values: Values) -> float:
 def walking_torque(values: Values) -> float:
     """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
     # As repr, so that the walk has this very number. Nothing is published of a limit of the torque.
-    overrides = (f"supply.pressure={float(values['pressure'])!r} Pa_a", "controller.largest_torque=100 N m")
+    overrides = (f"supply.pressure={float(values['pressure'])!r} SI", "controller.largest_torque=100 N m")
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
 

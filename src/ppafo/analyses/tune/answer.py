@@ -13,7 +13,6 @@ from ppafo.errors import count_of
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
-from ppafo.report.display_units import quantity_of_unit
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -23,7 +22,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage, without_exponent
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

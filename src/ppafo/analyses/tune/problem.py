@@ -30,7 +30,7 @@ from ppafo.studies.draws import (
 )
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.varying import VariedPath, in_its_unit, value_at, varied_path
+from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
@@ -300,7 +300,8 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError):
         varied = varied_path(gain.path, scenario)
-        varied = in_its_unit(varied, (gain.minimum, gain.maximum)) if atmosphere_varies else varied
+        ends = (gain.minimum, gain.maximum)
+        varied = given_in(in_its_unit(varied, ends) if atmosphere_varies else varied, ends)
         minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
         before = value_at(gain.path, scenario)
         if before is None:

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.parameters.device import Device
-from ppafo.report.display_units import display_value, quantity_of_unit
+from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
+from ppafo.units.shown import quantity_of_unit
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import RecordingAgreement, ReplaySettings
 from ppafo.validation.causes import Causes, ResidualCause

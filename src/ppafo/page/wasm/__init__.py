@@ -94,7 +94,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
-from ppafo.report.display_units import display_unit, quantity_of_unit
+from ppafo.report.display_units import display_unit
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import parameter_set_of
@@ -104,6 +104,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
 from ppafo.units import split_pressure_kind, to_si
+from ppafo.units.shown import quantity_of_unit
 from ppafo.version import __version__
 
 _KINDS = {VANE: "scenario", WALK: "walk"}

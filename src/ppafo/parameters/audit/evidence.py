@@ -17,6 +17,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.units import from_si
 from ppafo.units.definitions import DECIMALS
+from ppafo.units.shown import shown_in, shown_unit, shown_value
 
 Severity = Literal["error", "warning", "note"]
 
@@ -137,8 +138,8 @@ class Evidence:
 
     def torque(self, value: float, form: str = ".3g") -> str:
         """Return a torque [N m] as text in the unit in which the set writes torques, for example ``550 N cm``."""
-        unit = self.parameter_set.shown.get("N m", "N m")
-        number = f"{from_si(value, unit, 'N m'):{form}}"
+        with shown_in(self.parameter_set.shown):
+            number, unit = f"{shown_value(value, 'N m'):{form}}", shown_unit("N m")
         # A form that keeps zeros makes "550." of 550.
         return f"{number.removesuffix('.')} {unit}"
 

@@ -11,6 +11,7 @@ from ppafo.parameters.device import VANE, Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
+from ppafo.units.shown import shown_in, shown_unit
 
 # Do damping and dynamic friction agree with the inertia and the reported ratios they were computed from?
 
@@ -137,7 +138,8 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
     ceilings = {path: constant * abs(value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
     # Torque constants are quoted per psi in the field, or per bar where the set has bar.
-    unit = evidence.parameter_set.shown.get("Pa_d", "psi_d")
+    with shown_in(evidence.parameter_set.shown):
+        unit = shown_unit("Pa_d")
     per_unit = evidence.torque(constant * to_si(1.0, unit, "Pa_d"), "#.3g")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
     held = (f"{evidence.torque(ceilings[path], '#.3g')} at {pressures[path]} ({path})" for path in supplies)
@@ -218,7 +220,8 @@ _ABOVE = "A reference above that cannot be followed by any valve or controller."
 
 def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:
     static, demand = evidence.number(_STATIC), evidence.number(_DEMAND)
-    unit = evidence.parameter_set.shown.get("Pa_d", "kPa_d")
+    with shown_in(evidence.parameter_set.shown):
+        unit = shown_unit("Pa_d")
     if static is not None and static >= ceiling:
         needed = f"{from_si(static / constant, unit, 'Pa_d'):.4g} {unit}"
         return "error", f" Static friction of {evidence.torque(static)} is more: the vane cannot move below {needed}."

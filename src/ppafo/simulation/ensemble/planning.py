@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.model.catalog import ACTUATORS
@@ -18,13 +17,12 @@ from ppafo.parameters.building import actuator_problem, beyond_pressures, consis
 from ppafo.parameters.declaration import limits_text
 from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.declaration import limits, quantity_text
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.numbers import declared_numbers, with_numbers
-from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import shown_text
 
 # Numbers that name one of many: there is nothing between two of them.
 _WHOLE = ("sensors.seed", "wearer.person")
@@ -112,9 +110,7 @@ def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
             return f"{said}: is not a finite number"
         if path in _WHOLE and values[run] != np.floor(values[run]):
             return f"{said}: must be a whole number"
-        # In the words of the file that has the number: a parameter set's, or the scenario's.
-        allowed = limits_text(quantity) if is_of_device(path) else limits(quantity, STANDARD_ATMOSPHERE)
-        return f"{said}: {range_rule(quantity, allowed)}"
+        return f"{said}: {range_rule(quantity, limits_text(quantity, unit))}"
 
     above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
     is_good = np.isfinite(values) & above & (values <= quantity.maximum)
@@ -229,7 +225,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
 
     def line(run: int) -> str:
         first, second = (
-            quantity_text(at(pressure, run), "Pa_a", at(supply.atmospheric_pressure, run))
+            shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"

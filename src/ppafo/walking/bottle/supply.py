@@ -13,9 +13,10 @@ from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_d
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
-from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, DocumentReader, kind_at, quantity_text, value_at
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, DocumentReader, kind_at, value_at
 from ppafo.simulation.scenario import SupplyLine
 from ppafo.units import format_quantity, to_si
+from ppafo.units.shown import shown_text
 
 BOTTLE = "bottle"
 BOTTLE_NAME = f"{BOTTLE}.name"
@@ -144,8 +145,8 @@ def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> Bottle
         room = device.supply.atmospheric_pressure
         raise ScenarioError(
             f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
-            f"{quantity_text(own_pressure, 'Pa_a', room)}, and supply.pressure is "
-            f"{quantity_text(pressure, 'Pa_a', room)}: give both the same"
+            f"{shown_text(own_pressure, 'Pa_a', atmosphere=room)}, and supply.pressure is "
+            f"{shown_text(pressure, 'Pa_a', atmosphere=room)}: give both the same"
         )
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
@@ -214,8 +215,8 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
         )
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
-        has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
-        needs = quantity_text(
-            regulator.set_pressure + regulator.pressure_margin, "Pa_a", device.supply.atmospheric_pressure
+        has, needs = (
+            shown_text(each, "Pa_a", atmosphere=device.supply.atmospheric_pressure)
+            for each in (pressure, regulator.set_pressure + regulator.pressure_margin)
         )
         raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, and its regulator needs {needs}")

@@ -129,7 +129,7 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
             for path, entry in scaled_entries(part, paper.entries).items()
             if entry != paper.entries.get(path)
         ]
-        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} Pa_a"])
+        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} SI"])
         try:
             ended = follow_bottle(full, draw_of_numbers(gas, period, None), schedule).discharge.ending.kind
         except ParameterError:

@@ -36,8 +36,9 @@ _HEAD = (
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
     "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
-    "reaches the torque with the toes above the ground walk on bottles, lightest first, until one lasts; that walk is "
-    "shown. Dead volumes, friction and sensors are the walk's; dorsiflexion has nine tenths of the gauge pressure.",
+    "reaches the torque (95 % of it at least) with the toes above the ground walk on bottles, lightest first, until "
+    "one lasts; that walk is shown. Dead volumes, friction and sensors are the walk's; dorsiflexion has nine tenths of "
+    "the gauge pressure.",
     "Power of the valve is what its coils, or its spool in proportion to the stroke, take over the walk; drivers lose "
     "nothing. A shut-off valve is open as long as the device helps.",
 )

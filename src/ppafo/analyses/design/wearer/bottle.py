@@ -14,8 +14,6 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk
 
-_KEPT = 0.9
-"""Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _ALLOWANCE = 1.15
 """Gas that a pair may need over what another got out of a bottle, to be tried on it as well."""
 
@@ -74,8 +72,8 @@ def lasting_flow(pair: WalkedDevice, lasted: float, seconds: float) -> float:
 
 
 def keeps(walked: WalkResult, wish: Wish) -> bool:
-    """Return whether the mean stride of a walk on a bottle has most of the torque, and the clearance."""
+    """Return whether the mean stride of a walk on a bottle reaches the torque, and has the clearance."""
     if not walked.averages or walked.tracking:
         return False
-    torque = walked.averages["torque"].mean.max()
-    return bool(torque >= _KEPT * wish.torque and walked.metrics["lowest_toes"].value >= wish.clearance)
+    is_reached = wish.is_reached_by(float(walked.averages["torque"].mean.max()))
+    return bool(is_reached and walked.metrics["lowest_toes"].value >= wish.clearance)

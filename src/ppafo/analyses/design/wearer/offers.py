@@ -45,11 +45,11 @@ def offers_instead(wish: Wish, tried: Sequence[WalkedDevice], shelf: Shelf, repo
     able = sorted((at for at in candidates if at.pair.has(wish)), key=lambda at: at.pair.flow)
     # A device whose toes drag is no offer.
     weak = sorted(
-        (at for at in candidates if at.pair.toes >= wish.clearance and at.pair.torque < wish.torque),
+        (at for at in candidates if at.pair.toes >= wish.clearance and not wish.is_reached_by(at.pair.torque)),
         key=lambda at: -at.pair.torque,
     )
     low = sorted(
-        (at for at in candidates if at.pair.torque >= wish.torque and 0.0 <= at.pair.toes < wish.clearance),
+        (at for at in candidates if wish.is_reached_by(at.pair.torque) and 0.0 <= at.pair.toes < wish.clearance),
         key=lambda at: -at.pair.toes,
     )
     report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
@@ -124,7 +124,7 @@ def _lasting(wish: Wish, weak: Sequence[_Candidate], bottle: Part, shelf: Shelf)
 def _offered(candidate: _Candidate, bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
     lesser, pair = candidate
-    if pair.torque < lesser.torque:
+    if not lesser.is_reached_by(pair.torque):
         lesser = replace(lesser, torque=math.floor(_SHOWN_TORQUE * pair.torque) / _SHOWN_TORQUE)
     if pair.toes < lesser.clearance:
         lesser = replace(lesser, toes=shown_clearance(pair.toes))

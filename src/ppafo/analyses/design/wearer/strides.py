@@ -11,6 +11,7 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Part
+from ppafo.units.shown import written_text
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import walk
@@ -54,7 +55,8 @@ def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[WalkedDevice]:
             tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
             if tried is None:
                 break
-            if tried.has(wish):
+            # A request that has all of the torque goes before one that all but reaches it.
+            if tried.torque >= wish.torque and tried.has(wish):
                 return [tried]
             strides.append(tried)
             # Another lift gives no more torque.
@@ -74,10 +76,10 @@ def _common_overrides(wish: Wish, valve: Part, actuator: Part) -> tuple[str, ...
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(wish),
-        f"supply.pressure={wish.pressure:.7g} Pa_a",
-        f"supply.dorsiflexion_pressure={dorsiflexion:.7g} Pa_a",
-        *(f"{path}={number:.6g} {units[path.partition('.')[2]]}".strip() for path, number in numbers.items()),
-        f"shut_off.area={SHUT_OFF_PARTS['area']:g} m^2",
+        f"supply.pressure={written_text(wish.pressure, 'Pa_a')}",
+        f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
+        *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
+        f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
     )
 
 
