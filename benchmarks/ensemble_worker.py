@@ -17,7 +17,7 @@ from benchmarks.task import ensemble
 from benchmarks.timing import time_in_turn
 from ppafo.engine.lanes import Batch, Floats, run_batch
 from ppafo.metrics import gas, switching, tracking
-from ppafo.simulation.ensemble.running import Outcome, Request
+from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,12 +63,12 @@ def work(order: Order) -> dict[str, tuple[float, ...]]:
 def metrics_of(batch: Batch, threads: int) -> Callable[[], dict[str, Floats]]:
     """A function that runs the batch with every metric of tracking, gas and switching, sampled at every step."""
     kinds = {kind.name: kind for kind in (*tracking.METRICS, *gas.METRICS, *switching.METRICS)}
-    request = Request(kinds, (), 0.0, np.empty(0))
+    request = OutputRequest(kinds, (), 0.0, np.empty(0))
     sampled = replace(batch, clock=replace(batch.clock, record_every=1))
     runs = batch.states.shape[1]
 
     def run() -> dict[str, Floats]:
-        outcome = Outcome(runs, request)
+        outcome = MeteredRuns(runs, request)
         outcome.run_all([(np.arange(runs), sampled)], threads)
         return outcome.metrics
 

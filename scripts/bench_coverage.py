@@ -25,8 +25,8 @@ if not __package__:
 
 from ppafo.errors import PpafoError
 from ppafo.identification.estimate import Estimate
-from ppafo.identification.problem import PROCEDURES, Setting, parse_problem, run_procedure
-from ppafo.identification.source import Source
+from ppafo.identification.problem import PROCEDURES, ProcedureContext, parse_problem, run_procedure
+from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_parameter_set
 from ppafo.rig import record
 from ppafo.signals import Recording
@@ -102,10 +102,10 @@ def identified(experiment: str, preset: str, seed: int, noise: str = "") -> Iden
     made = record(experiment, preset, seed, DEVICE)
     text = f'{HEAD}[[procedure]]\nkind = "{kind}"\nrecordings = ["made.csv"]\n{EXTRA.get(experiment, "")}'
     problem = parse_problem(text.encode(), "bench").procedure[0]
-    setting = Setting(load_parameter_set(DEVICE), "proportional", experiment)
+    setting = ProcedureContext(load_parameter_set(DEVICE), "proportional", experiment)
     try:
         found, refused = (
-            run_procedure((Source(with_noise(made.recording, noise, seed)),), problem, setting).estimates,
+            run_procedure((RecordingSource(with_noise(made.recording, noise, seed)),), problem, setting).estimates,
             "",
         )
     except PpafoError as error:

@@ -12,7 +12,7 @@ import argparse
 
 from ppafo.analyses.reproduce.decision_phases import phased_runs
 from ppafo.analyses.reproduce.solve import torque_task_claims, torque_task_observations
-from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
+from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.simulate import simulate
 
@@ -27,7 +27,7 @@ def row(dead: float, displacement: float | None) -> str:
     names = ("step-response", "torque-task-solenoid", "torque-task-proportional")
     step, solenoid, proportional = (simulate(load_scenario(name, overrides)) for name in names)
     supply = step.scenario.device.supply
-    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     told = step_observations(step.recording, levels, step_events(step.recording))
     swings = torque_task_observations(solenoid, proportional)
     claims = torque_task_claims(phased_runs(solenoid), proportional, ())

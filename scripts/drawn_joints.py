@@ -13,7 +13,7 @@ import re
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -280,8 +280,8 @@ def printed_remedy(sentence: str) -> list[str]:
     return [] if found is None else [text.replace(" = ", "=", 1) for text in re.findall(r"`([^`]*)`", found[1])]
 
 
-def run_joints(seed: int, joints: int, log: Path) -> list[dict[str, Any]]:
-    """Run every task of the joints that a log (a JSON object a line, one for each run) has not; all its records.
+def run_joints(seed: int, joints: int, log: Path, kinds: Sequence[str] = KINDS) -> list[dict[str, Any]]:
+    """Run every task of the joints of some kinds that a log (a JSON object a line for each run) has not; all records.
 
     Each joint is drawn by itself, so that a count that was stopped goes on where it ended.
     """
@@ -290,6 +290,8 @@ def run_joints(seed: int, joints: int, log: Path) -> list[dict[str, Any]]:
     with tempfile.TemporaryDirectory() as folder, log.open("a", encoding="utf-8") as lines:
         for number in sorted(set(range(joints)) - known):
             draw, kind = random.Random(f"{seed}, joint {number}"), KINDS[number % len(KINDS)]
+            if kind not in kinds:
+                continue
             file = draw_joint(draw, kind, Path(folder), number)
             records = [
                 {"seed": seed, "joint": number, "kind": kind, "task": task.name, **_outcome(task)}

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.io import loadmat
 
 from ppafo.gait.document import gait_toml
-from ppafo.gait.gait import HARMONICS, KNEE, Curve, FitError, Gait, fit_curve
+from ppafo.gait.gait import HARMONICS, KNEE, FitError, Gait, GaitCurve, fit_curve
 from ppafo.gait.recorded.walk import knee_position
 
 DIGITS = 5
@@ -56,10 +56,10 @@ def table(path: Path) -> dict[str, np.ndarray]:
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
-def round_curve(curve: Curve) -> Curve:
+def round_curve(curve: GaitCurve) -> GaitCurve:
     """Return the curve with as many digits as the fit deserves; what it still does not carry is left out."""
     cosines, sines = (tuple(round(value, DIGITS) for value in values) for values in (curve.cosines, curve.sines))
-    return Curve(round(curve.mean, DIGITS), cosines, sines, round(curve.deviation, DIGITS))
+    return GaitCurve(round(curve.mean, DIGITS), cosines, sines, round(curve.deviation, DIGITS))
 
 
 def knee_way(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -74,7 +74,7 @@ def knee_way(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return forward, up
 
 
-def fit_knee(path: Path, stride_time: float) -> dict[str, tuple[Curve, FitError]]:
+def fit_knee(path: Path, stride_time: float) -> dict[str, tuple[GaitCurve, FitError]]:
     """Return both accelerations of the knee by name, and what the series leave of its way [m]."""
     found = {}
     for name, way in zip(KNEE, knee_way(path), strict=True):
@@ -83,7 +83,7 @@ def fit_knee(path: Path, stride_time: float) -> dict[str, tuple[Curve, FitError]
     return found
 
 
-def fit_stride(stride: Mapping[str, np.ndarray]) -> dict[str, tuple[Curve, FitError]]:
+def fit_stride(stride: Mapping[str, np.ndarray]) -> dict[str, tuple[GaitCurve, FitError]]:
     """Return curve and error of the fit by name, in the units of the table and the signs of the package."""
     found = {}
     for name, (column, sign, zero) in COLUMNS.items():
@@ -93,11 +93,11 @@ def fit_stride(stride: Mapping[str, np.ndarray]) -> dict[str, tuple[Curve, FitEr
     return found
 
 
-def in_si(name: str, curve: Curve) -> Curve:
+def in_si(name: str, curve: GaitCurve) -> GaitCurve:
     """Return the curve with angles in radians."""
     factor = np.pi / 180.0 if name in ANGLES else 1.0
     cosines, sines = (tuple(float(factor * value) for value in values) for values in (curve.cosines, curve.sines))
-    return Curve(float(factor * curve.mean), cosines, sines, float(factor * curve.deviation))
+    return GaitCurve(float(factor * curve.mean), cosines, sines, float(factor * curve.deviation))
 
 
 def built_in_gait(folder: Path) -> Gait:

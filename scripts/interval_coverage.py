@@ -25,7 +25,7 @@ if not __package__:
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.identification.trajectory import (
-    Experiment,
+    FittedExperiment,
     FreeParameter,
     Tolerances,
     TrajectoryFit,
@@ -154,7 +154,7 @@ def problem_of(recordings: Sequence[Recording], random: np.random.Generator, sta
     """
     labels = ("there", "back")
     experiments = tuple(
-        Experiment(label, scenario, recording)
+        FittedExperiment(label, scenario, recording)
         for label, scenario, recording in zip(labels, scenarios(), recordings, strict=True)
     )
     sought = tuple(

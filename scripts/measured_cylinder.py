@@ -25,7 +25,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from ppafo.errors import PpafoError
-from ppafo.identification.problem import Setting, load_problem, run_procedure
+from ppafo.identification.problem import ProcedureContext, load_problem, run_procedure
 from ppafo.identification.source import source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.model.orifice import isentropic_flow_function
@@ -151,7 +151,9 @@ def is_line(files: list[Path]) -> bool:
     """Return whether `ppafo identify cylinder.toml` finds friction linear in pressure in these recordings."""
     problem = load_problem(EXAMPLE / "cylinder.toml")
     sources = tuple(source_of(file, read_foreign(file, problem.columns["rig"])) for file in files)
-    setting = Setting(load_parameter_set(problem.device.set), "", "cylinder.toml", tolerances_of(problem.bench, ""))
+    setting = ProcedureContext(
+        load_parameter_set(problem.device.set), "", "cylinder.toml", tolerances_of(problem.bench, "")
+    )
     return all(one.is_identified for one in run_procedure(sources, problem.procedure[0], setting).estimates)
 
 

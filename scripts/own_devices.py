@@ -27,7 +27,7 @@ from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
-from scripts.drawn_joints import angle_text, counts_of, run_joints, table_text
+from scripts.drawn_joints import KINDS, angle_text, counts_of, run_joints, table_text
 
 LAWS = (
     "event_on_off_dead_zone",
@@ -139,9 +139,11 @@ def main(words: Sequence[str] | None = None) -> int:
         "--joints", type=int, default=0, help="joints of a bench in place of walks: are verdicts right?"
     )
     parser.add_argument("--log", type=Path, default=None, help="records of the joints that were run")
+    parser.add_argument("--kinds", default=",".join(KINDS), help="kinds of joints that are run, with commas between")
     given = parser.parse_args(words)
     if given.joints:
-        records = run_joints(given.seed, given.joints, given.log or Path(f"joints-{given.seed}.jsonl"))
+        log = given.log or Path(f"joints-{given.seed}.jsonl")
+        records = run_joints(given.seed, given.joints, log, given.kinds.split(","))
         counts = counts_of(records)
         print(table_text(counts), angle_text(records), sep="\n\n")
         return 1 if any(row["good said"] or row["fails silent"] for row in counts.values()) else 0

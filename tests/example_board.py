@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
-from ppafo.exports.hil.wire import Answer, Reader, Sample, sample_bytes
+from ppafo.exports.hil.wire import Answer, Reader, WireSample, sample_bytes
 from ppafo.processor.link import example_controller
 from ppafo.simulation.loading import load_scenario
 from tests.virtual_wire import free_port
@@ -57,7 +57,7 @@ class Plug:
         """The answer to a sample of a plant whose samples are some time [us] apart, or which has a stamp of its own."""
         shown = 150_000 + 700 * sequence * sequence if pressure is None else pressure
         counts = dict(zip(SENT, (1_000_000, 0, shown, 150_000, 0), strict=True))
-        self.send(sample_bytes(Sample(flags, run, sequence, apart * sequence if stamp is None else stamp, counts)))
+        self.send(sample_bytes(WireSample(flags, run, sequence, apart * sequence if stamp is None else stamp, counts)))
         (answer,) = Reader(is_stream=False).take(self.own.recv(256))
         assert isinstance(answer, Answer)
         assert (answer.run, answer.sequence) == (run, sequence)

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
-from ppafo.exports.hil.wire import BEGIN, OVER, VENTED, Answer, Reader, Sample, answer_bytes, sample_bytes, value_of
+from ppafo.exports.hil.wire import BEGIN, OVER, VENTED, Answer, Reader, WireSample, answer_bytes, sample_bytes, value_of
 
 Fault = Callable[[random.Random, float, bytes], list[tuple[float, bytes]]]
 """What becomes of a packet that would arrive at a time [s]: packets with their times."""
@@ -27,11 +27,11 @@ class ProportionalPartner:
     silent_from: int | None = None
     begun: int = 0
     commands: dict[int, int] = field(default_factory=dict)
-    seen: list[Sample] = field(default_factory=list)
+    seen: list[WireSample] = field(default_factory=list)
 
     def answers(self, data: bytes) -> list[bytes]:
         (sample,) = Reader(is_stream=False).take(data)
-        assert isinstance(sample, Sample)
+        assert isinstance(sample, WireSample)
         self.seen.append(sample)
         if sample.flags & BEGIN:
             self.begun += 1
@@ -142,7 +142,7 @@ def sending_bench(port: int, after: float = 0.0) -> Iterator[None]:
             stop.wait(after)
             while not stop.wait(0.01):
                 for number in range(5):
-                    sample = Sample(OVER * (number == 4), 1, number, 1000 * number, {"angle": number, "command": 5})
+                    sample = WireSample(OVER * (number == 4), 1, number, 1000 * number, {"angle": number, "command": 5})
                     bench.sendto(sample_bytes(sample), ("127.0.0.1", port))
 
     thread = threading.Thread(target=send)

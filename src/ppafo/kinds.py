@@ -200,12 +200,12 @@ def _entry_points(group: str, _path: tuple[str, ...]) -> tuple["EntryPoint", ...
 
     # The path is part of the key, as it may grow while the program runs. What lies in the working folder is no package
     # that somebody installed, but a file of whoever made the folder.
-    found = [point for point in entry_points(group=group) if not _is_beside(point)]
+    found = [
+        point
+        for point in entry_points(group=group)
+        if not (point.dist is not None and is_working_folder(str(point.dist.locate_file(""))))
+    ]
     return tuple(sorted(found, key=lambda point: (point.name, point.value)))
-
-
-def _is_beside(point: "EntryPoint") -> bool:
-    return point.dist is not None and is_working_folder(str(point.dist.locate_file("")))
 
 
 def _package(point: "EntryPoint") -> str:

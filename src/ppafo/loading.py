@@ -3,7 +3,6 @@
 The code of walks, which is much, is loaded only where one is asked for.
 """
 
-import json
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -148,7 +147,20 @@ def json_schema() -> dict[str, Any]:
     parts: dict[str, Any] = {}
     for name, form in forms.items():
         # Both have definitions of the same names: each gets the name of its form before it.
-        own = json.loads(json.dumps(form).replace('"#/$defs/', f'"#/$defs/{name}.'))
+        own = _with_references(form, f"{_DEFINITIONS}{name}.")
         inner = own.pop("$defs")
         parts |= {name: own} | {f"{name}.{part}": described for part, described in inner.items()}
     return {"title": "ppafo scenario", "anyOf": [{"$ref": f"#/$defs/{name}"} for name in forms], "$defs": parts}
+
+
+_DEFINITIONS = "#/$defs/"
+
+
+def _with_references(node: Any, to: str) -> Any:
+    """Copy of a part of a JSON Schema, whose references to definitions begin with ``to``."""
+    if isinstance(node, dict):
+        return {key: _with_references(value, to) for key, value in node.items()}
+    if isinstance(node, list):
+        return [_with_references(value, to) for value in node]
+    is_reference = isinstance(node, str) and node.startswith(_DEFINITIONS)
+    return f"{to}{node.removeprefix(_DEFINITIONS)}" if is_reference else node

@@ -87,7 +87,9 @@ def test_a_unit_has_the_load_with_the_bits_of_python(tmp_path: Path) -> None:
 
 def test_a_load_that_is_too_stiff_for_the_steps_of_a_walk_is_refused_with_a_step_that_does() -> None:
     stiff = FAN.replace("0.05", "10")
-    remedy = r"effects\.fan: the load changes too much in a step of 0\.001 s, .*: give run\.step = 0\.18 ms or less"
+    remedy = (
+        r"effects\.fan: a drag of .* N m s/rad at 5 rad/s needs steps of at most .* ms, .*: set run\.step = 0\.18 ms"
+    )
     with pytest.raises(ScenarioError, match=remedy):
         plan_walk(load_walk("solenoid", (stiff,)))
     assert plan_walk(load_walk("solenoid", (stiff, "run.step=0.18 ms"))).step < 0.181e-3

@@ -267,6 +267,19 @@ def test_the_page_on_architecture_lists_every_room_and_no_other() -> None:
     assert listed == packages | modules
 
 
+def test_the_page_on_architecture_answers_where_ten_things_are() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    answers = text.partition("## Where do I find ...?")[2].partition("\n## ")[0].strip().splitlines()[2:]
+    assert len(answers) >= 10
+    for answer in answers:
+        files = re.findall(r"`([\w/]+\.py)`(?: \(`(\w+)`\))?", answer.rpartition(" | ")[2])
+        assert files, answer
+        for file, name in files:
+            tree = ast.parse((SOURCE / file).read_text(encoding="utf-8"))
+            defined = {node.name for node in tree.body if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+            assert not name or name in defined, f"{file}: {name}"
+
+
 def test_decisions_are_few_and_at_most_half_a_page() -> None:
     pages = sorted((ROOT / "docs" / "decisions").glob("0*.md"))
     words = {page.name: len(page.read_text(encoding="utf-8").split()) for page in pages}

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.cli.command_line import Group
+from ppafo.cli.command_line import CommandGroup
 from ppafo.cli.commands import COMMANDS
 
 ROOT = Path(__file__).parents[2]
@@ -36,5 +36,5 @@ def test_a_version_that_the_page_names_is_the_one_that_the_tests_have(said: str,
 
 def test_every_export_is_on_the_page() -> None:
     exports = COMMANDS["export"]
-    assert isinstance(exports, Group)
+    assert isinstance(exports, CommandGroup)
     assert [name for name in exports.actions if name != "figure" and f"ppafo export {name}" not in PAGE] == []

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import ppafo
-from ppafo.cli.command_line import Group
+from ppafo.cli.command_line import CommandGroup
 from ppafo.cli.commands import COMMANDS
 
 LONGEST = 6
@@ -22,7 +22,7 @@ def functions() -> Iterator[tuple[str, Callable[..., Any]]]:
     """Each function by the name of its command, or else by its public name."""
     seen = set()
     for name, entry in COMMANDS.items():
-        if isinstance(entry, Group):
+        if isinstance(entry, CommandGroup):
             commands = {f"{name} {action}": command for action, command in entry.actions.items()}
         else:
             commands = {name: entry}

@@ -94,7 +94,8 @@ def test_a_wrong_setting_is_one_line(capsys: pytest.CaptureFixture[str]) -> None
     for text, said in (
         (
             f"{AREA}=-1 mm^2",
-            "effects.mesh.area = -1 mm^2: must be at least 0 and at most 0.01 m^2 (open area of the mesh, 0 for none)",
+            "effects.mesh.area = -1 mm^2: must be at least 0 mm^2 and at most 10000 mm^2 (open area of the mesh, 0 for "
+            "none)",
         ),
         ("effects.mesh.aera=1 mm^2", "did you mean 'effects.mesh.area'?"),
         ("effects.mash.area=1 mm^2", "did you mean 'effects.mesh.area'?"),

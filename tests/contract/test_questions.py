@@ -19,7 +19,7 @@ from ppafo.analyses.find.solve import DEFAULT_GRID
 from ppafo.analyses.linearise.solve import EQUILIBRIUM
 from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
-from ppafo.cli.command_line import Command, Group, option_of, parameters_of
+from ppafo.cli.command_line import Command, CommandGroup, option_of, parameters_of
 from ppafo.cli.commands import COMMANDS, OTHERS
 from ppafo.cli.main import build_parser, main
 from ppafo.exports.hil.wire import DEFAULT_BAUD, RATE
@@ -29,7 +29,7 @@ from tests.page_code import block_with, write_package
 VERBS: dict[str, Command] = {
     f"{name} {action}".strip(): command
     for name, one in COMMANDS.items()
-    for action, command in (one.actions if isinstance(one, Group) else {"": one}).items()
+    for action, command in (one.actions if isinstance(one, CommandGroup) else {"": one}).items()
 }
 QUESTIONS = (
     "bottle",

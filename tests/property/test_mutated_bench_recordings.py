@@ -16,7 +16,7 @@ from ppafo.identification.bench import (
     vane_leak,
 )
 from ppafo.identification.bench.flow import GasAt
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.storage import read_csv
 from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.foreign import read_foreign
@@ -79,11 +79,11 @@ def table(kind: str) -> str:
 TABLES = {kind: table(kind) for kind in RUNS}
 
 
-def read(path: Path, kind: str, through_map: bool) -> Source:
+def read(path: Path, kind: str, through_map: bool) -> RecordingSource:
     if not through_map:
-        return Source(read_csv(path))
+        return RecordingSource(read_csv(path))
     channels = {name: {"column": number, "unit": unit} for number, (name, unit) in enumerate(UNITS[kind].items(), 1)}
-    return Source(read_foreign(path, ColumnMap.model_validate({"channels": channels})))
+    return RecordingSource(read_foreign(path, ColumnMap.model_validate({"channels": channels})))
 
 
 @pytest.mark.parametrize("kind", RUNS)

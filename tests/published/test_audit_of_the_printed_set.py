@@ -3,12 +3,12 @@
 import pytest
 
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import Finding, audit
+from ppafo.parameters.audit import AuditFinding, audit
 
 FOUND = {finding.id: finding for finding in audit(load_parameter_set("ppafo2011-printed"))}
 
 
-def side(finding: Finding, label: str) -> float:
+def side(finding: AuditFinding, label: str) -> float:
     return next(side.value for side in finding.sides if side.label == label)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import ppafo
-from ppafo.cli.command_line import Group
+from ppafo.cli.command_line import CommandGroup
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
 
@@ -30,7 +30,7 @@ def test_a_printed_answer_is_what_its_command_prints(capsys: pytest.CaptureFixtu
 
 def test_every_analysis_returns_a_finding_which_prints_saves_and_draws_itself() -> None:
     commands = [
-        each for one in COMMANDS.values() for each in (one.actions.values() if isinstance(one, Group) else [one])
+        each for one in COMMANDS.values() for each in (one.actions.values() if isinstance(one, CommandGroup) else [one])
     ]
     own = [command.function() for command in commands]
     words = ((one.__name__, one.__annotations__["return"]) for one in own)

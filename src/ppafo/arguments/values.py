@@ -30,7 +30,7 @@ class NotLoaded:
         return cls
 
 
-class _Names(dict[str, Any]):
+class _AnnotationNames(dict[str, Any]):
     """The names of an annotation: those of its module, of Python, and classes that are not loaded."""
 
     def __contains__(self, name: object) -> bool:
@@ -55,7 +55,7 @@ def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.P
 
 def _annotations(function: Callable[..., Any]) -> Mapping[str, Any]:
     """Return the annotations of a function by name; a class that is not loaded is a ``NotLoaded``."""
-    names = _Names(vars(sys.modules[function.__module__]))
+    names = _AnnotationNames(vars(sys.modules[function.__module__]))
     return typing.get_type_hints(function, localns=names, include_extras=True)
 
 

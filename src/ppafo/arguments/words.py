@@ -14,7 +14,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from ppafo.errors import ArgumentError, UnitError, one_line
-from ppafo.units import SI, number_text, parse_quantity
+from ppafo.units import SI, number_text, parse_quantity, split_number
+from ppafo.units.shown import pressure_units
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _EXAMPLES = {
@@ -30,6 +31,8 @@ _EXAMPLES = {
     "rad": ("an angle", ("deg", "rad")),
 }
 """Description of each quantity, and units in which people write it."""
+_SHOWN_AGAIN = ("Pa_a", "N m", "kg/s", "m^3")
+"""Quantities that differ from laboratory to laboratory, which people are shown in the unit that they gave."""
 _MAXIMUM_DIGITS, _ABOVE_ALL, _MAXIMUM_LEVELS = 40, 10**40, 60
 """A seed of 128 bits has 39; Python refuses thousands of them by an error of its own."""
 
@@ -99,7 +102,7 @@ def fraction(text: str) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
+class NumberRange:
     """Numbers from ``lowest`` or ``above`` to ``highest``, in a unit."""
 
     lowest: float = -math.inf
@@ -121,12 +124,34 @@ class Range:
         return ", ".join(end for end, is_there in ends if is_there)
 
 
-ANY = Range()
-ABOVE_ZERO = Range(above=0.0)
-FROM_ZERO = Range(lowest=0.0)
+ANY = NumberRange()
+ABOVE_ZERO = NumberRange(above=0.0)
+FROM_ZERO = NumberRange(lowest=0.0)
 
 
-def quantity(si_unit: str, allowed: Range = ANY) -> Callable[[str], float]:
+class Given(float):
+    """A number in SI with the unit in which it was given, in which people are shown it again."""
+
+    __slots__ = ("unit",)
+    unit: str
+
+    def __new__(cls, value: float, unit: str) -> "Given":
+        """Return the number with its unit."""
+        given = super().__new__(cls, value)
+        given.unit = unit
+        return given
+
+
+def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
+    """Return the units of the numbers that came with one, by unit in SI; a pressure brings that of differences."""
+    units: dict[str, str] = {}
+    for si_unit, value in by_si_unit.items():
+        if isinstance(value, Given) and value.unit != SI:
+            units |= pressure_units(value.unit) if si_unit == "Pa_a" else {si_unit: value.unit}
+    return units
+
+
+def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]:
     """Return what turns a text with a unit, such as ``10 min``, into a number in SI; ArgumentError for others.
 
     A number alone is refused with examples, and one outside the range.
@@ -145,7 +170,7 @@ def quantity(si_unit: str, allowed: Range = ANY) -> Callable[[str], float]:
             raise ArgumentError(f"{text}: {error}") from error
         if value not in allowed:
             raise ArgumentError(f"{text}: must be {allowed.words(si_unit)}")
-        return value
+        return Given(value, split_number(text)[1]) if si_unit in _SHOWN_AGAIN else value
 
     return value_of
 
@@ -213,7 +238,7 @@ def _single(value: Any) -> Any:
 
     A time of NumPy would count as a whole number otherwise, and a masked value as the one that it hides.
     """
-    if getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
+    if type(value) is float or getattr(value, "ndim", None) != 0 or not hasattr(value, "item"):
         return value
     is_hidden = bool(getattr(value, "mask", False))
     return None if is_hidden or getattr(value.dtype, "kind", "") in "mM" else value.item()
@@ -239,7 +264,7 @@ def taken_whole(least: int) -> Callable[[Any], int]:
     return take
 
 
-def taken_number(allowed: Range = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
+def taken_number(allowed: NumberRange = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
     """Return what takes a finite number in a range, also of NumPy, or a text that ``read`` reads."""
 
     def take(value: Any) -> float:
@@ -250,7 +275,7 @@ def taken_number(allowed: Range = ANY, read: Callable[[str], float] | None = Non
             raise ValueError
         if float(given) not in allowed:
             raise ValueError
-        return float(given)
+        return given if isinstance(given, Given) else float(given)
 
     return take
 
@@ -347,7 +372,7 @@ def taken_point(value: Any) -> float | str:
     return taken_number()(value)
 
 
-def _quantity_word(metavar: str, si_unit: str, allowed: Range = ANY) -> Word:
+def _quantity_word(metavar: str, si_unit: str, allowed: NumberRange = ANY) -> Word:
     """Return the word of a quantity: a text with its unit, and in Python a number in SI as well."""
     read = quantity(si_unit, allowed)
     shown = {"Pa_a": "Pa (absolute)"}.get(si_unit, si_unit)
@@ -375,7 +400,7 @@ def fraction_word(help_text: str = "") -> Word:
     return Word(
         "FRACTION",
         fraction,
-        taken_number(Range(0.0, highest=1.0), fraction),
+        taken_number(NumberRange(0.0, highest=1.0), fraction),
         "a number from 0 to 1, or a percentage such as '95%'",
         help=help_text,
     )
@@ -395,7 +420,7 @@ Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
 Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
 Time = Annotated[float, _quantity_word("TIME", "s")]
 Duration = Annotated[float, _quantity_word("TIME", "s", FROM_ZERO)]
-Patience = Annotated[float, _quantity_word("TIME", "s", Range(above=0.0, highest=3600.0))]
+Patience = Annotated[float, _quantity_word("TIME", "s", NumberRange(above=0.0, highest=3600.0))]
 Torque = Annotated[float, _quantity_word("TORQUE", "N m", ABOVE_ZERO)]
 Pressure = Annotated[float, _quantity_word("PRESSURE", "Pa_a", ABOVE_ZERO)]
 Flow = Annotated[float, _quantity_word("FLOW", "kg/s", ABOVE_ZERO)]

@@ -84,7 +84,7 @@ class Command:
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class CommandGroup:
     """Commands that share their first word, as ``sets audit`` and ``sets show`` do."""
 
     summary: str
@@ -103,7 +103,7 @@ _PARAMETER = re.compile(r"(\w+): (.*)")
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class OptionType:
     """Option type: how an annotation turns the text of a parameter into its value."""
 
     word: Word
@@ -112,25 +112,7 @@ class Reading:
     choices: tuple[str, ...] | None = None
 
 
-def _help_by_parameter(verb: Verb, names: Sequence[str]) -> dict[str, str]:
-    """Return the lines ``name: help`` of the docstring; more indented lines go on with them."""
-    found: dict[str, str] = {}
-    latest, depth = "", 0
-    for line in (inspect.getdoc(verb) or "").splitlines():
-        indent = len(line) - len(line.lstrip())
-        # Only names of parameters: a sentence of the docstring may have a colon too.
-        begun = _PARAMETER.fullmatch(line.strip())
-        if latest and indent > depth:
-            found[latest] += f" {line.strip()}"
-        elif begun is not None and begun[1] in names:
-            latest, depth = begun[1], indent
-            found[latest] = begun[2]
-        else:
-            latest = ""
-    return found
-
-
-def reading_of(annotation: Any) -> Reading:
+def reading_of(annotation: Any) -> OptionType:
     """Return how the text of a parameter with an annotation is read."""
     word, is_repeated = None, False
     while True:
@@ -144,14 +126,14 @@ def reading_of(annotation: Any) -> Reading:
         elif isinstance(origin, type) and issubclass(origin, Iterable):
             is_repeated, annotation = True, inner[0]
         elif origin is typing.Literal:
-            return Reading(word or Word("|".join(inner)), choices=inner)
+            return OptionType(word or Word("|".join(inner)), choices=inner)
         else:
             is_flag = annotation is bool
             word = word or _PLAIN.get(annotation, Word("TEXT"))
-            return Reading(word, is_flag, is_repeated or word.is_repeated)
+            return OptionType(word, is_flag, is_repeated or word.is_repeated)
 
 
-def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, Reading]]:
+def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, OptionType]]:
     """Return each parameter that words of the line fill, with how its text is read."""
     for name, parameter in annotated_parameters(verb).items():
         if name not in (PROGRESS, PLUGINS):
@@ -170,7 +152,7 @@ def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return reader
 
 
-def option_of(parameter: inspect.Parameter, reading: Reading) -> str:
+def option_of(parameter: inspect.Parameter, reading: OptionType) -> str:
     """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
         return reading.word.option
@@ -185,7 +167,19 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
     verb = command.function()
     readings = list(parameters_of(verb))
     names = [parameter.name for parameter, _ in readings]
-    helps = _help_by_parameter(verb, names)
+    helps: dict[str, str] = {}
+    latest, depth = "", 0
+    for line in (inspect.getdoc(verb) or "").splitlines():
+        indent = len(line) - len(line.lstrip())
+        # Only names of parameters: a sentence of the docstring may have a colon too.
+        begun = _PARAMETER.fullmatch(line.strip())
+        if latest and indent > depth:
+            helps[latest] += f" {line.strip()}"
+        elif begun is not None and begun[1] in names:
+            latest, depth = begun[1], indent
+            helps[latest] = begun[2]
+        else:
+            latest = ""
     # argparse gives an optional word nothing where options stand between it and a repeated one.
     is_alone = sum(not option_of(parameter, reading) for parameter, reading in readings) == 1
     for parameter, reading in readings:
@@ -211,7 +205,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
 def _add_parameter(
     parser: argparse.ArgumentParser,
     parameter: inspect.Parameter,
-    reading: Reading,
+    reading: OptionType,
     help_text: str,
     may_be_missing: bool,
     is_listing: bool,
@@ -255,7 +249,20 @@ def _add_parameter(
 def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     """Call the verb of a command with what the line says, deliver what it returns, and return the exit code."""
     if command.lists and parsed.list:
-        return _list(command, parsed.json)
+        library: TomlKind | None = kind_at(command.library) if command.library else None
+        noun = command.listed or (library.noun if library is not None else "")
+        if command.listing:
+            listed: output.Said | list[dict[str, Any]] = kind_at(command.listing)()
+            listing = listed if isinstance(listed, output.Said) else output.listing(noun, listed)
+        else:
+            assert library is not None
+            files = {name: library.parse(library.read(name), name) for name in library.names()}
+            rows = [
+                {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
+                for name, file in files.items()
+            ]
+            listing = output.listing(noun, rows, ("name", list(rows[0])[-1]))
+        return output.deliver(listing, parsed.json, None, "")
     verb = command.function()
     parameters = inspect.signature(verb).parameters
     values = {name: getattr(parsed, name) for name in parameters if name not in (PROGRESS, PLUGINS)}
@@ -290,24 +297,6 @@ def _texts(values: Iterable[Any]) -> Iterator[str]:
             yield value
         elif isinstance(value, Iterable):
             yield from _texts(value)
-
-
-def _list(command: Command, as_json: bool) -> int:
-    """Print what comes with the package: names with their descriptions, all columns where these are more."""
-    library: TomlKind | None = kind_at(command.library) if command.library else None
-    noun = command.listed or (library.noun if library is not None else "")
-    if command.listing:
-        listed: output.Said | list[dict[str, Any]] = kind_at(command.listing)()
-        listing = listed if isinstance(listed, output.Said) else output.listing(noun, listed)
-    else:
-        assert library is not None
-        files = {name: library.parse(library.read(name), name) for name in library.names()}
-        rows = [
-            {"name": name} | {key: str(file[key]) for key in ("title", "description") if key in file}
-            for name, file in files.items()
-        ]
-        listing = output.listing(noun, rows, ("name", list(rows[0])[-1]))
-    return output.deliver(listing, as_json, None, "")
 
 
 _BAD_VALUE = re.compile(r"argument (?:--?\w+/)*(\S+): (?!invalid )(.+: .+)")

@@ -5,7 +5,7 @@ Commands of other packages are plain functions, found by entry points of the gro
 
 from types import FunctionType
 
-from ppafo.cli.command_line import Command, Group, UsageError
+from ppafo.cli.command_line import Command, CommandGroup, UsageError
 from ppafo.errors import nearest_name
 from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
@@ -21,7 +21,7 @@ def _of_scenario(verb: str, first_line: str = "") -> Command:
     return Command(verb, listing="ppafo.cli.simulate:list_descriptions", listed="scenario", first_line=first_line)
 
 
-_EVERY: dict[str, dict[str, Command | Group]] = {
+_EVERY: dict[str, dict[str, Command | CommandGroup]] = {
     "the paper": {
         "reproduce": Command(
             f"{_ANALYSES}.reproduce.question:reproduce",
@@ -34,7 +34,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         "new": Command("ppafo.cli.new:new", listing="ppafo.cli.new:list_kinds", listed="kind"),
         "simulate": _of_scenario("ppafo.cli.simulate:simulate"),
         "workbench": _of_scenario("ppafo.page.commands:workbench"),
-        "sets": Group(
+        "sets": CommandGroup(
             "list, show and audit parameter sets; list real parts",
             {
                 "list": Command(f"{_DEVICE}:sets_list"),
@@ -45,7 +45,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         ),
     },
     "from bench to model": {
-        "rig": Group(
+        "rig": CommandGroup(
             "record a bench, or synthetic data on the simulated test bench",
             {
                 "simulate": Command(f"{_BENCH}:rig_simulate", listing=f"{_BENCH}:list_rig", listed="experiment"),
@@ -101,7 +101,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         ),
     },
     "walk": {
-        "gait": Group(
+        "gait": CommandGroup(
             "list, show and import gaits",
             {
                 "list": Command(f"{_WALKING}:gait_list"),
@@ -119,7 +119,7 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
         ),
     },
     "tools": {
-        "export": Group(
+        "export": CommandGroup(
             "write a scenario or a walk for other tools: C, an FMU, OpenSim, firmware; figures of a result",
             {
                 "c": _of_scenario(f"{_EXPORTS}:export_c"),
@@ -137,20 +137,22 @@ _EVERY: dict[str, dict[str, Command | Group]] = {
 """Headings of the help, by what somebody has come for, and under each the commands, guests' too."""
 
 
-def _installed(one: Command | Group) -> Command | Group | None:
+def _installed(one: Command | CommandGroup) -> Command | CommandGroup | None:
     """Return a command, a group without the commands that are not there, or None where nothing is left."""
     if isinstance(one, Command):
         return one if is_installed(one.verb) else None
-    return Group(one.summary, {name: action for name, action in one.actions.items() if is_installed(action.verb)})
+    return CommandGroup(
+        one.summary, {name: action for name, action in one.actions.items() if is_installed(action.verb)}
+    )
 
 
-HEADINGS: dict[str, dict[str, Command | Group]] = {
+HEADINGS: dict[str, dict[str, Command | CommandGroup]] = {
     heading: {name: there for name, one in group.items() if (there := _installed(one)) is not None}
     for heading, group in _EVERY.items()
 }
 """The headings with the commands that are installed."""
 
-COMMANDS: dict[str, Command | Group] = {name: one for group in HEADINGS.values() for name, one in group.items()}
+COMMANDS: dict[str, Command | CommandGroup] = {name: one for group in HEADINGS.values() for name, one in group.items()}
 """The commands of this package by name."""
 
 OTHERS: Kinds[FunctionType] = Kinds("ppafo.commands", "command", FunctionType, {})
@@ -169,7 +171,12 @@ def check_words(words: list[str]) -> None:
     # Options alone, such as --version, are for the parser.
     if not given:
         return
-    _check_installed(given)
+    one = next((group[given[0]] for group in _EVERY.values() if given[0] in group), None)
+    shown = given[: 2 if isinstance(one, CommandGroup) else 1]
+    if isinstance(one, CommandGroup):
+        one = one.actions.get(shown[-1])
+    if one is not None and not is_installed(one.verb):
+        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(one.verb)}, which is not installed")
     word = given[0]
     name_modules_in(word)
     if word not in COMMANDS and word not in OTHERS:
@@ -177,7 +184,7 @@ def check_words(words: list[str]) -> None:
         raise UsageError(f"there is no command '{word}'{nearest_name(word, known)}; available: {', '.join(known)}")
     command = COMMANDS.get(word)
     # A group alone is a mistake, unless its help is asked for, which the parser prints.
-    if isinstance(command, Group) and "-h" not in words and "--help" not in words:
+    if isinstance(command, CommandGroup) and "-h" not in words and "--help" not in words:
         actions, action = list(command.actions), given[1] if len(given) > 1 else None
         if action is None and "--list" in words and "list" in actions:
             raise UsageError(f"{word}: there is no option '--list'; 'ppafo {word} list' shows what there is")
@@ -186,16 +193,6 @@ def check_words(words: list[str]) -> None:
         if action not in actions:
             hint = nearest_name(action, actions)
             raise UsageError(f"there is no 'ppafo {word} {action}'{hint}; available: {', '.join(actions)}")
-
-
-def _check_installed(given: list[str]) -> None:
-    """Refuse a command of a guest that is not there."""
-    one = next((group[given[0]] for group in _EVERY.values() if given[0] in group), None)
-    shown = given[: 2 if isinstance(one, Group) else 1]
-    if isinstance(one, Group):
-        one = one.actions.get(shown[-1])
-    if one is not None and not is_installed(one.verb):
-        raise UsageError(f"'ppafo {' '.join(shown)}' is part of {package_of(one.verb)}, which is not installed")
 
 
 def list_commands() -> str:

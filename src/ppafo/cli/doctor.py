@@ -35,17 +35,6 @@ JOINED: dict[str, str] = {"size": "design"}
 """Formats that are now part of another one."""
 
 
-def _schema_of(name: str) -> Said:
-    """Return the schema of a file format, which is JSON in any case."""
-    if name in JOINED:
-        raise DataError(f"the format '{name}' is now part of '{JOINED[name]}'; print that one")
-    if name not in FORMATS:
-        hint = nearest_name(name, FORMATS)
-        raise DataError(f"there is no file format '{name}'{hint}; available: {', '.join(FORMATS)}")
-    document = importlib.import_module(FORMATS[name]).json_schema()
-    return Said(json_text(document), document, f"{name}.schema")
-
-
 def doctor(
     *,
     warm: bool = False,
@@ -76,7 +65,13 @@ def doctor(
     if len(given) > 1:
         raise DataError(f"{given[1]}: not allowed with {given[0]}")
     if schema is not None:
-        return _schema_of(schema)
+        if schema in JOINED:
+            raise DataError(f"the format '{schema}' is now part of '{JOINED[schema]}'; print that one")
+        if schema not in FORMATS:
+            hint = nearest_name(schema, FORMATS)
+            raise DataError(f"there is no file format '{schema}'{hint}; available: {', '.join(FORMATS)}")
+        document = importlib.import_module(FORMATS[schema]).json_schema()
+        return Said(json_text(document), document, f"{schema}.schema")
     if bits:
         return _bits()
     folder = cache_folder()

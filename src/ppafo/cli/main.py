@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 
 from ppafo import interrupts
-from ppafo.cli.command_line import Command, CommandParser, Group, UsageError, add_parameters, check_options, run
+from ppafo.cli.command_line import Command, CommandGroup, CommandParser, UsageError, add_parameters, check_options, run
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
 from ppafo.cli.output import EXIT_INTERRUPTED
 from ppafo.errors import PpafoError, one_line
@@ -50,7 +50,7 @@ def completion_script(shell: str) -> str:
 def _cases() -> Iterator[tuple[str, list[str]]]:
     """Yield the first words of a line, and what may follow them; a group after its actions."""
     for name, one in COMMANDS.items():
-        if isinstance(one, Group):
+        if isinstance(one, CommandGroup):
             yield from ((f"{name} {action} ", _words(command)) for action, command in one.actions.items())
             yield f"{name} ", list(one.actions)
         else:
@@ -117,7 +117,7 @@ def build_parser(words: Sequence[str]) -> CommandParser:
             subparsers.add_parser(name)
             continue
         command = COMMANDS.get(name) or Command("", found=OTHERS[name])
-        if isinstance(command, Group):
+        if isinstance(command, CommandGroup):
             group = subparsers.add_parser(name, description=_sentence(command.summary))
             actions = group.add_subparsers(dest="action", metavar="ACTION", required=True)
             for action, member in command.actions.items():

@@ -90,7 +90,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
 def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tuned: Sequence[str]) -> "Finding[None]":
     """Return what the page of a result says: the metrics, the figure, and the run again, to be dragged."""
     from ppafo.report.display_units import metric_text, metric_words
-    from ppafo.report.finding import Finding, Part, columns_of
+    from ppafo.report.finding import Finding, Section, columns_of
     from ppafo.report.live_parts import live_part
 
     scenario, status = result.scenario, result.status
@@ -107,11 +107,11 @@ def _finding(result: "Result", check: "Check | None", follows: Sequence[str], tu
         title=scenario.name,
         said=(" ".join(scenario.description.split()), f"{device}{changed if scenario.origin.overrides else ''}"),
         parts=(
-            Part(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *follows)),
-            Part("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
-            Part("Over time", name=FIGURE, caption=caption, draw=result.plot),
-            Part() if check is None else Part("What can be repeated", code=repr(check)),
-            Part(remarks=tuned),
+            Section(remarks=(*(() if status.is_completed else (f"The run {status.message}",)), *follows)),
+            Section("Metrics", columns_of(("Metric", "Value", "What it is"), rows), left=3),
+            Section("Over time", name=FIGURE, caption=caption, draw=result.plot),
+            Section() if check is None else Section("What can be repeated", code=repr(check)),
+            Section(remarks=tuned),
         ),
         found=None,
         live=lambda: live_part([scenario]),
@@ -139,12 +139,13 @@ def _write(result: "Result", check: "Check | None", follows: Sequence[str], tune
     report = page_of(_finding(result, check, follows, tuned), {FIGURE: figures[f"{FIGURE}.svg"]})
     checks = {} if check is None else {CHECK_FILE: f"{json_text(check.document())}\n".encode()}
     result.save(folder, {**figures, REPORT: report, **checks})
-    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", "report.html"]
+    files = ["recording.nc", "recording.csv", "run.json", "figure.png", "figure.svg", REPORT]
     written = ", ".join(files if check is None else [*files, CHECK_FILE])
     further = result.scenario.motion.motion_kind.further_command(str(result.scenario.origin.file))
     return "\n".join(["", *([further] if further else []), f"written: {folder} ({written})"])
 
 
+@in_units(lambda result, *_: result.scenario.device.shown)
 def _text(
     result: "Result",
     error: "ErrorEstimate | None",
@@ -153,8 +154,10 @@ def _text(
     tuned: Sequence[str],
 ) -> str:
     """Return how the run ended, how it follows its reference, the numbers, how exact they are, and the gains."""
+    from ppafo.report.display_units import metrics_lines
+
     exact = [repr(check)] if check is not None else [] if error is None else [error.sentence]
-    # In place of the result's own verdict, whose remedies were not tried.
-    metrics = str(result).partition("\n\n")[2]
     last = ["", *exact, *tuned] if exact or tuned else []
-    return "\n".join([f"{result.scenario.name}: {result.status.kind}", *follows, "", metrics, *last])
+    # The result's own text has a verdict whose remedies were not tried.
+    head = [f"{result.scenario.name}: {result.status.kind}", *follows, ""]
+    return "\n".join([*head, *metrics_lines(result.metrics), *last])

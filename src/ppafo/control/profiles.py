@@ -131,7 +131,7 @@ class Tabulated(NamedTuple):
     knots: Annotated[tuple[Knot, ...], KNOTS - 1]
 
 
-class Segment(NamedTuple):
+class ProfileSegment(NamedTuple):
     """A line between two knots: times [s] and values of its start and end."""
 
     start: float
@@ -140,10 +140,10 @@ class Segment(NamedTuple):
     last: float
 
 
-def next_segment(segment: Segment, place: float, time: float, value: float) -> Segment:
+def next_segment(segment: ProfileSegment, place: float, time: float, value: float) -> ProfileSegment:
     """The segment, or the next one, to the knot at ``time`` [s], where ``place`` [s] has passed its end."""
     passed = place >= segment.end
-    return Segment(
+    return ProfileSegment(
         start=segment.end if passed else segment.start,
         first=segment.last if passed else segment.first,
         end=time if passed else segment.end,
@@ -151,16 +151,16 @@ def next_segment(segment: Segment, place: float, time: float, value: float) -> S
     )
 
 
-def segment_at(profile: Tabulated, place: float) -> Segment:
+def segment_at(profile: Tabulated, place: float) -> ProfileSegment:
     """The segment in which a place [s] of a repetition lies; its end is later than the place."""
     # Every knot is looked at: a search would branch, and 32 selects cost little in vector code.
-    segment = Segment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
+    segment = ProfileSegment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
     for knot in profile.knots[1:]:
         segment = next_segment(segment, place, knot.time, knot.value)
     segment = next_segment(segment, place, profile.period, profile.value_01)
     # An unused knot lies at or beyond the end of a repetition: the line then ends at the first knot of the next.
     is_last = segment.end >= profile.period
-    return Segment(
+    return ProfileSegment(
         start=segment.start,
         first=segment.first,
         end=profile.period if is_last else segment.end,

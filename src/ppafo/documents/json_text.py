@@ -33,10 +33,6 @@ def plain(value: Any) -> Any:
         return {str(key): plain(inner) for key, inner in value.items()}
     if isinstance(value, tuple | list):
         return [plain(inner) for inner in value]
-    return _plain_leaf(value)
-
-
-def _plain_leaf(value: Any) -> str | bool | int | float | None:
     # Before whole numbers, which True and False are in Python.
     if value is None or isinstance(value, str | bool):
         return value

@@ -13,7 +13,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
 from ppafo.engine.source_text import (
     Composer,
-    Names,
+    RewrittenNames,
     SourceCollector,
     emitted_name,
     is_step_function,
@@ -66,6 +66,8 @@ class StepText:
     of_step: dict[str, Any] = field(init=False)
     composed: dict[FunctionType, Composed] = field(default_factory=dict)
     kept: dict[str, Any] = field(default_factory=dict)
+    given: set[str] = field(default_factory=set)
+    """Groups of a step that a phase has set so far, in the order of the loop."""
 
     def __post_init__(self) -> None:
         """Look up the groups of the program, and let its components stand for what they stand for."""
@@ -81,7 +83,12 @@ class StepText:
     def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> Composed:
         """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
         assert isinstance(function, FunctionType), "it is no other callable"
-        return self._composed(function, known or {}, is_phase=True)
+        phase = self._composed(function, known or {}, is_phase=True)
+        for name in phase.effects.reads:
+            if name in self.of_step and name not in self.given:
+                raise self.refuse_unset(name, phase)
+        self.given.update(phase.effects.groups)
+        return phase
 
     def add_called(self, inside: FunctionType, called: FunctionType, known: Mapping[str, Any]) -> str:
         """Add a function that another calls, with what is known of its arguments; return its name in the module."""
@@ -132,6 +139,21 @@ class StepText:
             )
         return refusal(function.__code__.co_filename, node, problem)
 
+    def refuse_unset(self, name: str, asking: Composed) -> ProgramError:
+        """The error for a phase that needs a group of the step before any phase has set it on every path."""
+        uses = (
+            (function, node)
+            for use, functions in ((ast.Load, [asking.function]), (ast.Store, self.composed))
+            for function in functions
+            for node in uses_of_group(function, name, use)
+        )
+        function, node = next(uses, (asking.function, definition_of(asking.function).tree))
+        problem = (
+            f"'lane.{name}' may have no value here: no phase before '{asking.function.__name__}' sets it; "
+            "set it before, on every path"
+        )
+        return refusal(function.__code__.co_filename, node, problem)
+
     def joined(self, functions: Sequence[PlainFunction], parts: Any, takes: Sequence[str]) -> list[ast.stmt]:
         """Statements of functions one after another, as one function of the parameters ``takes`` has them.
 
@@ -143,11 +165,11 @@ class StepText:
         found: list[ast.stmt] = []
         for function, tree in reduced:
             check_grammar(tree, function.__code__.co_filename)
-            composer = self.composer(function, Names(frozenset([*local, *takes]), self.kept, {}))
+            composer = self.composer(function, RewrittenNames(frozenset([*local, *takes]), self.kept, {}))
             found += [composer.visit(statement) for statement in tree.body]
         return found
 
-    def composer(self, function: FunctionType, names: Names) -> Composer:
+    def composer(self, function: FunctionType, names: RewrittenNames) -> Composer:
         """Composer of a reduced function of the step: replaces names that are defined outside it."""
         return Composer(
             function,
@@ -193,7 +215,7 @@ class StepText:
         handed = tuple(name for name in parameters if name in effects.reads or name == NUMBER)
         return Composed(
             function=function,
-            name=self._written(function, tree, handed),
+            name=self._written(function, tree, handed, {*effects.reads, *effects.groups}),
             effects=effects,
             handed=handed,
             known=known,
@@ -209,7 +231,7 @@ class StepText:
             return ast.Return(ast.Call(ast.Name(self.keep(row), ast.Load()), results, []))
         return ast.Return(results[0] if len(results) == 1 else ast.Tuple(results, ast.Load()))
 
-    def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...]) -> str:
+    def _written(self, function: FunctionType, tree: ast.FunctionDef, handed: tuple[str, ...], groups: set[str]) -> str:
         """Put the text of a reduced function into the module; return its name there."""
         file = function.__code__.co_filename
         ast.fix_missing_locations(tree)
@@ -217,8 +239,9 @@ class StepText:
         local = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
         local |= {argument.arg for argument in tree.args.args}
         check_flow(tree, file, local)
-        rows = {name: kind for name, kind in self.rows.items() if name in local}
-        composer = self.composer(function, Names(frozenset(local), self.kept, rows))
+        # A local name may be that of a group which this function does not ask for.
+        rows = {name: kind for name, kind in self.rows.items() if name in groups}
+        composer = self.composer(function, RewrittenNames(frozenset(local), self.kept, rows))
         tree.returns, tree.decorator_list = None, []
         tree.body = [composer.visit(statement) for statement in tree.body]
         ast.fix_missing_locations(tree)

@@ -101,11 +101,13 @@ class PythonFunctions:
             return function
         if function not in self._made:
             code = function.__code__ if self._operations is None else rewritten(function, self._operations.writer)
-            scope = dict(function.__globals__)
+            given = function.__globals__
+            # A module has many more names than a function asks for.
+            read = {name: given[name] for name in _names_of(function.__code__) if name in given}
+            scope: dict[str, Any] = {"__builtins__": given["__builtins__"], "__name__": function.__module__}
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
             rows = self._effects.get(function, ())
             self._made[function] = self._law(copied, rows) if rows else copied
-            read = {name: scope[name] for name in _names_of(function.__code__) if name in scope}
             scope |= {name: self.of(value, function) for name, value in read.items()}
             copied.__kwdefaults__ = self._named_defaults(function)
             if self._operations is not None:
@@ -134,9 +136,10 @@ class PythonFunctions:
         return called
 
 
-def _names_of(code: CodeType) -> set[str]:
+@lru_cache(maxsize=4096)
+def _names_of(code: CodeType) -> frozenset[str]:
     """Names that a code reads, with those of the code in it."""
-    names = set(code.co_names)
+    names = frozenset(code.co_names)
     return names.union(*(_names_of(constant) for constant in code.co_consts if isinstance(constant, CodeType)))
 
 

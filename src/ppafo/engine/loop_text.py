@@ -18,7 +18,7 @@ from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.reduction import HISTORIES, Reduction, is_known_part
 from ppafo.engine.rows import leaf_paths, row_numbers
-from ppafo.engine.source_text import Names, SourceCollector
+from ppafo.engine.source_text import RewrittenNames, SourceCollector
 from ppafo.engine.step import loop
 from ppafo.engine.step.lane import Now
 
@@ -42,7 +42,7 @@ class LoopText:
         assert isinstance(function, FunctionType), "it is no other callable"
         self.reduction = Reduction(self.step, function, known or {})
         local = frozenset({*function.__code__.co_varnames, *HISTORIES, "record", *self.rows.arrays})
-        self.composer = self.step.composer(function, Names(local, self.step.kept, {"now": Now}))
+        self.composer = self.step.composer(function, RewrittenNames(local, self.step.kept, {"now": Now}))
         self.other = LoopText(dict(others), function) if others else None
 
     def lines(self) -> list[ast.stmt]:

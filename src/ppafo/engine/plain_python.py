@@ -193,7 +193,7 @@ def _assigned_names(target: ast.AST) -> set[str]:
 _ORIGIN = re.compile(rf"{re.escape(ORIGIN)} (?P<file>.*): (?P<lines>[\d ]+)$")
 
 
-class Place(NamedTuple):
+class SourcePosition(NamedTuple):
     """The line of a user's file where a statement begins, and the line where the next one does."""
 
     file: str
@@ -201,7 +201,7 @@ class Place(NamedTuple):
     next_line: int
 
 
-def place_in(lines: list[str], number: int) -> Place | None:
+def place_in(lines: list[str], number: int) -> SourcePosition | None:
     """Source position of line ``number`` of a generated text; None for lines that belong to no function of a file."""
     for start in range(min(number, len(lines)) - 1, -1, -1):
         origin = _ORIGIN.match(lines[start])
@@ -214,5 +214,5 @@ def place_in(lines: list[str], number: int) -> Place | None:
         index = number - 1 - (start + 2)
         if not 0 <= index < len(at) - 1:
             return None
-        return Place(origin["file"], at[index], min(line for line in at if line > at[index]))
+        return SourcePosition(origin["file"], at[index], min(line for line in at if line > at[index]))
     return None

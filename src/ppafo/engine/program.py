@@ -10,7 +10,7 @@ from ppafo.control.profiles import CONSTANT
 from ppafo.engine.channels import REQUEST, paths_of_traces
 from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
 from ppafo.engine.rows import leaf_paths
-from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
+from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
 from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParameters
 from ppafo.kinds import kind_at
@@ -432,7 +432,7 @@ def groups_of(program: Program) -> Groups:
     before = {
         "timing": given(LaneTiming),
         "result": kept(LaneResult),
-        "pace": kept(Pace),
+        "pace": kept(StepControl),
         "plant": given(program.actuator.plant),
         "state": kept(PlantState),
         **({"held": handed(HeldChambers)} if program.hands_chambers_on else {}),

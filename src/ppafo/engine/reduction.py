@@ -206,7 +206,7 @@ class Reduction:
         own = [name for name in self.parameters if name != "lane" and name not in self.known and name in asked]
         self.effects.takes = tuple(own)
         # A local name that is also a group's has another spelling.
-        names = _Names({name for name in _bound(tree.body) | set(own) if name in taken})
+        names = _Renaming({name for name in _bound(tree.body) | set(own) if name in taken})
         tree.body = [names.visit(line) for line in tree.body]
         handed = [NUMBER, *self.effects.reads] if HISTORIES & self.effects.reads.keys() else [*self.effects.reads]
         tree.args = ast.arguments(
@@ -443,7 +443,7 @@ class Reduction:
                 break
         return made
 
-    def statement(self, node: ast.stmt) -> list[ast.stmt]:  # noqa: PLR0911 - one for each kind
+    def statement(self, node: ast.stmt) -> list[ast.stmt]:
         """Reduction of a statement."""
         match node:
             case ast.Expr(value=ast.Call() as call):
@@ -650,7 +650,7 @@ def with_arguments(expression: ast.expr, arguments: Mapping[str, ast.expr]) -> a
 
 
 @dataclass(slots=True)
-class _Names(ast.NodeTransformer):
+class _Renaming(ast.NodeTransformer):
     """Gives groups their names, and local names that some group has another one."""
 
     hidden: set[str]

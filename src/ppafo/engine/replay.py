@@ -22,7 +22,7 @@ COMMAND = "result.command"
 """Path of the command in force among the states of a program."""
 
 
-class Segment(NamedTuple):
+class AngleSegment(NamedTuple):
     """A straight piece of a recorded angle: a time [s], the angle [rad] then, and the angular velocity [rad/s]."""
 
     start: float
@@ -30,12 +30,12 @@ class Segment(NamedTuple):
     rate: float
 
 
-def segment_value(segment: Segment, time: float) -> tuple[float, float, float]:
+def segment_value(segment: AngleSegment, time: float) -> tuple[float, float, float]:
     """Angle [rad], angular velocity [rad/s] and angular acceleration [rad/s^2] at a time [s] on a straight piece."""
     return segment.level + segment.rate * (time - segment.start), segment.rate, 0.0
 
 
-def segment_bounds(_segment: Segment) -> tuple[float, float]:
+def segment_bounds(_segment: AngleSegment) -> tuple[float, float]:
     """Bounds [rad] of a segment: none, because the next one may lead anywhere between the stops."""
     return -math.inf, math.inf
 
@@ -44,7 +44,7 @@ RECORDED_ANGLE = ProfileKind(
     name="recorded",
     summary="A recorded angle, straight from sample to sample; its parameters change at every sample.",
     quantities=(),
-    parameters=Segment,
+    parameters=AngleSegment,
     value=segment_value,
     bounds=segment_bounds,
 )

@@ -56,7 +56,7 @@ def is_step_function(function: object) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class RewrittenNames:
     """Names of a function that was written anew: all that it has, values that some stand for, classes of rows."""
 
     local: frozenset[str]
@@ -80,7 +80,7 @@ class Composer(ast.NodeTransformer):
         note: Callable[[Mapping[str, Any], str, Any], None],
         rows_of: Callable[[str], tuple[str, ...]] = lambda _name: (),
         stands_for: Callable[[Any], Any] = lambda row: row,
-        names: Names | None = None,
+        names: RewrittenNames | None = None,
     ) -> None:
         self.function = function
         self.add = add
@@ -143,6 +143,10 @@ class Composer(ast.NodeTransformer):
         owner = self.value_of(node.value)
         if owner is not _INSIDE and not isinstance(owner, tuple):
             raise self.refuse(node, f"'{ast.unparse(node)}' is of a {type(owner).__name__}, which cannot be compiled")
+        row = self.stands_for(self.row_of(node.value))
+        if row is not None and node.attr not in row._fields:
+            hint = nearest_name(node.attr, row._fields)
+            raise self.refuse(node, f"{ast.unparse(node.value)} has no '{node.attr}'{hint}")
         return ast.Attribute(self.visit(node.value), node.attr, node.ctx)
 
     def visit_Call(self, node: ast.Call) -> ast.expr:

@@ -1,13 +1,13 @@
 """Gaits: one periodic stride of a wearer, built in, imported from recordings, or read from a gait file."""
 
 from ppafo.gait.document import NORMATIVE, list_gaits, load_gait
-from ppafo.gait.gait import CURVES, Curve, Gait, at_speed, series_of, speed_range, walk_recording
+from ppafo.gait.gait import CURVES, Gait, GaitCurve, at_speed, series_of, speed_range, walk_recording
 
 __all__ = [
     "CURVES",
     "NORMATIVE",
-    "Curve",
     "Gait",
+    "GaitCurve",
     "at_speed",
     "list_gaits",
     "load_gait",

@@ -12,7 +12,7 @@ from ppafo.arguments import checked
 from ppafo.documents.models import NAME, QUANTITY, SchemaVersion, make_schema, optional, table, validate
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, UnitError, refused_as
-from ppafo.gait.gait import CURVES, REQUIRED, Curve, Gait, plain_unit
+from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, plain_unit
 from ppafo.gait.plausible import check_gait
 from ppafo.units import from_si, parse_quantity, to_si
 
@@ -151,7 +151,7 @@ def _number(document: dict[str, Any], path: str, file: str) -> float | None:
     return value
 
 
-def _curve(table: dict[str, Any], name: str, file: str) -> Curve:
+def _curve(table: dict[str, Any], name: str, file: str) -> GaitCurve:
     # The schema checks each list by itself; that both agree is said here.
     if len(table["cosine"]) != len(table["sine"]):
         counts = f"{len(table['cosine'])} numbers in cosine and {len(table['sine'])} in sine"
@@ -160,7 +160,7 @@ def _curve(table: dict[str, Any], name: str, file: str) -> Curve:
     def si(value: float) -> float:
         return to_si(float(value), plain_unit(table["unit"]), plain_unit(CURVES[name]))
 
-    return Curve(
+    return GaitCurve(
         si(table["mean"]),
         tuple(map(si, table["cosine"])),
         tuple(map(si, table["sine"])),

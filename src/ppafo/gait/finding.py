@@ -14,11 +14,12 @@ from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.curves import PHASES
 from ppafo.gait.recorded.footfalls import Stride
 from ppafo.gait.recorded.importing import ImportedGait
-from ppafo.report.display_units import display_unit, display_value, display_values, quantity_of_unit
-from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.display_units import display_unit, display_value, display_values
+from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, GREY, ORANGE
+from ppafo.units.shown import quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -103,7 +104,7 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
         title=gait.title or gait.name,
         said=(f"{gait.name}: {gait.title} ({gait.origin})",),
         parts=(
-            Part(
+            Section(
                 columns=facts(
                     (
                         ("source", gait.source),
@@ -116,9 +117,9 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
                     )
                 )
             ),
-            Part("Curves", columns_of(_HEAD, (_row(gait, name, imported) for name in gait.curves))),
-            Part(remarks=[f"remark: {text}" for text in imported.remarks] if imported else ()),
-            Part(
+            Section("Curves", columns_of(_HEAD, (_row(gait, name, imported) for name in gait.curves))),
+            Section(remarks=[f"remark: {text}" for text in imported.remarks] if imported else ()),
+            Section(
                 "Stride",
                 panels=partial(gait_panels, gait, imported),
                 name="gait",

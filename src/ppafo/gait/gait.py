@@ -57,7 +57,7 @@ def plain_unit(unit: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class GaitCurve:
     """Periodic curve: coefficients of its Fourier series in SI units, and the variation between strides.
 
     ``deviation`` is the standard deviation between strides, root mean square over the stride; 0 where it is not known.
@@ -81,13 +81,13 @@ class Curve:
         """Return the value at a phase [strides]."""
         return float(self.values_at(phase))
 
-    def derivative(self, stride_time: float) -> "Curve":
+    def derivative(self, stride_time: float) -> "GaitCurve":
         """Return the derivative by time for a stride of this time [s]; how much strides differ in it is not known."""
         angular = 2.0 * np.pi / stride_time * (1.0 + np.arange(self.harmonics))
         cosines, sines = angular * np.array(self.sines), -angular * np.array(self.cosines)
-        return Curve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
+        return GaitCurve(0.0, tuple(cosines.tolist()), tuple(sines.tolist()))
 
-    def scale(self, factor: float) -> "Curve":
+    def scale(self, factor: float) -> "GaitCurve":
         """Return the curve times a factor [-], with its deviation between strides."""
         cosines, sines = (tuple(factor * value for value in values) for values in (self.cosines, self.sines))
         return replace(
@@ -125,13 +125,13 @@ class Gait:
     walking_speed: float | None
     stride_time: float
     stance_share: float
-    shank_angle: Curve
-    ankle_angle: Curve
-    ankle_moment: Curve | None = None
-    vertical_force: Curve | None = None
-    centre_of_pressure: Curve | None = None
-    knee_forward: Curve | None = None
-    knee_up: Curve | None = None
+    shank_angle: GaitCurve
+    ankle_angle: GaitCurve
+    ankle_moment: GaitCurve | None = None
+    vertical_force: GaitCurve | None = None
+    centre_of_pressure: GaitCurve | None = None
+    knee_forward: GaitCurve | None = None
+    knee_up: GaitCurve | None = None
     stride_time_deviation: float = 0.0
     stance_share_deviation: float = 0.0
     strides: int = 0
@@ -147,11 +147,11 @@ class Gait:
             )
 
     @property
-    def curves(self) -> dict[str, Curve]:
+    def curves(self) -> dict[str, GaitCurve]:
         """The curves that there are, by name, in the order of ``CURVES``."""
         return {name: curve for name in CURVES if (curve := getattr(self, name)) is not None}
 
-    def curve(self, name: str) -> Curve:
+    def curve(self, name: str) -> GaitCurve:
         """Return a curve by its name; DataError where this gait does not have it."""
         curves = self.curves
         if name not in curves:
@@ -193,7 +193,7 @@ class FitError:
     largest: float
 
 
-def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[Curve, FitError]:
+def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[GaitCurve, FitError]:
     """Return the series through values at even phases from 0 to 1, both ends counted, and its errors.
 
     All in the unit of ``values`` [SI]. DataError where there are too few values.
@@ -210,7 +210,7 @@ def fit_curve(values: Floats, harmonics: int, deviation: float = 0.0) -> tuple[C
     left = design @ solution - values
     cosines, sines = solution[1 : harmonics + 1].tolist(), solution[harmonics + 1 :].tolist()
     error = FitError(float(np.sqrt(np.mean(left**2))), float(np.max(np.abs(left))))
-    return Curve(float(solution[0]), tuple(cosines), tuple(sines), deviation), error
+    return GaitCurve(float(solution[0]), tuple(cosines), tuple(sines), deviation), error
 
 
 LARGEST_CHANGE = 0.2

@@ -452,15 +452,6 @@ _WHERE: dict[SignSource, str] = {
 }
 
 
-def check_turning(walk: MeanStride) -> None:
-    """Raise DataError where the knee turns about the standing ankle only with a mistake corrected, and name it."""
-    mistake = _mistaken_turning(walk)
-    if mistake is not None and mistake.left < _LEFT_BY_ONE * mistake.missed:
-        raise DataError(
-            f"{walk.file['knee_forward']}: {mistake.statement}; {mistake.mistake.remedy} {_WHERE[walk.signs_from]}"
-        )
-
-
 def turning_remarks(walk: MeanStride) -> list[str]:
     """Return a remark where a mistake would explain a part of how the knee misses the standing ankle."""
     mistake = _mistaken_turning(walk)
@@ -547,7 +538,11 @@ def check_knee(walk: MeanStride) -> None:
     if len(there) == 1:
         (missing,) = set(KNEE) - set(there)
         raise DataError(f"{walk.file[there[0]]}: {there[0]} is given without {missing}; give both, or neither")
-    check_turning(walk)
+    mistake = _mistaken_turning(walk)
+    if mistake is not None and mistake.left < _LEFT_BY_ONE * mistake.missed:
+        raise DataError(
+            f"{walk.file['knee_forward']}: {mistake.statement}; {mistake.mistake.remedy} {_WHERE[walk.signs_from]}"
+        )
     check_knee_means(walk)
     check_all([partial(_check_knee_curve, walk, name)] for name in there)
 

@@ -11,8 +11,8 @@ from gymnasium.vector.utils import batch_space
 
 from ppafo.engine.lanes import Floats
 from ppafo.errors import ScenarioError, SimulationError
-from ppafo.gym.lanes import Flags, Places, Seen
-from ppafo.gym.pictures import Moment, picture
+from ppafo.gym.lanes import BatchStep, Flags, Places
+from ppafo.gym.pictures import EpisodeFrame, picture
 from ppafo.gym.world import World, settings_of
 
 Observations = np.ndarray[Any, np.dtype[np.float32]]
@@ -46,7 +46,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
         self._drawn: Floats | None = None
         self._lanes = self.world.lanes(1)
         self._period = 0.0
-        self._moments: list[Moment] = []
+        self._moments: list[EpisodeFrame] = []
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle keeps: the world as it was made, and the state of its lane."""
@@ -102,7 +102,7 @@ class PneumaticEnv(gymnasium.Env[Observations, Any]):
 
     def _remember(self, error: float) -> None:
         """Keep what a picture shows of this moment."""
-        self._moments.append(Moment(len(self._moments) * self._period, self.numbers()["state.angle"], error))
+        self._moments.append(EpisodeFrame(len(self._moments) * self._period, self.numbers()["state.angle"], error))
 
     def episode(self) -> Any:
         """Return the scenario of this episode with the numbers that were drawn, or the walk before anything is drawn.
@@ -220,7 +220,7 @@ class PneumaticVectorEnv(VectorEnv[Observations, Any, Any]):
         """Return the true state of one environment in SI units, by path such as ``state.angle`` [rad]."""
         return self._lanes.numbers(place)
 
-    def _begin(self, places: Places) -> Seen:
+    def _begin(self, places: Places) -> BatchStep:
         drawn = [self._generators[number] for number in places]
         return self.world.begin(self._lanes, places, [generator for generator in drawn if generator is not None])[0]
 

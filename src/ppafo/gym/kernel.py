@@ -28,7 +28,7 @@ class Action(NamedTuple):
     other: float
 
 
-class Asked(NamedTuple):
+class ObservationFlag(NamedTuple):
     """1 where an environment is observed in this call, else 0."""
 
     is_observed: float
@@ -125,7 +125,7 @@ def observe(
 def kernel_source(program: Program, task: Task) -> str:
     """Return the source text of the module with ``command``, ``advance`` and ``judge``, each of a block of lanes."""
     collector = SourceCollector(INLINE)
-    further = {**OWN, "action": Action, "asked": Asked, "view": task.view, "outcome": Outcome}
+    further = {**OWN, "action": Action, "asked": ObservationFlag, "view": task.view, "outcome": Outcome}
     step = StepText(program, collector, further=further)
     loop = lane_loop(step, COMPILED, "advance", ARGUMENTS)
     begin = lane_entry(step, command, {"states": step.states, "actions": {"action": Action}}, {"task": task})
@@ -133,7 +133,7 @@ def kernel_source(program: Program, task: Task) -> str:
         "states": step.states,
         "parameters": step.parameters,
         "own": OWN,
-        "chosen": {"asked": Asked},
+        "chosen": {"asked": ObservationFlag},
         "observations": {"view": task.view},
         "outcomes": {"outcome": Outcome},
     }

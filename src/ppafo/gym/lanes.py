@@ -46,16 +46,16 @@ def episode_program(batch: Batch) -> tuple[Program, Clock]:
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class EpisodeStarts:
     """Starts of episodes: parameters and states as the program has them, and goals (rows, episodes)."""
 
     parameters: Floats
     states: Floats
     goals: Floats
 
-    def repeated(self, count: int) -> "Columns":
+    def repeated(self, count: int) -> "EpisodeStarts":
         """Start of ``count`` equal episodes, from the start of one."""
-        return Columns(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
+        return EpisodeStarts(*(np.repeat(rows, count, axis=1) for rows in (self.parameters, self.states, self.goals)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Judging:
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class BatchStep:
     """Result of a step in every environment: observations (environments, observed), the rest (environments,)."""
 
     observations: NDArray[np.float32]
@@ -78,12 +78,12 @@ class Seen:
     terminated: Flags
     truncated: Flags
 
-    def then(self, later: "Seen") -> "Seen":
+    def then(self, later: "BatchStep") -> "BatchStep":
         """Return what two samples show one after the other; an episode that ended with the first stays as it was."""
         ended = self.terminated | self.truncated
         pairs = {name: (getattr(self, name), getattr(later, name)) for name in ("errors", "supplied")}
         chosen = {name: np.where(ended, *pair) for name, pair in pairs.items()}
-        return Seen(
+        return BatchStep(
             observations=np.where(ended[:, None], self.observations, later.observations),
             rewards=self.rewards + np.where(ended, 0.0, later.rewards),
             terminated=self.terminated | (later.terminated & ~ended),
@@ -92,7 +92,7 @@ class Seen:
         )
 
 
-class Block(NamedTuple):
+class EnvironmentBlock(NamedTuple):
     """Compiled calls for the environments of a block: commands of the actions, steps, what is observed."""
 
     command: Callable[..., None]
@@ -130,7 +130,7 @@ class Environments:
         module = load_source(kernel_source(program, task))
         record, trace = np.empty((0, len(state_rows), width)), np.empty((0, 0, width))
         self._blocks = [
-            Block(
+            EnvironmentBlock(
                 with_arrays(module.command, states, actions, signals),
                 with_arrays(module.advance, states, parameters, signals, commands, record, trace),
                 with_arrays(module.judge, states, parameters, own, chosen, observations, outcomes, signals),
@@ -169,7 +169,7 @@ class Environments:
             else:
                 self._now = value
 
-    def begin(self, places: Places, columns: Columns) -> Seen:
+    def begin(self, places: Places, columns: EpisodeStarts) -> BatchStep:
         """Begin episodes of some environments at once; what the others show is not to be used."""
         lanes = self._states.shape[2]
         # Lanes without an environment repeat the last one, so that each has a run that goes on.
@@ -189,7 +189,7 @@ class Environments:
         self._chosen[blocks[: places.size], 0, own[: places.size]] = 1.0
         return self._call(0)
 
-    def step(self) -> Seen:
+    def step(self) -> BatchStep:
         """Take ``actions`` for a sample period, and show what follows."""
         self._chosen[:] = 1.0
         return self._call(self._clock.steps_per_sample)
@@ -199,7 +199,7 @@ class Environments:
         block, lane = divmod(place, self._states.shape[2])
         return {path: float(self._states[block, row, lane]) for path, row in self.rows.items()}
 
-    def _call(self, steps: int) -> Seen:
+    def _call(self, steps: int) -> BatchStep:
         clock, judging, width = self._clock, self._judging, self._states.shape[2]
         self._now += steps
         # Lanes without an environment take the action of the last one.
@@ -228,7 +228,7 @@ class Environments:
         outcomes = self._by_environment(self._outcomes).T
         rewards, errors, supplied = outcomes[:_FIRST_FLAG]
         failed, through = outcomes[_FIRST_FLAG:] != 0.0
-        return Seen(shown.astype(np.float32), rewards, errors, supplied, failed, through)
+        return BatchStep(shown.astype(np.float32), rewards, errors, supplied, failed, through)
 
     def _by_environment(self, blocks: Floats) -> Floats:
         """Return copies of numbers (blocks, numbers, lanes) as (environments, numbers)."""

@@ -22,7 +22,7 @@ _NEUTRAL = 90.0
 """Angle of a neutral ankle [deg]."""
 
 
-class Moment(NamedTuple):
+class EpisodeFrame(NamedTuple):
     """Frame of a picture: time [s], angle of the vane [rad], and error in the unit of the task."""
 
     time: float
@@ -30,7 +30,7 @@ class Moment(NamedTuple):
     error: float
 
 
-def picture(moments: Sequence[Moment], unit: str, period: float) -> NDArray[np.uint8]:
+def picture(moments: Sequence[EpisodeFrame], unit: str, period: float) -> NDArray[np.uint8]:
     """Return a picture (height, width, 3) of the moments of an episode, in order; at least one.
 
     ``unit`` is the unit of their errors, "rad" or "N m"; ``period`` [s] is the shortest span of time that is shown.
@@ -45,7 +45,16 @@ def picture(moments: Sequence[Moment], unit: str, period: float) -> NDArray[np.u
         figure = Figure(figsize=_SIZE, dpi=_RESOLUTION, layout="constrained")
         canvas: Any = FigureCanvasAgg(figure)
         panels: Any = figure.subplot_mosaic([["vane", "angle"], ["vane", "error"]], width_ratios=[1.0, 1.8])
-        _draw_vane(panels["vane"], float(angles[-1]))
+        axes = panels["vane"]
+        angle = float(angles[-1])
+        turn = np.linspace(0.0, 2.0 * np.pi, 121)
+        vane: Floats = np.array([-1.0, 1.0])
+        axes.plot(np.cos(turn), np.sin(turn), color=GREY)
+        axes.plot(vane * np.cos(angle), vane * np.sin(angle), color=BLUE, linewidth=6.0, solid_capstyle="butt")
+        axes.plot(_SHAFT * np.cos(turn), _SHAFT * np.sin(turn), color=GREY)
+        axes.set_aspect("equal")
+        axes.set_axis_off()
+        axes.set_title(f"Vane at {np.degrees(angle):.0f} deg")
         panels["angle"].plot(times, np.degrees(angles), color=BLUE)
         _finish(panels["angle"], end, "Angle (deg)", _NEUTRAL)
         panels["angle"].tick_params(labelbottom=False)
@@ -55,18 +64,6 @@ def picture(moments: Sequence[Moment], unit: str, period: float) -> NDArray[np.u
         canvas.draw()
         # Without transparency, and a copy, since the canvas owns its buffer.
         return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
-
-
-def _draw_vane(axes: "Axes", angle: float) -> None:
-    """Draw housing, dual vane and shaft; the angle [rad] grows in plantarflexion."""
-    turn = np.linspace(0.0, 2.0 * np.pi, 121)
-    vane: Floats = np.array([-1.0, 1.0])
-    axes.plot(np.cos(turn), np.sin(turn), color=GREY)
-    axes.plot(vane * np.cos(angle), vane * np.sin(angle), color=BLUE, linewidth=6.0, solid_capstyle="butt")
-    axes.plot(_SHAFT * np.cos(turn), _SHAFT * np.sin(turn), color=GREY)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
-    axes.set_title(f"Vane at {np.degrees(angle):.0f} deg")
 
 
 def _finish(axes: "Axes", end: float, label: str, level: float) -> None:

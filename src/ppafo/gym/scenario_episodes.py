@@ -12,7 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, UnitError
-from ppafo.gym.lanes import Columns, FromOutside, Places, episode_program
+from ppafo.gym.lanes import EpisodeStarts, FromOutside, Places, episode_program
 from ppafo.gym.tasks import Goal
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.graph import ATMOSPHERE_PATH, gauge_link
@@ -49,10 +49,10 @@ class ScenarioEpisodes:
     clock: Clock
     ranges: Mapping[str, tuple[float, float]]
     targets: tuple[float, float]
-    plain: Columns
+    plain: EpisodeStarts
     gauge: frozenset[str] = frozenset()
 
-    def draw(self, generators: Sequence[np.random.Generator]) -> tuple[Columns, Floats]:
+    def draw(self, generators: Sequence[np.random.Generator]) -> tuple[EpisodeStarts, Floats]:
         """Return an episode for each generator, and what was drawn of each (numbers, episodes) in SI.
 
         Drawn again where a draw breaks a rule of scenarios, or asks for another program, as a chamber that is too quick
@@ -83,7 +83,7 @@ class ScenarioEpisodes:
         numbers = dict(zip(self.ranges, drawn.tolist(), strict=True))
         return with_numbers(self.base, absolute(self.base, numbers, self.gauge))
 
-    def _plan(self, columns: Columns, values: Floats, left: Places) -> tuple[Places, str]:
+    def _plan(self, columns: EpisodeStarts, values: Floats, left: Places) -> tuple[Places, str]:
         """Write the columns of some episodes; return the places of those that do not fit, and why one does not."""
         given = dict(zip(self.ranges, values[:, left], strict=True))
         plan = plan_ensemble(check_columns(self.base, given, self.gauge))
@@ -121,7 +121,7 @@ def scenario_episodes(base: Scenario, randomise: bool, vary: Ranges, targets: tu
     batch = batch_of(plan_run(base))
     program, clock = episode_program(batch)
     middle = Goal(angle=0.5 * (lowest + highest), profile=_NO_PROFILE)
-    plain = Columns(batch.parameters, batch.states, np.array([numbers(middle)]).T)
+    plain = EpisodeStarts(batch.parameters, batch.states, np.array([numbers(middle)]).T)
     return ScenarioEpisodes(base, program, clock, ranges, (lowest, highest), plain, frozenset(gauge))
 
 

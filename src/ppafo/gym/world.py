@@ -14,7 +14,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, SimulationError, nearest_name
-from ppafo.gym.lanes import Columns, Environments, FromOutside, Judging, Places, Seen, episode_program
+from ppafo.gym.lanes import BatchStep, Environments, EpisodeStarts, FromOutside, Judging, Places, episode_program
 from ppafo.gym.scenario_episodes import Ranges, ScenarioEpisodes, scenario_episodes
 from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Goal, Task
 from ppafo.model.controlled import TORQUE
@@ -42,9 +42,9 @@ class WalkEpisodes:
     program: Program
     clock: Clock
     randomise: bool
-    plain: Columns
+    plain: EpisodeStarts
 
-    def draw(self, generators: Sequence[np.random.Generator]) -> tuple[Columns, Floats]:
+    def draw(self, generators: Sequence[np.random.Generator]) -> tuple[EpisodeStarts, Floats]:
         """Return an episode for each generator, and no drawn numbers: a wearer is not a list of numbers."""
         columns = self.plain.repeated(len(generators))
         for number, generator in enumerate(generators if self.randomise else ()):
@@ -82,7 +82,7 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
     commanded = with_duration(configuration, seconds).controlled_by(FromOutside())
     batch = batch_of(plan_walk(commanded))
     program, clock = episode_program(batch)
-    plain = Columns(batch.parameters, batch.states, np.array([numbers(goal)]).T)
+    plain = EpisodeStarts(batch.parameters, batch.states, np.array([numbers(goal)]).T)
     # Nothing is recorded between two samples: an agent sees what is observed.
     return WalkEpisodes(configuration, commanded, program, replace(clock, record_every=0), randomise, plain)
 
@@ -131,7 +131,7 @@ HEADROOM = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Settings:
+class EnvironmentSettings:
     """Settings of an environment beside its task; ``PneumaticEnv`` explains each."""
 
     scenario: str | Path | None = None
@@ -162,17 +162,19 @@ def _check_word(name: str, word: Any, allowed: tuple[str, str]) -> None:
         raise ScenarioError(f"{name} = {word!r}: must be '{allowed[0]}' or '{allowed[1]}'{hint}")
 
 
-def settings_of(arguments: Mapping[str, Any]) -> Settings:
+def settings_of(arguments: Mapping[str, Any]) -> EnvironmentSettings:
     """Return settings by name; ScenarioError for a name that is none."""
-    names = [field.name for field in fields(Settings)]
+    names = [field.name for field in fields(EnvironmentSettings)]
     for name in arguments:
         if name not in names:
             hint = nearest_name(name, names)
             raise ScenarioError(f"an environment has no argument '{name}'{hint}; it has {', '.join(names)}")
-    return Settings(**arguments)
+    return EnvironmentSettings(**arguments)
 
 
-def _torque_episodes(file: str | Path, words: Sequence[str], varied: Ranges, settings: Settings) -> ScenarioEpisodes:
+def _torque_episodes(
+    file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
+) -> ScenarioEpisodes:
     chosen = _scenario(file, words, settings.duration)
     if chosen.controlled != TORQUE:
         raise ScenarioError(
@@ -182,7 +184,9 @@ def _torque_episodes(file: str | Path, words: Sequence[str], varied: Ranges, set
     return scenario_episodes(chosen, settings.randomise, varied, settings.targets)
 
 
-def _angle_episodes(file: str | Path, words: Sequence[str], varied: Ranges, settings: Settings) -> ScenarioEpisodes:
+def _angle_episodes(
+    file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
+) -> ScenarioEpisodes:
     chosen = _scenario(file, words, settings.duration)
     return scenario_episodes(chosen, settings.randomise, varied, settings.targets)
 
@@ -192,7 +196,9 @@ def _scenario(file: str | Path, words: Sequence[str], duration: float | None) ->
     return load_scenario(file, over(words, own, ScenarioError))
 
 
-def _walk_episodes(file: str | Path, words: Sequence[str], varied: Ranges, settings: Settings) -> WalkEpisodes:
+def _walk_episodes(
+    file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
+) -> WalkEpisodes:
     if varied:
         raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
     walk, duration = load_walk(file, words), settings.duration
@@ -200,7 +206,9 @@ def _walk_episodes(file: str | Path, words: Sequence[str], varied: Ranges, setti
     return walk_episodes(walk, settings.randomise, seconds)
 
 
-_EPISODES: Mapping[str, Callable[[str | Path, Sequence[str], Ranges, Settings], ScenarioEpisodes | WalkEpisodes]] = {
+_EPISODES: Mapping[
+    str, Callable[[str | Path, Sequence[str], Ranges, EnvironmentSettings], ScenarioEpisodes | WalkEpisodes]
+] = {
     "torque": _torque_episodes,
     "angle": _angle_episodes,
     "walk": _walk_episodes,
@@ -211,7 +219,7 @@ _EPISODES: Mapping[str, Callable[[str | Path, Sequence[str], Ranges, Settings], 
 class World:
     """Common basis of single and vector environments: episodes, spaces, and lanes for any number of environments."""
 
-    def __init__(self, task: str, settings: Settings) -> None:
+    def __init__(self, task: str, settings: EnvironmentSettings) -> None:
         self.settings = settings
         self.task = TASKS[task]
         usual, flaws = DEFAULTS[task]
@@ -236,7 +244,7 @@ class World:
         if self.is_continuous:
             self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.task.actions,), np.float32)
 
-    def __reduce__(self) -> "tuple[type[World], tuple[str, Settings]]":
+    def __reduce__(self) -> "tuple[type[World], tuple[str, EnvironmentSettings]]":
         """Pickle by what it was made of: programs and what they are compiled to are found again."""
         return World, (self.task.name, self.settings)
 
@@ -254,12 +262,12 @@ class World:
 
     def begin(
         self, lanes: Environments, places: Places, generators: Sequence[np.random.Generator]
-    ) -> tuple[Seen, Floats]:
+    ) -> tuple[BatchStep, Floats]:
         """Draw and begin episodes of some environments; return what is seen of all, and what was drawn."""
         columns, drawn = self.episodes.draw(generators)
         return self._shown(lanes.begin(places, columns)), drawn
 
-    def take(self, lanes: Environments, actions: Any) -> Seen:
+    def take(self, lanes: Environments, actions: Any) -> BatchStep:
         """Return what follows from actions that are held for ``frame_skip`` samples, or to the end of an episode.
 
         Rewards are added up. SimulationError for an action that is no finite number.
@@ -279,7 +287,7 @@ class World:
             seen = seen.then(lanes.step())
         return self._shown(seen)
 
-    def _shown(self, seen: Seen) -> Seen:
+    def _shown(self, seen: BatchStep) -> BatchStep:
         if self.is_scaled:
             seen.observations[:] = np.clip((seen.observations - self._middle) / self._half, -1.0, 1.0)
         return seen

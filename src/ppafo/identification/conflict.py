@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 from scipy.stats import t as student
 
 from ppafo.identification.noise import Noise
-from ppafo.identification.residuals import Flags, Work
+from ppafo.identification.residuals import FitRuns, Flags
 from ppafo.identification.whitened import root_of_inverse
 from ppafo.signals.recording import Floats
 
@@ -48,7 +48,7 @@ class Conflict:
     p: float
 
 
-def _groups(work: Work) -> Iterator[tuple[str, list[slice]]]:
+def _groups(work: FitRuns) -> Iterator[tuple[str, list[slice]]]:
     """Return sensors, recordings, channels of recordings and further groups, none of them twice nor the whole."""
     labels = [
         (block.channel, block.recording, f"{block.channel} of {block.recording}", *block.groups)
@@ -70,7 +70,7 @@ def too_smooth(sensors: Mapping[str, Noise]) -> Conflict | None:
     return Conflict(channel, SMOOTH, 1.0 / noise.innovation, 0.0) if noise.innovation < _SMOOTHEST else None
 
 
-def conflict_of(work: Work, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
+def conflict_of(work: FitRuns, rows: Floats, point: Floats, free: Flags, freedom: float) -> Conflict | None:
     """Return the group of rows that wants other numbers most, None where no group does (Hausman's test).
 
     A group alone would go by d = -H_g^-1 (J_g' r_g + P (z - m)), whose covariance is H_g^-1 - C. With C = L L' and the

@@ -20,7 +20,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
-from ppafo.identification.residuals import Block, Free, Indices, Residuals, Work
+from ppafo.identification.residuals import FitRuns, Free, Indices, ResidualBlock, Residuals
 from ppafo.identification.whitened import Linear, cost_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
@@ -99,7 +99,7 @@ _OTHER_STARTS = 32
 def fit(
     residuals: Residuals,
     numbers: Sequence[Free],
-    blocks: Sequence[Block],
+    blocks: Sequence[ResidualBlock],
     confidence: float = 0.95,
     report: Report = report_nothing,
     memory: int = HIGHEST_ORDER,
@@ -123,7 +123,7 @@ def fit(
                 f"{one.name}: bounds {one.low:g} to {one.high:g} with the start {one.start:g}: the lower must be below "
                 "the upper and the start between them"
             )
-    work = Work(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
+    work = FitRuns(residuals, tuple(numbers), tuple(blocks), report, memory, is_motion)
     samples, sought = (
         sum(one.rows.stop - one.rows.start for one in blocks),
         sum(math.isinf(one.deviation) for one in numbers),
@@ -144,7 +144,7 @@ def fit(
     return replace(found, evaluations=work.evaluations)
 
 
-def _search(work: Work, start: Floats) -> Floats:
+def _search(work: FitRuns, start: Floats) -> Floats:
     """Return about the least squares, weights and squares in turn until both stay."""
     point = np.clip(start, work.low, work.high)
     left, work.outliers = work.one(point), work.outliers[:0]
@@ -190,7 +190,7 @@ def _search(work: Work, start: Floats) -> Floats:
     return point
 
 
-def _outliers(work: Work, left: Floats) -> Indices:
+def _outliers(work: FitRuns, left: Floats) -> Indices:
     """Return samples that no sensor made: residuals of the robust pass far off those around them, at most one in 100.
 
     One near a break-away would else decide a friction by itself. More are noise with heavy tails: the largest are left
@@ -221,7 +221,7 @@ class _Settled(NamedTuple):
     gain: float
 
 
-def _settled(work: Work, point: Floats) -> _Settled:
+def _settled(work: FitRuns, point: Floats) -> _Settled:
     """Return where Gauss-Newton steps on whitened samples end, from the least squares at a scaled ``point``.
 
     Samples that stand alone are left out, and in a fit of motion once more those on which the rest hangs.
@@ -255,7 +255,7 @@ def _settled(work: Work, point: Floats) -> _Settled:
     return _Settled(point=point, residuals=left, linear=linear, step=step, gain=gain)
 
 
-def _edge(work: Work, point: Floats, step: Floats) -> dict[str, int]:
+def _edge(work: FitRuns, point: Floats, step: Floats) -> dict[str, int]:
     """Return the sought numbers with which no run succeeds a short step from a point, each with the sign of the step.
 
     All of them where each alone may take it and only together they may not.
@@ -267,7 +267,7 @@ def _edge(work: Work, point: Floats, step: Floats) -> dict[str, int]:
     return {work.numbers[row].name: int(np.sign(step[row])) for row in rows.tolist()}
 
 
-def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
+def _whitened(work: FitRuns, start: Floats, confidence: float) -> Fit:
     """Return the fit after whitening, with its intervals and what speaks against it, from scaled least squares."""
     point, left, linear, step, gain = _settled(work, start)
     rows = linear.rows
@@ -304,7 +304,7 @@ def _whitened(work: Work, start: Floats, confidence: float) -> Fit:
     )
 
 
-def _shares(work: Work, covariance: Floats, names: Sequence[str]) -> dict[str, tuple[tuple[str, float], ...]]:
+def _shares(work: FitRuns, covariance: Floats, names: Sequence[str]) -> dict[str, tuple[tuple[str, float], ...]]:
     """Return the shares [-] of the variance of each number that come from what is assumed of others, largest first."""
     fractions = np.square(covariance * work.prior) / np.diag(covariance)[:, None]
     return {
@@ -313,7 +313,7 @@ def _shares(work: Work, covariance: Floats, names: Sequence[str]) -> dict[str, t
     }
 
 
-def _likelihood(work: Work, found: Fit) -> float:
+def _likelihood(work: FitRuns, found: Fit) -> float:
     """Return the logarithm of the likelihood [-] of whitened residuals and priors, but for a constant."""
     size = 0.0
     for one in work.blocks:
@@ -322,7 +322,7 @@ def _likelihood(work: Work, found: Fit) -> float:
     return -size - 0.5 * float(np.square((found.values / work.scale - work.mean) * work.prior).sum())
 
 
-def _other_starts(work: Work, found: Fit) -> Iterator[Floats]:
+def _other_starts(work: FitRuns, found: Fit) -> Iterator[Floats]:
     """Return scaled starts for the numbers that are sought that explain more than a fit: at most two of a batch."""
     sought = ~(work.prior > 0.0)
     point = found.values / work.scale

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from ppafo.identification.residuals import Work
+from ppafo.identification.residuals import FitRuns
 from ppafo.identification.whitened import Linear, cost_of, squares_of, whitened_errors
 from ppafo.signals.recording import Floats
 
@@ -37,7 +37,7 @@ _UNKNOWN = 0.5
 """Standard error of a combination over the scales of its numbers from which it is not identifiable."""
 
 
-def interval_ends(work: Work, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
+def interval_ends(work: FitRuns, point: Floats, linear: Linear, times: float) -> tuple[Floats, Floats]:
     """Return the lower and upper ends of all numbers, scaled: ``times`` the standard errors, or more where laws bend.
 
     Only intervals of sought numbers change, and only outwards. An end that the samples do not fix is the bound.
@@ -60,7 +60,7 @@ def interval_ends(work: Work, point: Floats, linear: Linear, times: float) -> tu
 
 
 def _end(
-    work: Work,
+    work: FitRuns,
     point: Floats,
     least: float,
     linear: Linear,
@@ -100,7 +100,7 @@ def _end(
     return float(inner[number] + share * (outer[number] - inner[number]))
 
 
-def _least_beside(work: Work, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
+def _least_beside(work: FitRuns, points: Floats, held: list[int], linear: Linear) -> tuple[Floats, Floats]:
     """Return the least squares with one number of each scaled point held where it is, and the points where they are.
 
     The other numbers take Gauss-Newton steps on the Jacobian of the estimate. Infinite where no run succeeds.
@@ -126,7 +126,7 @@ def _least_beside(work: Work, points: Floats, held: list[int], linear: Linear) -
     return least, best
 
 
-def _least_along(work: Work, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
+def _least_along(work: FitRuns, point: Floats, number: int, linear: Linear) -> tuple[float, Floats]:
     """Return the least squares with a number of a scaled point held, and the point where they are.
 
     The other numbers take Gauss-Newton steps within their bounds, each on a Jacobian of its own: far from the estimate

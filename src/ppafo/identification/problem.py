@@ -25,7 +25,7 @@ from ppafo.identification.bench.valve_map import valve_map
 from ppafo.identification.bench.vane_leak import vane_leak
 from ppafo.identification.keys import Columns, Confidence, positive_in, quantity_in
 from ppafo.identification.new_set import stated_half_width
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.identification.tolerances import DEFAULTS, BenchSection, Tolerances
 from ppafo.identification.trajectory.layout import TrajectorySection, refuse_removed
 from ppafo.model.gas import SPECIES
@@ -52,7 +52,7 @@ _FILE = TomlKind(
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class ProcedureContext:
     """Context of a procedure: parameter set, chosen valve, bench, and label of its section in messages."""
 
     parameter_set: ParameterSet
@@ -107,7 +107,7 @@ class StaticTorqueProblem(StrictTable):
     columns: Columns = None
     confidence: Confidence = 0.95
 
-    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
         """Return what the procedure makes of recordings."""
         return static_torque(sources, self.confidence, setting.tolerances)
 
@@ -127,7 +127,7 @@ class FreeDecayProblem(StrictTable):
     end: _End = None
     inertia: Text | None = Field(None, description="such as '8.4 g m^2', or 'unknown'; default: the set's")
 
-    def inertia_of(self, setting: Setting) -> tuple[float | None, float]:
+    def inertia_of(self, setting: ProcedureContext) -> tuple[float | None, float]:
         """Return the inertia and its standard deviation [kg m^2]: the set's where none is named, if it has one."""
         path = "foot_plate.inertia"
         if self.inertia == UNKNOWN:
@@ -138,7 +138,7 @@ class FreeDecayProblem(StrictTable):
         inertia = number_in_si(setting.parameter_set, path)
         return inertia, 0.0 if inertia is None else setting.deviation(path, inertia, "kg m^2")
 
-    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
         """Return what the procedure makes of recordings; IdentificationError for an angle that no such device turns."""
         low, high = (number_in_si(setting.parameter_set, f"actuator.angle_{end}") for end in ("min", "max"))
         for source in sources:
@@ -175,7 +175,7 @@ class OpenValveFlowProblem(StrictTable):
     valve: _Valve = None
     law: Annotated[Law, Field(description="law of the flow; it is written into the set in this form")] = "orifice"
 
-    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
         """Return what the procedure makes of recordings."""
         path = setting.valve_path(self.valve)
         area = number_in_si(setting.parameter_set, f"{path}.area")
@@ -202,7 +202,7 @@ class VaneLeakProblem(StrictTable):
     volume_1: Text | None = Field(None, description="volume of chamber 1 with its line, such as '40 cm^3'")
     volume_2: Text | None = Field(None, description="volume of chamber 2 with its line")
 
-    def volumes_of(self, setting: Setting) -> tuple[float | None, float | None, float]:
+    def volumes_of(self, setting: ProcedureContext) -> tuple[float | None, float | None, float]:
         """Return both volumes [m^3], as given, else from the angle, and the standard deviation of one over it [-].
 
         Equations (4), (5): V1 = V_dead1 + v (theta - theta_min) and V2 = V_dead2 + v (theta_max - theta), with v the
@@ -229,7 +229,7 @@ class VaneLeakProblem(StrictTable):
             deviation = math.hypot(of_volume, of_angle) / (dead_1 + per_angle * (angle - lower))
         return first, second, deviation
 
-    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
         """Return what the procedure makes of recordings."""
         first, second, deviation = self.volumes_of(setting)
         start, end = times_of(self, setting.place)
@@ -262,7 +262,7 @@ class ValveMapProblem(StrictTable):
     temperature: _Temperature = None
     valve: _Valve = None
 
-    def run(self, sources: tuple[Source, ...], setting: Setting) -> BenchResult:
+    def run(self, sources: tuple[RecordingSource, ...], setting: ProcedureContext) -> BenchResult:
         """Return what the procedure makes of recordings."""
         gas = setting.gas(self)
         return valve_map(sources, gas, setting.valve_path(self.valve), self.confidence, setting.tolerances)
@@ -288,7 +288,9 @@ PROCEDURES = "static-torque", "free-decay", "open-valve-flow", "valve-map", "van
 """Kinds of procedures in the recommended order."""
 
 
-def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, setting: Setting) -> BenchResult:
+def run_procedure(
+    sources: tuple[RecordingSource, ...], problem: ProcedureProblem, setting: ProcedureContext
+) -> BenchResult:
     """Return what a procedure of a problem makes of its recordings.
 
     The line of an IdentificationError begins with the recording, else with the place of the procedure.
@@ -311,7 +313,7 @@ def run_procedure(sources: tuple[Source, ...], problem: ProcedureProblem, settin
     return replace(found, remarks=(*found.remarks, said))
 
 
-def window_of(problem: ProcedureProblem, setting: Setting) -> tuple[float, float]:
+def window_of(problem: ProcedureProblem, setting: ProcedureContext) -> tuple[float, float]:
     """Return first and last time [s] that a procedure uses of its recordings."""
     # Steady readings have no window: each counts by itself.
     if not isinstance(problem, FreeDecayProblem | VaneLeakProblem):

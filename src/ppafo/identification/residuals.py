@@ -35,7 +35,7 @@ class Free:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class ResidualBlock:
     """Rows of the residuals that are one channel of one recording or a part of it, in the order of time.
 
     ``floor`` is the error of the engine, or of the resolution [SI], below which no residual says anything: one for all
@@ -59,14 +59,14 @@ _STEPS = (1.0e-7, 1.0e-3)
 """Shortest and longest difference over the scale of a number."""
 
 
-class Work:
+class FitRuns:
     """Runs of a fit in scaled numbers, with the last one kept."""
 
     def __init__(
         self,
         residuals: Residuals,
         numbers: tuple[Free, ...],
-        blocks: tuple[Block, ...],
+        blocks: tuple[ResidualBlock, ...],
         report: Report,
         memory: int,
         is_motion: bool,

@@ -32,7 +32,7 @@ from ppafo.storage.files import read_bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class RecordingSource:
     """A recording and its reference, ``static.csv sha256:0123...``; one that comes from no file has its label."""
 
     recording: Recording
@@ -49,12 +49,12 @@ class Source:
         return self.reference or self.recording.label
 
 
-def source_of(path: Path, recording: Recording, trial: str = "") -> Source:
+def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSource:
     """Return a recording with the name and the hash of the file that it was read from; DataError if that is gone.
 
     ``trial`` stands behind the name where the file has several recordings.
     """
-    return Source(recording, f"{path.name}{trial} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
+    return RecordingSource(recording, f"{path.name}{trial} sha256:{hashlib.sha256(read_bytes(path)).hexdigest()}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ _KINDS: tuple[RecordingKind, ...] = ("synthetic", "simulated", "measured")
 
 
 def check_sources(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     procedure: str,
     channels: Iterable[str],
     fewest: int,
@@ -170,7 +170,7 @@ def check_sources(
             _check_absolute(source, procedure, name)
 
 
-def _check_absolute(source: Source, procedure: str, name: str) -> None:
+def _check_absolute(source: RecordingSource, procedure: str, name: str) -> None:
     # Gauge pressures, passed for absolute, are 0 or less where the other side is open.
     values = source.recording[name]
     low = int(np.argmin(values))
@@ -182,7 +182,7 @@ def _check_absolute(source: Source, procedure: str, name: str) -> None:
     check_not_alone(source, procedure, name)
 
 
-def check_not_alone(source: Source, procedure: str, name: str) -> None:
+def check_not_alone(source: RecordingSource, procedure: str, name: str) -> None:
     """Refuse a value that lies further beyond all others of its channel than twice their range, and than their size.
 
     So is a reading of ten times its value in what nothing else drives. IdentificationError names the sample.
@@ -195,13 +195,13 @@ def check_not_alone(source: Source, procedure: str, name: str) -> None:
             _refuse_outlier(source, procedure, name, [int(wrong)], float(values[wrong]), float(values[others[-1]]))
 
 
-def _shown(source: Source, name: str, value: float) -> str:
+def _shown(source: RecordingSource, name: str, value: float) -> str:
     channel = source.recording.channels[name]
     number, unit = in_shown_unit(value, channel.unit, channel.stated)
     return f"{number:.6g} {unit}".removesuffix(" -")
 
 
-def check_moves(source: Source, procedure: str, name: str) -> None:
+def check_moves(source: RecordingSource, procedure: str, name: str) -> None:
     """Refuse a channel that never changes: nothing can be learnt from it. IdentificationError names the recording."""
     values = source.recording[name]
     if values.max() == values.min():
@@ -212,7 +212,12 @@ def check_moves(source: Source, procedure: str, name: str) -> None:
 
 
 def check_not_clipped(
-    source: Source, procedure: str, name: str, driver: str, driving: Floats, fraction: float = _FRACTION_THAT_MOVES
+    source: RecordingSource,
+    procedure: str,
+    name: str,
+    driver: str,
+    driving: Floats,
+    fraction: float = _FRACTION_THAT_MOVES,
 ) -> None:
     """Refuse a channel that stays exactly at its largest value while what drives it moves: a saturated sensor.
 
@@ -232,8 +237,8 @@ def check_not_clipped(
 
 
 def without_wrong_samples(
-    sources: tuple[Source, ...], procedure: str, names: Sequence[str], start: float | None, end: float | None
-) -> tuple[tuple[Source, ...], tuple[str, ...]]:
+    sources: tuple[RecordingSource, ...], procedure: str, names: Sequence[str], start: float | None, end: float | None
+) -> tuple[tuple[RecordingSource, ...], tuple[str, ...]]:
     """Return recordings over time without the samples that no sensor made, and remarks on these.
 
     They are far off the samples around them by the rule of a fit of motion, in a channel of ``names`` from ``start`` to
@@ -247,7 +252,8 @@ def without_wrong_samples(
         right = np.ones(len(recording), dtype=np.bool_)
         for name in (name for name in names if name in recording):
             values, most = recording[name][inside], max(1, int(_MOST_LEFT_OUT * inside.size))
-            wrong = np.flatnonzero(_far_off(values, most))
+            fine = _off_by(values, most, _FINE_SAMPLE)
+            wrong = np.flatnonzero(fine if np.count_nonzero(fine) <= most else _off_by(values, most, _GROSS_SAMPLE))
             if not wrong.size:
                 continue
             first = int(wrong[0])
@@ -262,15 +268,6 @@ def without_wrong_samples(
         channels = {name: replace(one, values=one.values[right]) for name, one in recording.channels.items()}
         kept.append(replace(source, recording=replace(recording, time=recording.time[right], channels=channels)))
     return tuple(kept), tuple(said)
-
-
-def _far_off(values: Floats, most: int) -> NDArray[np.bool_]:
-    """Return which samples are far off those around them; where more than ``most`` are, a converter may step so.
-
-    Where few are a sixteenth of the usual range off, these are; else those that are off by all of it.
-    """
-    fine = _off_by(values, most, _FINE_SAMPLE)
-    return fine if np.count_nonzero(fine) <= most else _off_by(values, most, _GROSS_SAMPLE)
 
 
 def _off_by(values: Floats, most: int, share: float) -> NDArray[np.bool_]:
@@ -288,7 +285,7 @@ def _off_by(values: Floats, most: int, share: float) -> NDArray[np.bool_]:
 
 
 def check_no_wrong_reading(
-    sources: tuple[Source, ...], procedure: str, name: str, drivers: Sequence[Floats], used: NDArray[np.bool_]
+    sources: tuple[RecordingSource, ...], procedure: str, name: str, drivers: Sequence[Floats], used: NDArray[np.bool_]
 ) -> None:
     """Refuse readings of a channel far off the six readings that are nearest in what drives it, such as a typing error.
 
@@ -334,7 +331,11 @@ class MeterReadings(NamedTuple):
 
 
 def meter_readings(
-    sources: tuple[Source, ...], procedure: str, direction: Floats, zero: float, used: NDArray[np.bool_] | None = None
+    sources: tuple[RecordingSource, ...],
+    procedure: str,
+    direction: Floats,
+    zero: float,
+    used: NDArray[np.bool_] | None = None,
 ) -> MeterReadings:
     """Readings of the flow meter, each beside the direction that pressures or command give the flow.
 
@@ -379,7 +380,7 @@ def usual_range(values: Floats) -> float:
 
 
 def _refuse_outlier(
-    source: Source, procedure: str, name: str, samples: list[int], value: float, around: float
+    source: RecordingSource, procedure: str, name: str, samples: list[int], value: float, around: float
 ) -> NoReturn:
     more = f", and so are samples {', '.join(str(sample + 1) for sample in samples[1:4])}" if samples[1:] else ""
     raise IdentificationError(
@@ -388,7 +389,7 @@ def _refuse_outlier(
     )
 
 
-def check_no_gap(source: Source, procedure: str, part: Recording) -> int:
+def check_no_gap(source: RecordingSource, procedure: str, part: Recording) -> int:
     """Return how many samples of a recording lie before a part of it; refuse a part with a gap.
 
     IdentificationError says where the gap is.
@@ -417,7 +418,7 @@ def kind_of(kinds: Iterable[RecordingKind]) -> RecordingKind:
     return min(kinds, key=_KINDS.index, default="measured")
 
 
-def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
+def told_of_readings(sources: tuple[RecordingSource, ...]) -> tuple[str, ...]:
     """Return remarks on what the sensors did not show: pauses, and values beyond a limit."""
     remarks = []
     for source in sources:
@@ -438,6 +439,6 @@ def told_of_readings(sources: tuple[Source, ...]) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def pool(sources: tuple[Source, ...], name: str) -> Floats:
+def pool(sources: tuple[RecordingSource, ...], name: str) -> Floats:
     """Return a channel [SI] of all recordings, one after the other."""
     return np.concatenate([source.recording[name] for source in sources])

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import lsq_linear
 
 from ppafo.identification.noise import Noise, noise_of, whiten
-from ppafo.identification.residuals import Flags, Work
+from ppafo.identification.residuals import FitRuns, Flags
 from ppafo.signals.recording import Floats
 
 _OF_ANY_SIZE = 1.0e8
@@ -33,7 +33,7 @@ class Linear(NamedTuple):
     sensors: dict[str, Noise]
 
 
-def linear_at(work: Work, point: Floats, left: Floats, slopes: Floats) -> tuple[Linear, Floats]:
+def linear_at(work: FitRuns, point: Floats, left: Floats, slopes: Floats) -> tuple[Linear, Floats]:
     """Return the problem whitened at a point, and the step to its least squares within the bounds.
 
     What the numbers absorb of the noise is missing in the residuals; its expectation J C J' is added until both agree
@@ -89,7 +89,7 @@ def root_of_inverse(curvature: Floats) -> tuple[Floats, Flags]:
     return np.asarray(vectors / np.sqrt(np.maximum(values, _RANK)) / size[:, None]), np.asarray(values > _RANK)
 
 
-def whitened_errors(work: Work, left: Floats, linear: Linear) -> Floats:
+def whitened_errors(work: FitRuns, left: Floats, linear: Linear) -> Floats:
     """Return residuals [SI] (rows, points) as independent errors [-], by the noise of a linear problem."""
     scaled = left / linear.noise[:, None]
     kinds = {channel: replace(noise, deviation=1.0) for channel, noise in linear.sensors.items()}
@@ -97,12 +97,12 @@ def whitened_errors(work: Work, left: Floats, linear: Linear) -> Floats:
     return np.asarray(errors - linear.shared @ (linear.shared.T @ errors))
 
 
-def squares_of(work: Work, errors: Floats, points: Floats) -> Floats:
+def squares_of(work: FitRuns, errors: Floats, points: Floats) -> Floats:
     """Return the sums of squares [-] of whitened errors (rows, points) and of priors, for each scaled point."""
     away = (points - work.mean[:, None]) * work.prior[:, None]
     return np.asarray(np.square(errors).sum(axis=0) + np.square(away).sum(axis=0))
 
 
-def cost_of(work: Work, left: Floats, point: Floats, linear: Linear) -> float:
+def cost_of(work: FitRuns, left: Floats, point: Floats, linear: Linear) -> float:
     """Return the sum of squares [-] of whitened residuals [SI] (rows,) and priors at one scaled point."""
     return float(squares_of(work, whitened_errors(work, left[:, None], linear), point[:, None])[0])

@@ -4,12 +4,12 @@ import math
 
 from ppafo.identification.conflict import SMOOTH, STATED
 from ppafo.identification.fit import Fit
-from ppafo.units import from_si, percentage
-from ppafo.units.shown import shown_unit
+from ppafo.units import percentage
+from ppafo.units.shown import shown_unit, shown_value
 from ppafo.units.spelling import split_pressure_kind
 
-_SHOWN_IN = {"Pa": ("Pa_d", "kPa_d"), "rad": ("rad", "deg"), "N m": ("N m", "N m")}
-"""Unit in SI to the difference that it is shown as, and in which unit where the set does not write another."""
+_DIFFERENCES = {"Pa": "Pa_d"}
+"""Unit in SI to the one of a difference."""
 _SMALLEST, _LARGEST = 1.0e-2, 1.0e5
 """Sizes between which a number is written without a power of ten."""
 _SEVERAL = {"readings", "commands"}
@@ -19,17 +19,15 @@ _SHARE, _MOST_NAMED = 0.05, 3
 
 
 def in_shown_unit(number: float, unit: str, stated: str = "") -> tuple[float, str]:
-    """Number and unit for display: the file's unit if ``stated``, else the set's, else kPa or degrees.
+    """Number and unit for display: the file's unit if ``stated``, else the one that is shown.
 
     A pressure that a file has as gauge is shown absolute, as it is kept.
     """
-    if unit not in _SHOWN_IN or not math.isfinite(number):
-        return number, unit
-    si_unit, usual = _SHOWN_IN[unit]
-    shown = shown_unit(si_unit, usual)
-    if stated:
-        shown = f"{split_pressure_kind(stated)[0]}_d" if si_unit == "Pa_d" else stated
-    return from_si(float(number), shown, si_unit), shown.removesuffix("_d")
+    si_unit = _DIFFERENCES.get(unit, unit)
+    shown = stated or shown_unit(si_unit)
+    if stated and si_unit == "Pa_d":
+        shown = f"{split_pressure_kind(stated)[0]}_d"
+    return shown_value(float(number), si_unit, shown), shown.removesuffix("_d")
 
 
 def with_error(value: float, error: float) -> str:

@@ -48,12 +48,12 @@ def evaluate(recording: Recording) -> dict[str, Metric]:
 
 
 def missing_channels(program: "Program") -> frozenset[str]:
-    """Return channels that runs of a program do not have: those of an energy balance where its gas has none."""
+    """Return the channels that runs of a program lack: an energy balance, if its gas has none."""
     return frozenset() if program.is_thermal else gas.WITH_ENERGY_BALANCE
 
 
 def has_channels(program: "Program", kind: MetricKind) -> bool:
-    """True where runs of a program have the channels of a metric, and what else it needs."""
+    """Tell whether runs of a program have the channels and other needs of a metric."""
     return (
         missing_channels(program).isdisjoint(kind.channels)
         and kind.of_reference in ("", program.followed)

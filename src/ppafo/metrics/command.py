@@ -20,11 +20,11 @@ from ppafo.signals.meter import REQUESTED, WALK, Course, MeterKind, Sample
 Masks = NDArray[np.bool_]
 
 HALF_OPEN = 0.5
-"""Command [-] beyond which a valve counts as open one way."""
+"""Command [-] above which a valve counts as open in one direction."""
 
 
 class Reversals(NamedTuple):
-    """The way that the command went last in this task, 1, -1 or 0 for neither; the task; reversals so far."""
+    """Last direction of the command in this task, 1, -1 or 0 for neither; the task; number of reversals so far."""
 
     way: float
     task: float
@@ -32,7 +32,7 @@ class Reversals(NamedTuple):
 
 
 def way_of(command: float) -> float:
-    """The way [-] that a command opens the valve: 1 or -1, 0 where it is at most half open or vents."""
+    """Direction [-] in which a command opens the valve: 1 or -1, 0 if it is at most half open or vents."""
     return (1.0 if HALF_OPEN < command <= VENTS_ABOVE else 0.0) - (1.0 if command < -HALF_OPEN else 0.0)
 
 
@@ -52,22 +52,17 @@ def update_reversals(state: Reversals, _course: Course, sample: Sample) -> Rever
 REVERSALS = MeterKind("reversals", Reversals, start_reversals, update_reversals)
 
 
-def reversals_of(command: Floats, task: Floats) -> int:
-    """Return how often a command [-] turns within a task; both (samples,)."""
+def command_reversals(recording: Recording) -> float:
+    """Reversals of the command in a recording."""
+    command = recording["command"]
+    task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
     ways = np.where((command > HALF_OPEN) & (command <= VENTS_ABOVE), 1, 0) - np.where(command < -HALF_OPEN, 1, 0)
     # What begins anew has a number of its own: reversals count between two ways of one number.
     begins = (np.diff(task, prepend=task[:1]) != 0.0) | (command > VENTS_ABOVE)
     number = np.cumsum(begins)
     open_at = np.flatnonzero(ways)
     turns = np.diff(ways[open_at]) != 0
-    return int(np.count_nonzero(turns & (np.diff(number[open_at]) == 0)))
-
-
-def command_reversals(recording: Recording) -> float:
-    """Reversals of the command in a recording."""
-    command = recording["command"]
-    task = recording["controller_phase"] if "controller_phase" in recording else np.zeros(command.size)
-    return float(reversals_of(command, task))
+    return float(np.count_nonzero(turns & (np.diff(number[open_at]) == 0)))
 
 
 class Peak(NamedTuple):
@@ -82,7 +77,7 @@ def start_peak(_course: Course, sample: Sample) -> Peak:
 
 
 def update_peak(state: Peak, _course: Course, sample: Sample) -> Peak:
-    """The larger one of the peak and the next sample's torque."""
+    """Peak after one more sample."""
     return Peak(max(state.torque, abs(sample.torque)))
 
 
@@ -95,7 +90,7 @@ def peak_torque(recording: Recording) -> float:
 
 
 class Asked(NamedTuple):
-    """Sums over the samples in which a controller of walking asks for a torque, and how many these are.
+    """Sums over the samples in which a walking controller requests a torque, and their number.
 
     Squared torque errors and squared requested torques [N^2 m^2].
     """
@@ -106,12 +101,12 @@ class Asked(NamedTuple):
 
 
 def is_asked(command: float, task: float) -> bool:
-    """Return whether a controller of walking asks for a torque: in mid-stance, and where it vents, it does not."""
+    """Tell whether a walking controller requests a torque: not in mid-stance, and not while it vents."""
     return command <= VENTS_ABOVE and task != MID_STANCE
 
 
 def start_asked(_course: Course, _sample: Sample) -> Asked:
-    """Nothing is asked for before a walk."""
+    """Zero sums at the start of a walk."""
     return Asked(0.0, 0.0, 0.0)
 
 
@@ -129,14 +124,14 @@ ASKED = MeterKind("asked", Asked, start_asked, update_asked)
 
 
 def asked_samples(recording: Recording) -> Masks:
-    """Return the samples in which a controller asks for a torque (samples,): all, but of a walk with its phases."""
+    """Mark the samples in which a controller requests a torque (samples,): all, except in a walk by its phases."""
     if "controller_phase" not in recording:
         return np.ones(len(recording), dtype=np.bool_)
     return np.asarray((recording["command"] <= VENTS_ABOVE) & (recording["controller_phase"] != MID_STANCE))
 
 
 def torque_error(recording: Recording) -> float | None:
-    """RMS error of the torque [N m] in a walk where one is asked for; None where none is."""
+    """RMS error of the torque [N m] over the samples of a walk with a requested torque; None without any."""
     asked = asked_samples(recording)
     if not asked.any():
         return None
@@ -144,13 +139,13 @@ def torque_error(recording: Recording) -> float | None:
 
 
 def requested_torque(recording: Recording) -> float | None:
-    """RMS of the torque that a walk's controller requests [N m], where it requests one; None where it never does."""
+    """RMS of the torque [N m] that a walking controller requests; None if it requests none."""
     asked = asked_samples(recording)
     return float(np.sqrt(np.mean(recording["reference"][asked] ** 2))) if asked.any() else None
 
 
 def root_mean(squares: Floats, samples: Floats) -> Floats:
-    """Root of a mean of squares; nan for none (runs,)."""
+    """Root of a mean of squares; nan for no samples (runs,)."""
     found: Floats = root(choose(samples > 0.0, squares / larger(samples, 1.0), math.nan))
     return found
 

@@ -1,4 +1,4 @@
-"""Gas and work: what a task costs, and what it gives."""
+"""Metrics of gas and work: consumption and output of a task."""
 
 import math
 from functools import partial
@@ -21,18 +21,18 @@ def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunct
 
 
 def gas_imbalance(supplied: Numeric, vented: Numeric, mass_1: Numeric, mass_2: Numeric) -> Numeric:
-    """Supplied less vented less stored gas [kg]; what a simulation loses or invents, near 0 for a sound one."""
+    """Supplied less vented less stored gas [kg]: mass error of a simulation, near 0."""
     # What leaks goes from one chamber to the other: it leaves neither sum.
     return supplied - vented - (mass_1 + mass_2)
 
 
 def gas_taken(supplied: Numeric) -> Numeric:
-    """Gas [kg] that a source moves: out of a supply, or into one that is a vacuum."""
+    """Gas [kg] that a source supplies, or that a vacuum takes in."""
     return abs(supplied)
 
 
 def energy_imbalance(supplied: Numeric, vented: Numeric, heat: Numeric, work: Numeric, stored: Numeric) -> Numeric:
-    """Enthalpy supplied less vented, and heat, less work and stored energy [J]; what a simulation loses or invents."""
+    """Enthalpy supplied less vented, plus heat, less work and stored energy [J]: energy error of a simulation."""
     return supplied - vented + heat - work - stored
 
 
@@ -75,12 +75,12 @@ class GasGains(NamedTuple):
 
 
 def start_gas(course: Course, sample: Sample) -> GasGains:
-    """Nothing gained at the first sample."""
+    """Zero gains at the first sample."""
     return GasGains(sample.gas, NO_GAS)
 
 
 def update_gas(state: GasGains, course: Course, sample: Sample) -> GasGains:
-    """Gains up to the next sample."""
+    """Gains after one more sample."""
     # A run may go on after its last sample, to the end of a step: what passes there is in no recording.
     gained = GasSample(
         supplied_mass=sample.gas.supplied_mass - state.first.supplied_mass,
@@ -103,12 +103,12 @@ class EnergyGains(NamedTuple):
 
 
 def start_energy(course: Course, sample: Sample) -> EnergyGains:
-    """Nothing gained at the first sample."""
+    """Zero gains at the first sample."""
     return EnergyGains(sample.energy, NO_ENERGY)
 
 
 def update_energy(state: EnergyGains, course: Course, sample: Sample) -> EnergyGains:
-    """Gains up to the next sample."""
+    """Gains after one more sample."""
     gained = EnergySample(
         gas_energy=sample.energy.gas_energy - state.first.gas_energy,
         supplied_enthalpy=sample.energy.supplied_enthalpy - state.first.supplied_enthalpy,
@@ -134,7 +134,7 @@ def start_largest_pressure(course: Course, sample: Sample) -> LargestPressure:
 
 
 def update_largest_pressure(state: LargestPressure, course: Course, sample: Sample) -> LargestPressure:
-    """The larger one of that and both pressures of the next sample."""
+    """Largest pressure after one more sample."""
     return LargestPressure(max(state.pressure, sample.pressure_1, sample.pressure_2))
 
 
@@ -153,7 +153,7 @@ def start_lowest_temperature(course: Course, sample: Sample) -> LowestTemperatur
 
 
 def update_lowest_temperature(state: LowestTemperature, course: Course, sample: Sample) -> LowestTemperature:
-    """The lowest one of that and both temperatures of the next sample."""
+    """Lowest temperature after one more sample."""
     return LowestTemperature(min(state.temperature, sample.temperature_1, sample.temperature_2))
 
 

@@ -34,7 +34,7 @@ class Metric:
         return np.array(self.value, dtype)
 
     def __float__(self) -> float:
-        """Return the value in SI, as arithmetic asks for it."""
+        """Return the value in SI, for arithmetic."""
         return float(self.value)
 
     def in_unit(self, unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> float:
@@ -46,7 +46,7 @@ class Metric:
 
 
 class Metrics(dict[str, Metric]):
-    """Metrics by name; a name that is not there is answered with the nearest one."""
+    """Metrics by name; an unknown name is refused with the nearest one."""
 
     def __missing__(self, name: str) -> Metric:
         """Refuse a name. DataError with the nearest one, as for a channel of a recording."""

@@ -87,7 +87,7 @@ class EndedStrides(NamedTuple):
     push_off_samples: float
 
 
-class Strides(NamedTuple):
+class StrideMeter(NamedTuple):
     """A walk up to a sample: heel strikes, gas [kg] from the supply at the first sample and now, its strides.
 
     ``safe_time`` [s] is the time of the first sample with less help, ``NOT_YET`` without one.
@@ -140,11 +140,11 @@ def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> Curre
     )
 
 
-def _start(_course: Course, sample: Sample) -> Strides:
+def _start(_course: Course, sample: Sample) -> StrideMeter:
     no_sums = StrideTotals(
         gas=0.0, positive_push_off_work=0.0, net_push_off_work=0.0, toe_clearance=0.0, toe_landing=0.0
     )
-    return Strides(
+    return StrideMeter(
         strikes=sample.stride.strides,
         first_gas=sample.stride.supplied_mass,
         gas=sample.stride.supplied_mass,
@@ -154,13 +154,13 @@ def _start(_course: Course, sample: Sample) -> Strides:
     )
 
 
-def _update(strides: Strides, _course: Course, sample: Sample) -> Strides:
+def _update(strides: StrideMeter, _course: Course, sample: Sample) -> StrideMeter:
     # Counts are floats in the state of a run: half way between two of them is safe from rounding.
     is_strike = sample.stride.strides - strides.strikes > 0.5
     on_toes = sample.stride.toe_landings - strides.current.at_strike.toe_landing
     begun = begun_stride(sample.stride, 1.0, on_toes)
     is_first_without_help = sample.stride.level > HELPS and strides.safe_time < 0.0
-    return Strides(
+    return StrideMeter(
         strikes=sample.stride.strides,
         first_gas=strides.first_gas,
         gas=sample.stride.supplied_mass,
@@ -201,7 +201,7 @@ def ended_with_stride(ended: EndedStrides, stride: CurrentStride, sample: Sample
     )
 
 
-METER = MeterKind("strides", Strides, _start, _update)
+METER = MeterKind("strides", StrideMeter, _start, _update)
 
 
 def mean_of(total: Floats, count: Floats) -> Floats:

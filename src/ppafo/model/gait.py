@@ -348,7 +348,7 @@ class TimedSequence(NamedTuple):
     parts: Annotated[tuple[SequencePart, ...], PARTS]
 
 
-class Motion(NamedTuple):
+class AngleMotion(NamedTuple):
     """An angle [rad] with its rate [rad/s] and acceleration [rad/s^2]."""
 
     angle: float
@@ -369,7 +369,7 @@ class Pace(NamedTuple):
     stride_rate: float
     stride_acceleration: float
     load: float
-    slope: Motion
+    slope: AngleMotion
     tilt: float
     scuff: float
 
@@ -440,7 +440,7 @@ def pace_in(part: SequencePart, time: float) -> Pace:
         stride_rate=part.stride_gain * shape.rate / part.length,
         stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
         load=part.load + part.load_gain * shape.value,
-        slope=Motion(
+        slope=AngleMotion(
             angle=part.slope + part.slope_gain * shape.value,
             rate=part.slope_gain * shape.rate / part.length,
             acceleration=part.slope_gain * shape.acceleration / (part.length * part.length),
@@ -450,20 +450,20 @@ def pace_in(part: SequencePart, time: float) -> Pace:
     )
 
 
-def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> Motion:
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> AngleMotion:
     """An angle between its value in standing [rad] and the gait's."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
     # A changing cadence adds its own term to the second derivative, with the shape of the rate.
     turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
-    return Motion(
+    return AngleMotion(
         angle=standing + pace.stride * away,
         rate=pace.stride_rate * away + pace.stride * rate,
         acceleration=pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
     )
 
 
-def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> AngleMotion:
     """Forward lean of the shank for a strike with the toes: largest at the strike, zero at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
     # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.
@@ -474,7 +474,7 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> Motion:
     place = (since - lifted) * slope if rises else 1.0 + (since - strike) * slope
     shape = blend(max(0.0, min(1.0, place)))
     rate = slope * pace.frequency
-    return Motion(
+    return AngleMotion(
         angle=pace.tilt * shape.value,
         rate=pace.tilt * shape.rate * rate,
         acceleration=pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),

@@ -156,36 +156,6 @@ def _setting(entry: Mapping[str, Any], gauge: Mapping[str, str], intervals: Mapp
         interval is not None and not interval[0] <= entry["value"] <= interval[1]
     )
     is_initial = key in ("initial.pressure_1", "initial.pressure_2")
-    return {
-        "key": key,
-        "label": label_of(key),
-        "unit": _bare(entry["unit"]),
-        "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
-        "low": entry["minimum"],
-        "high": entry["maximum"],
-        "isLowAllowed": entry["is_minimum_allowed"],
-        "value": entry["value"],
-        "text": gauge.get(key, ""),
-        "follows": entry["follows"] or "",
-        "made": entry["made"],
-        "words": {word: f"supply.{name}" for word, name in PRESSURE_WORDS.items()} if is_initial else {},
-        "kept": entry["kept"] or "",
-        "slider": _slider(entry),
-        "summary": entry["description"],
-        "origin": entry["origin"],
-        "source": entry["source"],
-        "note": entry["note"],
-        "interval": None if is_theirs else interval,
-    }
-
-
-def _bare(unit: str) -> str:
-    """A unit as it is typed; a plain number has none."""
-    return "" if unit == "1" else unit
-
-
-def _slider(entry: Mapping[str, Any]) -> Interval:
-    """Ends of a slider in the unit that is shown, with the value inside."""
     display = entry["display"]
     factor, zero = display["factor"], display["zero"]
     value = (entry["value"] - zero) / factor
@@ -202,7 +172,32 @@ def _slider(entry: Mapping[str, Any]) -> Interval:
         begin = max(begin, (low or 0.0) + (end - (low or 0.0)) / 100.0)
     begin = begin if low is None else max(begin, low)
     end = end if high is None else min(end, high)
-    return min(begin, value), max(end, value)
+    return {
+        "key": key,
+        "label": label_of(key),
+        "unit": _bare(entry["unit"]),
+        "shown": _typed(_bare(entry["display"]["unit"]), entry["unit"]),
+        "low": entry["minimum"],
+        "high": entry["maximum"],
+        "isLowAllowed": entry["is_minimum_allowed"],
+        "value": entry["value"],
+        "text": gauge.get(key, ""),
+        "follows": entry["follows"] or "",
+        "made": entry["made"],
+        "words": {word: f"supply.{name}" for word, name in PRESSURE_WORDS.items()} if is_initial else {},
+        "kept": entry["kept"] or "",
+        "slider": (min(begin, value), max(end, value)),
+        "summary": entry["description"],
+        "origin": entry["origin"],
+        "source": entry["source"],
+        "note": entry["note"],
+        "interval": None if is_theirs else interval,
+    }
+
+
+def _bare(unit: str) -> str:
+    """A unit as it is typed; a plain number has none."""
+    return "" if unit == "1" else unit
 
 
 def _nice(value: float) -> float:

@@ -6,8 +6,9 @@ from html import escape
 from typing import Any, NamedTuple
 
 from ppafo.model.controlled import CONTROLLED
-from ppafo.report.display_units import axis_unit, display_value, quantity_of_unit
+from ppafo.report.display_units import axis_unit, display_value
 from ppafo.report.style import BLACK, GREY, PAGE_COLOURS
+from ppafo.units.shown import quantity_of_unit
 
 Points = list[tuple[float, float]]
 """Time [s] and value, in the unit in which it is shown."""

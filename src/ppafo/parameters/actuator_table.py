@@ -11,7 +11,7 @@ import numpy as np
 
 from ppafo.documents.toml_text import label
 from ppafo.errors import ParameterError
-from ppafo.model.actuators.table import BENDS, RISES, Chamber, Curve, Rise, Table
+from ppafo.model.actuators.table import BENDS, RISES, Curve, Rise, Table, TabulatedChamber
 from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_volumes
 from ppafo.signals.recording import Floats
 
@@ -50,7 +50,7 @@ def table_of(measured: MeasuredVolumes, file: str) -> Table:
     chamber_1 = _chamber(volume_1, measured.pressures, shares)
     _check_curves(chamber_1, bends, angles, "volume_1", file)
     if measured.volume_2 is None:
-        chamber_2 = Chamber(_NOTHING, tuple(rise._replace(gain=_NOTHING) for rise in chamber_1.rises))
+        chamber_2 = TabulatedChamber(_NOTHING, tuple(rise._replace(gain=_NOTHING) for rise in chamber_1.rises))
     else:
         volume_2, _ = within_resolution(measured.volume_2[::-1], 1.0 - shares[::-1], measured.resolution_2)
         chamber_2 = _chamber(volume_2[::-1], measured.pressures, shares)
@@ -124,14 +124,14 @@ def measured_pressures(table: Table) -> tuple[float, float]:
     return lowest, max((rise.lower + rise.length for rise in rises), default=math.inf)
 
 
-def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> Chamber:
+def _chamber(volume: Floats, pressures: Floats, shares: Floats) -> TabulatedChamber:
     """Return a chamber from its volumes [m^3] (angles, pressures) at gauge pressures [Pa] and shares of the range."""
     rises = [
         Rise(float(lower), float(upper - lower), _curve(volume[:, index + 1] - volume[:, index], shares))
         for index, (lower, upper) in enumerate(pairwise(pressures))
     ]
     unreached = Rise(_UNREACHED, 1.0, _NOTHING)
-    return Chamber(_curve(volume[:, 0], shares), (*rises, *[unreached] * (RISES - len(rises))))
+    return TabulatedChamber(_curve(volume[:, 0], shares), (*rises, *[unreached] * (RISES - len(rises))))
 
 
 def _curve(values: Floats, shares: Floats) -> Curve:
@@ -150,7 +150,7 @@ def _basis(shares: Floats, bends: Floats) -> Floats:
     return np.hstack([powers, np.maximum(shares[:, None] - bends, 0.0) ** 3])
 
 
-def _check_curves(chamber: Chamber, bends: Floats, angles: Floats, name: str, file: str) -> None:
+def _check_curves(chamber: TabulatedChamber, bends: Floats, angles: Floats, name: str, file: str) -> None:
     """Refuse a chamber of which a curve swings so far between the angles that it is negative."""
     basis = _basis(_CHECKED_SHARES, bends)
     for curve in (chamber.lowest, *(rise.gain for rise in chamber.rises)):

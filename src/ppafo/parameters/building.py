@@ -60,7 +60,11 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     name = chosen_valve(parameter_set, valve)
     links = links_of_set(parameter_set) if links is None else links
     parameter_set = with_followers(parameter_set)
-    _check_complete(parameter_set, name)
+    missing = missing_values(parameter_set, name)
+    if missing:
+        completed = parameter_set.completed_by
+        remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
+        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     species = _species(parameter_set)
@@ -208,9 +212,8 @@ def _reader(parameter_set: ParameterSet) -> Reader:
             with refused_as(ParameterError, written, UnitError):
                 numbers[member.name] = entry_in_si(entry, declared[path], atmosphere)
             if not declaration.is_within(numbers[member.name], declared[path]):
-                raise ParameterError(
-                    f"{written}: {range_rule(declared[path], declaration.limits_text(declared[path]))}"
-                )
+                allowed = declaration.limits_text(declared[path], entry.unit)
+                raise ParameterError(f"{written}: {range_rule(declared[path], allowed)}")
         return numbers
 
     return read
@@ -266,14 +269,6 @@ def missing_values(parameter_set: ParameterSet, valve: str) -> list[str]:
     # Without numbers of their own, chamber 2 has the pressure of chamber 1, and a vane displaces its torque constant.
     missing = [path for path in needed if path not in (*parameter_set.numbers, SECOND_PRESSURE_PATH, DISPLACEMENT_PATH)]
     return missing + [path for path in (declaration.SPECIES_PATH,) if path not in parameter_set.texts]
-
-
-def _check_complete(parameter_set: ParameterSet, valve: str) -> None:
-    missing = missing_values(parameter_set, valve)
-    if missing:
-        completed = parameter_set.completed_by
-        remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
-        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
 
 
 def consistency(device: Device) -> tuple[tuple[str, str, str, bool], ...]:

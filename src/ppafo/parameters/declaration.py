@@ -10,12 +10,15 @@ from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
+from ppafo.errors import UnitError
 from ppafo.model.actuators.vane import KIND as VANE
 from ppafo.model.catalog import ACTUATORS, VALVES, device_effects
 from ppafo.model.declaration import Quantity, quantities_of
 from ppafo.model.effects.kind import Effect
 from ppafo.model.effects.restitution import EFFECT as RESTITUTION
 from ppafo.parameters.device import Actuator, Flow, FootPlate, Friction, Gas, Orifice, SonicOrifice, Supply
+from ppafo.units import from_si, split_pressure_kind, to_si
+from ppafo.units.shown import shown_unit
 
 SPECIES_PATH = "gas.species"
 RELIEVING_PATH = "supply.relieving"
@@ -117,11 +120,27 @@ def _by_path(
     return MappingProxyType({quantity.name: quantity for quantity in declared})
 
 
-def limits_text(quantity: Quantity) -> str:
-    """Return the limits of a declaration with their unit as a message states them: ``at least 0 and at most 1 m``."""
-    beyond, unit = (
-        "at least" if quantity.minimum_allowed else "more than",
-        "" if quantity.unit == "1" else quantity.unit,
+def fits(unit: str, si_unit: str) -> bool:
+    """Tell whether a unit converts to an SI unit."""
+    try:
+        to_si(1.0, unit, si_unit)
+    except UnitError:
+        return False
+    return True
+
+
+def limits_text(quantity: Quantity, given: str = "") -> str:
+    """Return the limits of a declaration as a message states them: ``at least 0 cm^3 and at most 1000 cm^3``.
+
+    They are in the unit in which a value was ``given``, where that is known and fits, else in the one that is shown.
+    """
+    unit = given if given and fits(given, quantity.unit) else shown_unit(quantity.unit)
+    # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
+    unit = f"{split_pressure_kind(unit)[0]}_a" if quantity.unit == "Pa_a" else "" if unit == "1" else unit
+    beyond = "at least" if quantity.minimum_allowed else "more than"
+    ends = ((beyond, quantity.minimum), ("at most", quantity.maximum))
+    return " and ".join(
+        f"{word} {from_si(limit, unit, quantity.unit):.6g} {unit}".rstrip()
+        for word, limit in ends
+        if math.isfinite(limit)
     )
-    upper = f" and at most {quantity.maximum:g}" if math.isfinite(quantity.maximum) else ""
-    return f"{beyond} {quantity.minimum:g}{upper} {unit}".rstrip()

@@ -13,7 +13,7 @@ from ppafo.model.columns import first
 from ppafo.model.declaration import Number
 from ppafo.model.gas import specific_gas_constant
 from ppafo.parameters.graph import SAME_PRESSURE, Graph
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units.shown import counted_from
 
 VANE = "vane"
@@ -210,7 +210,7 @@ class Device:
     valve_name: str
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     links: Graph = field(default_factory=dict, compare=False, repr=False)
-    joint: Joint = ANKLE
+    joint: JointNames = ANKLE
     units: Mapping[str, str] = field(default_factory=dict, compare=False, repr=False)
 
     @property

@@ -36,7 +36,7 @@ def fill(row: type, numbers: Sequence[Any]) -> Any:
 
 
 @dataclass(frozen=True, slots=True)
-class Term:
+class LinkFunction:
     """A function of other numbers, floats or arrays (runs,), which is one of floats that can be translated to C.
 
     The first sources fill ``rows``, NamedTuple classes that declare their numbers, one after the other, and are given
@@ -48,7 +48,7 @@ class Term:
     function: PlainFunction = itself
     rows: tuple[type, ...] = ()
     orifice: str = ""
-    in_other_form: "Term | None" = None
+    in_other_form: "LinkFunction | None" = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copy and pickle with the recipe of the function, which may be one that no module has."""
@@ -72,8 +72,8 @@ class Term:
         return arguments + rest
 
 
-def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> Term:
-    return Term(sources, by_recipe(recipe), *others)
+def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> LinkFunction:
+    return LinkFunction(sources, by_recipe(recipe), *others)
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class Follows:
     ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
     """
 
-    terms: tuple[Term, ...]
+    terms: tuple[LinkFunction, ...]
     gap: float = 0.0
     when_set: bool = False
 
@@ -106,7 +106,7 @@ class Follows:
 
 def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Follows:
     """Return the link to one number, with what is added to it."""
-    return Follows((Term((source,)),), gap, when_set)
+    return Follows((LinkFunction((source,)),), gap, when_set)
 
 
 Graph = Mapping[str, tuple[Follows, ...]]
@@ -182,7 +182,7 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
     if not orifices:
         return graph
 
-    def turned(term: Term) -> Term:
+    def turned(term: LinkFunction) -> LinkFunction:
         other = term.in_other_form if term.orifice in orifices else None
         return term if other is None else replace(other, in_other_form=replace(term, in_other_form=None))
 

@@ -15,7 +15,7 @@ OPPOSITES |= {second: first for first, second in OPPOSITES.items()}
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class JointNames:
     """Joint that the actuator turns, in words: its name, the movement of a growing angle, and of a falling one."""
 
     name: str = "ankle"
@@ -30,5 +30,5 @@ class Joint:
         return text
 
 
-ANKLE = Joint()
+ANKLE = JointNames()
 """The joint of a set that names none."""

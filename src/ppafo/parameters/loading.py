@@ -24,7 +24,7 @@ from ppafo.parameters import declaration
 from ppafo.parameters.building import build_device
 from ppafo.parameters.declaration import alternatives
 from ppafo.parameters.device import VANE, Device
-from ppafo.parameters.joint import ANKLE, OPPOSITES, Joint
+from ppafo.parameters.joint import ANKLE, OPPOSITES, JointNames
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
 from ppafo.parameters.parameter_set import (
     Accepted,
@@ -118,7 +118,7 @@ _KINDS: tuple[Kinds[Any], ...] = (VALVES, ACTUATORS, EFFECTS)
 
 _WORD = Annotated[str, Field(pattern=r"^[a-z][a-z ]{0,39}$")]
 _JOINT = table(
-    "Joint",
+    "JointNames",
     {
         "name": (_WORD, Field(description="name of the joint, such as 'elbow'")),
         "positive": (_WORD, Field(description="what a growing angle is called, such as 'flexion'")),
@@ -127,7 +127,7 @@ _JOINT = table(
 )
 
 
-def _joint_of(words: Any, file: str) -> Joint:
+def _joint_of(words: Any, file: str) -> JointNames:
     """Return the words for a joint; ParameterError for a movement whose opposite is not known and not given."""
     if words is None:
         return ANKLE
@@ -137,7 +137,7 @@ def _joint_of(words: Any, file: str) -> Joint:
         raise ParameterError(
             f"{file}: joint.positive = '{words.positive}': its opposite is not known{hint}; give joint.negative too"
         )
-    return Joint(words.name, words.positive, negative)
+    return JointNames(words.name, words.positive, negative)
 
 
 @functools.lru_cache(maxsize=4)

@@ -26,7 +26,7 @@ from ppafo.signals.recording import Floats
 from ppafo.units import number_text, to_si
 
 
-class Column(NamedTuple):
+class VolumeColumn(NamedTuple):
     """A column that the file may have: its SI unit, the size [SI] beyond which a number is a slip, a unit to write."""
 
     unit: str
@@ -35,10 +35,10 @@ class Column(NamedTuple):
 
 
 COLUMNS = {
-    "angle": Column("rad", 10.0, "deg"),
-    "pressure": Column("Pa_a", 1.0e7, "kPa_g"),
-    "volume_1": Column("m^3", 1.0, "mL"),
-    "volume_2": Column("m^3", 1.0, "mL"),
+    "angle": VolumeColumn("rad", 10.0, "deg"),
+    "pressure": VolumeColumn("Pa_a", 1.0e7, "kPa_g"),
+    "volume_1": VolumeColumn("m^3", 1.0, "mL"),
+    "volume_2": VolumeColumn("m^3", 1.0, "mL"),
 }
 _NEEDED = ("angle", "pressure", "volume_1")
 _NEAREST_ANGLES = 0.01

@@ -27,8 +27,10 @@ from ppafo.parameters.parameter_set import (
     entry_text,
     links_of_set,
     with_followers,
+    written_units,
 )
-from ppafo.units import SI, from_si, split_number
+from ppafo.units import SI, split_number
+from ppafo.units.shown import shown_text
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]
@@ -201,7 +203,13 @@ def with_overrides(parameter_set: ParameterSet, overrides: Iterable[Override], v
     every = {**{path: overrides_by_path[path] for path in first}, **overrides_by_path, **followers}
     for path, text in every.items():
         parameter_set = _CHANGES.get(path, _with_number)(parameter_set, path, text)
-    return parameter_set
+    # Who gives a pressure in bar reads pressures in bar; a program gives numbers in SI, and reads nothing.
+    typed = {
+        path: parameter_set.numbers[path]
+        for path, override in overrides_by_path.items()
+        if path in parameter_set.numbers and split_number(override.text)[1] != SI
+    }
+    return replace(parameter_set, shown={**parameter_set.shown, **written_units(typed)})
 
 
 def _with_number(parameter_set: ParameterSet, path: str, override: Override) -> ParameterSet:
@@ -243,7 +251,7 @@ def _in_conductance(override: Override) -> str:
     if conductance is None:
         return ""
     return (
-        f": --set '{section}.sonic_conductance={from_si(conductance, 'L/(s bar)', 'm^3/(s Pa)'):.4g} L/(s bar)' "
+        f": --set '{section}.sonic_conductance={shown_text(conductance, 'm^3/(s Pa)', '.4g')}' "
         f"--set '{section}.critical_ratio={USUAL_CRITICAL_RATIO:g}'"
     )
 

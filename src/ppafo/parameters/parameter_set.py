@@ -11,7 +11,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
 from ppafo.errors import ParameterError, UnitError, nearest_name
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import SPECIES_PATH, alternatives, quantities
+from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, quantities
 from ppafo.parameters.graph import (
     ATMOSPHERE_PATH,
     DISPLACEMENT_PATH,
@@ -23,7 +23,7 @@ from ppafo.parameters.graph import (
     follows,
     gauge_link,
 )
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units import base_value, format_quantity, to_si
 from ppafo.units.shown import pressure_units
 
@@ -119,7 +119,7 @@ class ParameterSet:
     texts: Mapping[str, TextEntry]
     flags: Mapping[str, FlagEntry]
     accepted: Mapping[str, str]
-    joint: Joint = ANKLE
+    joint: JointNames = ANKLE
     shown: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     def __repr__(self) -> str:
@@ -143,6 +143,13 @@ _SPEAKING = {
     "rad": ("actuator.angle_max", "actuator.angle_min"),
 }
 """Paths whose unit says how the author of a set writes a quantity, by its unit in SI."""
+_SPEAKING_ENDS = {
+    "kg/s": (".mass_flow",),
+    "m^3/(s Pa)": (".sonic_conductance",),
+    "m^2": (".area",),
+    "m^3": (".dead_volume_1", ".dead_volume"),
+}
+"""The same of paths that differ from set to set, by their ends."""
 
 
 def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
@@ -151,29 +158,21 @@ def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
     ``numbers`` are the entries of the set by path. What follows is in step: the difference of two levels in ``bar_g``
     is in ``bar_d``, an angular velocity beside ``deg`` in ``deg/s``. A quantity without a number is left out.
     """
-    flows = tuple(path for path in numbers if path.startswith("reported.") and path.endswith(".mass_flow"))
-    conductances = tuple(path for path in numbers if path.endswith(".sonic_conductance"))
-    speaking = {**_SPEAKING, "kg/s": flows, "m^3/(s Pa)": conductances}
+    by_end = {
+        si_unit: tuple(path for path in numbers if path.endswith(ends)) for si_unit, ends in _SPEAKING_ENDS.items()
+    }
+    speaking = {**_SPEAKING, **by_end}
     units = {
         si_unit: unit
         for si_unit, paths in speaking.items()
         for unit in [numbers[path].unit for path in reversed(paths) if path in numbers]
-        if _is_of(unit, si_unit)
+        if fits(unit, si_unit)
     }
     if "Pa_a" in units:
         units |= pressure_units(units["Pa_a"])
     if "rad" in units:
         units["rad/s"] = f"{units['rad']}/s"
     return units
-
-
-def _is_of(unit: str, si_unit: str) -> bool:
-    """Tell whether a unit converts to an SI unit. One that does not is a finding of the audit, and no error here."""
-    try:
-        to_si(1.0, unit, si_unit)
-    except UnitError:
-        return False
-    return True
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:

@@ -6,7 +6,7 @@ from typing import final
 
 from ppafo.errors import ScenarioError
 from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
-from ppafo.processor.images import Decision, Image, Machine, Memory, Target
+from ppafo.processor.images import Decision, EmulatedMachine, Image, MemoryRegion, Target
 from ppafo.processor.qemu import QemuSimulator
 from ppafo.storage.files import write_file
 
@@ -96,8 +96,8 @@ MSP430F2013 = Target(
     processor="MSP430F2013",
     board="an eZ430-F2013",
     clock=16.0e6,
-    flash=Memory(0xF800, 0x800),
-    ram=Memory(0x200, 0x80),
+    flash=MemoryRegion(0xF800, 0x800),
+    ram=MemoryRegion(0x200, 0x80),
     interrupt_stack=4,
     converter_bits=16,
     words={
@@ -158,8 +158,8 @@ CORTEX_M0 = Target(
     processor="nRF51822, a Cortex-M0",
     board="a BBC micro:bit V1",
     clock=16.0e6,
-    flash=Memory(0, 256 * 1024),
-    ram=Memory(0x20000000, 16 * 1024),
+    flash=MemoryRegion(0, 256 * 1024),
+    ram=MemoryRegion(0x20000000, 16 * 1024),
     interrupt_stack=40,
     converter_bits=10,
     words=_words_of_cortex(
@@ -181,15 +181,15 @@ CORTEX_M0 = Target(
     packages=_PACKAGES,
     counted="instructions",
     simulator=QemuSimulator,
-    machine=Machine("microbit", 16.0e6),
+    machine=EmulatedMachine("microbit", 16.0e6),
 )
 CORTEX_M4 = Target(
     name="cortex-m4",
     processor="nRF52833, a Cortex-M4",
     board="a BBC micro:bit V2",
     clock=64.0e6,
-    flash=Memory(0, 512 * 1024),
-    ram=Memory(0x20000000, 128 * 1024),
+    flash=MemoryRegion(0, 512 * 1024),
+    ram=MemoryRegion(0x20000000, 128 * 1024),
     interrupt_stack=40,
     converter_bits=14,
     words=_words_of_cortex(
@@ -211,7 +211,7 @@ CORTEX_M4 = Target(
     packages=_PACKAGES,
     counted="instructions",
     simulator=QemuSimulator,
-    machine=Machine("mps2-an386", 25.0e6),
+    machine=EmulatedMachine("mps2-an386", 25.0e6),
 )
 CATALOG: dict[str, Target] = {target.name: target for target in (MSP430F2013, CORTEX_M0, CORTEX_M4)}
 TARGETS = tuple(CATALOG)

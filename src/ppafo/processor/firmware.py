@@ -14,16 +14,16 @@ from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.plant import plant_parameters
 from ppafo.processor.catalog import TARGETS, target_of
-from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, Readings, converter_with
+from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts, converter_with
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
-from ppafo.simulation.declaration import quantity_text
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
 from ppafo.translation.value_types import INT, Row
 from ppafo.translation.walk import walk_module
-from ppafo.translation.widths import Interval, Narrowed, Range, hull, narrowed
+from ppafo.translation.widths import IntegerRange, Narrowed, Range, hull, narrowed
+from ppafo.units.shown import written_text
 from ppafo.version import __version__
 
 PRELUDE = "prelude_whole.h"
@@ -41,17 +41,19 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     collector = SourceCollector("")
     entry = collector.add(law.sample)
     state = type(law.begins)
-    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, Readings))
+    parameters = tuple(_typed_row(row, collector) for row in (law.numbers, state, ConverterCounts))
     module = walk_module(collector.text(), {entry: parameters})
-    declared = (Interval(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities)
+    declared = (
+        IntegerRange(int(quantity.minimum), int(quantity.maximum)) for quantity in numbers or law.number_quantities
+    )
     own_names = (path.rpartition(".")[2] for path in leaf_paths(state, ""))
     ranges: dict[str, Range] = {
         "numbers": _nested(law.numbers, declared),
-        "state": _nested(state, (Interval(*law.state_ranges[name]) for name in own_names)),
-        "readings": (Interval(0, LARGEST_READING),) * len(Readings._fields),
+        "state": _nested(state, (IntegerRange(*law.state_ranges[name]) for name in own_names)),
+        "readings": (IntegerRange(0, LARGEST_READING),) * len(ConverterCounts._fields),
     }
     proved = narrowed(module, ranges)
-    allowed: Range = (Interval(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
+    allowed: Range = (IntegerRange(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
     # Within it where the hull of both is no wider.
     if hull(proved.returned, allowed) != allowed:
         raise ProgramError(f"{law.kind.name}: command and state may leave their ranges: {proved.returned}")
@@ -66,9 +68,11 @@ def law_source(law: FixedLaw) -> str:
     title = f"The controller '{law.kind.name}' of ppafo {__version__} in fixed point. Not to be edited."
     text = c_source(proof(law).module, documents, title, prelude=PRELUDE)
     text = _OF_NUMBERS.sub("PPAFO_CALLED", text)
-    numbers, state, readings = (collector.add(row_type) for row_type in (law.numbers, type(law.begins), Readings))
+    numbers, state, readings = (
+        collector.add(row_type) for row_type in (law.numbers, type(law.begins), ConverterCounts)
+    )
     numbers_in_c = rebuilt(law.numbers, [macro(quantity) for quantity in law.number_quantities])
-    parameters = ", ".join(f"int16_t {name}" for name in Readings._fields)
+    parameters = ", ".join(f"int16_t {name}" for name in ConverterCounts._fields)
     return f"""#include "controller.h"
 
 #include "parameters.h"
@@ -85,7 +89,7 @@ void controller_begin(void)
 int16_t controller_sample({parameters})
 {{
     static const {numbers} numbers = {_written(numbers_in_c)};
-    const {readings} readings = {{{", ".join(Readings._fields)}}};
+    const {readings} readings = {{{", ".join(ConverterCounts._fields)}}};
     const {entry}_result result = {entry}(numbers, state, readings);
     state = result.item_1;
     return result.item_0;
@@ -141,7 +145,7 @@ def parameters_header(scenario: Scenario, fixed: "FixedPointController") -> str:
     return "\n".join([*lines, "", "#endif", ""])
 
 
-def _nested(row: type, ranges: Iterator[Interval]) -> Range:
+def _nested(row: type, ranges: Iterator[IntegerRange]) -> Range:
     """The ranges of a NamedTuple, nested ones in their place."""
     return tuple(next(ranges) if is_number(kind) else _nested(kind, ranges) for _, kind in members(row))
 
@@ -224,7 +228,7 @@ def firmware(scenario: Scenario, target: str = TARGETS[0]) -> dict[str, bytes]:
         "board": chosen.board,
         "own_bits": str(chosen.converter_bits),
         "version": __version__,
-        "period": quantity_text(scenario.controller.period, "s"),
+        "period": written_text(scenario.controller.period, "s"),
         "range": f"{scenario.controller.settings[SETTINGS[1].name] / 1.0e3:.6g} kPa",
         "step": f"{converter.pressure_step:.4g} Pa",
         "torque_step": f"{converter.torque_step * 1.0e3:.4g} mN m",

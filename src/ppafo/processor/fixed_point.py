@@ -19,7 +19,7 @@ WIDEST = 2**30
 """Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
 
 
-class Gain(NamedTuple):
+class FixedPointGain(NamedTuple):
     """A factor from 0 up as a fraction of 15 bits and the places by which the product is shifted right."""
 
     fraction: float
@@ -52,10 +52,10 @@ def limited(value: int, limit: int) -> int:
     return max(min(value, limit), -limit)
 
 
-def gain_of(factor: float) -> Gain:
+def gain_of(factor: float) -> FixedPointGain:
     """A factor from 0 to 32767 times 2^15 as a gain: as many bits as there are, the largest one where it is larger."""
     if not factor > 0.0:
-        return Gain(0.0, 0.0)
+        return FixedPointGain(0.0, 0.0)
     _, exponent = math.frexp(factor)
     places = min(MOST_PLACES, max(0, FRACTION_BITS - exponent))
     fraction = math.floor(math.ldexp(factor, places) + 0.5)
@@ -63,7 +63,7 @@ def gain_of(factor: float) -> Gain:
     if fraction > LARGEST_FRACTION and places > 0:
         places -= 1
         fraction = math.floor(math.ldexp(factor, places) + 0.5)
-    return Gain(float(min(fraction, LARGEST_FRACTION)), float(places))
+    return FixedPointGain(float(min(fraction, LARGEST_FRACTION)), float(places))
 
 
 FEWEST_BITS, MOST_BITS = 8, 14
@@ -89,21 +89,21 @@ class Converter(NamedTuple):
     middle: float
 
 
-class Limits(NamedTuple):
+class ConverterLimits(NamedTuple):
     """The largest reading of a converter, and the one that stands for a reference of 0 N m."""
 
     top: int
     middle: int
 
 
-class Steps(NamedTuple):
+class CountResolution(NamedTuple):
     """Pressure and torque of one count of a converter [Pa], [N m]."""
 
     pressure_step: float
     torque_step: float
 
 
-class Readings(NamedTuple):
+class ConverterCounts(NamedTuple):
     """Converter readings, from 0 to the largest one: reference, pressure in chamber 1 and in chamber 2."""
 
     reference: int
@@ -134,7 +134,7 @@ def converter_of(bits: float, pressure_range: float, torque_constant: float) -> 
     )
 
 
-def converter_with(steps: Steps, limits: Limits) -> Converter:
+def converter_with(steps: CountResolution, limits: ConverterLimits) -> Converter:
     """The converter with these steps and limits, as the lanes keep both."""
     return Converter(
         pressure_step=steps.pressure_step, torque_step=steps.torque_step, top=limits.top, middle=limits.middle
@@ -147,9 +147,9 @@ def count_of(value: float, step: float, top: float) -> int:
     return int(max(0.0, min(top, value / step + 0.5)))
 
 
-def read(converter: Converter, reference: float, measurement: Measurement) -> Readings:
+def read(converter: Converter, reference: float, measurement: Measurement) -> ConverterCounts:
     """Converter readings of a reference [N m] and of the measured pressures [Pa]."""
-    return Readings(
+    return ConverterCounts(
         reference=count_of(reference + converter.middle * converter.torque_step, converter.torque_step, converter.top),
         pressure_1=count_of(measurement.pressure_1, converter.pressure_step, converter.top),
         pressure_2=count_of(measurement.pressure_2, converter.pressure_step, converter.top),
@@ -161,7 +161,7 @@ def is_inside(reading: int, top: int) -> bool:
     return reading > 0 and reading < top
 
 
-def still_sound(sound: int, readings: Readings, limits: Limits) -> int:
+def still_sound(sound: int, readings: ConverterCounts, limits: ConverterLimits) -> int:
     """1 as long as no reading was ever at an end of its range, else 0, for good."""
     inside = (
         is_inside(readings.reference, limits.top)
@@ -171,6 +171,6 @@ def still_sound(sound: int, readings: Readings, limits: Limits) -> int:
     return sound if inside else 0
 
 
-def error_of(readings: Readings, limits: Limits) -> int:
+def error_of(readings: ConverterCounts, limits: ConverterLimits) -> int:
     """Reference less torque, in counts of pressure."""
     return readings.reference - limits.middle - (readings.pressure_1 - readings.pressure_2)

@@ -13,7 +13,7 @@ from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked
 
 
-class Memory(NamedTuple):
+class MemoryRegion(NamedTuple):
     """A range of addresses: its first one, and its size [bytes]."""
 
     start: int
@@ -24,14 +24,14 @@ class Memory(NamedTuple):
         return self.start <= address < self.start + self.size
 
 
-class Machine(NamedTuple):
+class EmulatedMachine(NamedTuple):
     """Machine of QEMU: its name, and the clock of its processor [Hz]."""
 
     name: str
     clock: float
 
 
-NO_MACHINE = Machine("", 0.0)
+NO_MACHINE = EmulatedMachine("", 0.0)
 """Simulator of a target which QEMU does not simulate."""
 
 
@@ -43,7 +43,7 @@ class Decision(NamedTuple):
     work: int
 
 
-class Sizes(NamedTuple):
+class ImageSizes(NamedTuple):
     """Flash of an image and RAM of its data [bytes]."""
 
     flash: int
@@ -58,8 +58,8 @@ class Image:
     """
 
     file: Path
-    sizes: Sizes
-    shipped: Sizes
+    sizes: ImageSizes
+    shipped: ImageSizes
     symbols: Mapping[str, int]
 
 
@@ -97,8 +97,8 @@ class Target:
     processor: str
     board: str
     clock: float
-    flash: Memory
-    ram: Memory
+    flash: MemoryRegion
+    ram: MemoryRegion
     interrupt_stack: int
     converter_bits: int
     words: Mapping[str, str]
@@ -108,7 +108,7 @@ class Target:
     packages: str
     counted: str
     simulator: Callable[["Target", Image], ProcessorSimulator]
-    machine: Machine = NO_MACHINE
+    machine: EmulatedMachine = NO_MACHINE
 
 
 _LOADED = 2
@@ -185,14 +185,14 @@ def _sections(content: bytes) -> list[_Section]:
     return [_Section._make(_SECTION.unpack_from(content, start + length * number)) for number in range(count)]
 
 
-def sizes(image: Path, target: Target) -> Sizes:
+def sizes(image: Path, target: Target) -> ImageSizes:
     """Flash and RAM that a program takes of a target."""
     loaded = [section for section in _sections(image.read_bytes()) if section.flags & _LOADED]
     in_ram = [section for section in loaded if target.ram.holds(section.address)]
     values = sum(section.size for section in in_ram if section.kind == _WITH_VALUES)
     flash = sum(section.size for section in loaded if target.flash.holds(section.address))
     # Initial values of RAM lie in flash too, from where the start-up code copies them.
-    return Sizes(flash + values, sum(section.size for section in in_ram))
+    return ImageSizes(flash + values, sum(section.size for section in in_ram))
 
 
 def _symbols(content: bytes) -> dict[str, int]:

@@ -11,9 +11,9 @@ from ppafo.engine.rows import rebuilt
 from ppafo.errors import SimulationError
 from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.firmware import FixedPointController, firmware, fixed_point_controller, integer_form
-from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, Readings, read
-from ppafo.processor.images import Decision, Image, ProcessorSimulator, Sizes, Target, processor_simulator
-from ppafo.report.style import BLACK, REFERENCE, Margins, figure_of_panels, house_style, look_of_valve, mark_kind
+from ppafo.processor.fixed_point import COMMAND_STEPS, Converter, ConverterCounts, read
+from ppafo.processor.images import Decision, Image, ImageSizes, ProcessorSimulator, Target, processor_simulator
+from ppafo.report.style import BLACK, REFERENCE, FigureMargins, figure_of_panels, house_style, look_of_valve, mark_kind
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
 
@@ -42,7 +42,7 @@ class PythonProcessor:
         """Forget everything."""
         self.state = self.law.begins
 
-    def sample(self, readings: Readings) -> tuple[int, int]:
+    def sample(self, readings: ConverterCounts) -> tuple[int, int]:
         """Command in steps, and the status word that the processor reports with it."""
         command, self.state = self.law.sample(self.numbers, self.state, readings)
         return command, self.state.sound
@@ -77,7 +77,7 @@ class Cost(NamedTuple):
     """
 
     target: Target
-    sizes: Sizes
+    sizes: ImageSizes
     stack: int
     worst: int
     mean: float
@@ -118,7 +118,7 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class DecisionComparison:
     """Drawn samples on the processor's simulator and in Python: how many, how many decisions differ, and the cost."""
 
     samples: int
@@ -127,12 +127,12 @@ class Comparison:
     cost: Cost
 
 
-def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> Comparison:
+def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str = TARGETS[0]) -> DecisionComparison:
     """Give drawn readings to the processor's simulator and to Python, with a reset after every ``EPISODE`` of them."""
     fixed, chosen = fixed_point_controller(scenario), target_of(target)
     reference = PythonProcessor(fixed)
     wanted: list[tuple[int, int]] = []
-    asked: list[Readings] = []
+    asked: list[ConverterCounts] = []
     decisions: list[Decision] = []
     with processor_simulator(firmware(scenario, target), chosen) as (simulator, image):
         for number, readings in enumerate(drawn_readings(int(fixed.converter.top), samples, seed)):
@@ -151,10 +151,10 @@ def compare_drawn(scenario: Scenario, samples: int, seed: int = 1, target: str =
     first = ""
     if differ:
         first = f"sample {differ[0]}: {decisions[differ[0]][:2]} on the processor, {wanted[differ[0]]} in Python"
-    return Comparison(samples, len(differ), first, cost)
+    return DecisionComparison(samples, len(differ), first, cost)
 
 
-def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
+def drawn_readings(top: int, samples: int, seed: int) -> Iterator[ConverterCounts]:
     """Readings of a converter with some largest one: courses that wander, jump, rest at an edge, or break.
 
     Each episode has a manner of its own; in two of five a reading comes to an end of its range at some time.
@@ -163,7 +163,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
     edges = (1, 2, top // 2, top // 2 + 1, top - 2, top - 1)
     for start in range(0, samples, EPISODE):
         step = draw.choice((1, 3, 30, 300, top))
-        at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in Readings._fields]
+        at = [draw.choice((*edges, draw.randint(1, top - 1))) for _ in ConverterCounts._fields]
         breaks = draw.randrange(EPISODE) if draw.random() < 0.4 else EPISODE
         for sample in range(min(EPISODE, samples - start)):
             if draw.random() < 0.02:
@@ -173,7 +173,7 @@ def drawn_readings(top: int, samples: int, seed: int) -> Iterator[Readings]:
             shown = list(at)
             if sample == breaks:
                 shown[draw.randrange(3)] = draw.choice((0, top))
-            yield Readings(*shown)
+            yield ConverterCounts(*shown)
 
 
 def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision]) -> Cost:
@@ -184,7 +184,7 @@ def cost_of(target: Target, image: Image, stack: int, decisions: list[Decision])
     return Cost(target, image.shipped, stack, worst=max(work), mean=sum(work) / len(work))
 
 
-_MARGINS = Margins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
+_MARGINS = FigureMargins(left=0.68, right=0.15, top=0.42, bottom=0.52, row_gap=0.36)
 """Inches."""
 _WIDTH, _TORQUE, _COMMAND = 7.6, 2.6, 0.9
 _LANES = (0, (1, 3))

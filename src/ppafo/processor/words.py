@@ -10,8 +10,8 @@ from ppafo.processor.catalog import target_of
 from ppafo.processor.images import missing_tools
 from ppafo.processor.lock_step import (
     TRIED,
-    Comparison,
     Cost,
+    DecisionComparison,
     ProcessorRun,
     compare_drawn,
     processor_figure,
@@ -29,7 +29,7 @@ SAMPLES_OF_TABLE = 1000
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
+class VerifiedFirmware:
     """Text, document, whether every decision is the integer controller's, and what draws it where it is drawn."""
 
     text: str
@@ -38,7 +38,7 @@ class Tried:
     draw: "Callable[[], Figure] | None" = None
 
 
-def tried(names: Sequence[str], target: str, samples: int | None, overrides: Sequence[str]) -> Tried:
+def tried(names: Sequence[str], target: str, samples: int | None, overrides: Sequence[str]) -> VerifiedFirmware:
     """Scenarios on one target."""
     scenarios = [load_scenario(name, overrides) for name in names]
     if len(scenarios) > 1 and samples is not None:
@@ -58,10 +58,10 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
     ]
     about = {"scenario": scenario.name, "target": target}
     document = {**about, **_compared(comparison), **_cost_document(comparison.cost)}
-    return Tried("\n".join(lines), document, not comparison.differences)
+    return VerifiedFirmware("\n".join(lines), document, not comparison.differences)
 
 
-def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
+def _runs(scenarios: Sequence[Scenario], target: str) -> VerifiedFirmware:
     """Scenarios with the processor in charge, one after the other, and their figure."""
     runs = [run_on_processor(scenario, target) for scenario in scenarios]
     texts, documents = [], []
@@ -86,7 +86,7 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
                 "metrics": metrics,
             }
         )
-    return Tried(
+    return VerifiedFirmware(
         "\n\n".join(texts),
         documents[0] if len(documents) == 1 else {"runs": documents},
         all(run.same_bits and not run.differences for run in runs),
@@ -94,7 +94,7 @@ def _runs(scenarios: Sequence[Scenario], target: str) -> Tried:
     )
 
 
-def table(targets: Sequence[str], samples: int | None) -> Tried:
+def table(targets: Sequence[str], samples: int | None) -> VerifiedFirmware:
     """Every controller on every target, as a table."""
     lines = ["| target | controller | flash | data + stack | worst and mean | drawn samples | other decisions |"]
     lines.append("|---|---|---|---|---|---|---|")
@@ -114,10 +114,12 @@ def table(targets: Sequence[str], samples: int | None) -> Tried:
             f"| {cost.worst:,}, {cost.mean:,.0f} {target.counted} | {comparison.samples:,} | {comparison.differences} |"
         )
         documents.append({**own, **_compared(comparison), **_cost_document(cost)})
-    return Tried("\n".join(lines), {"rows": documents}, not any(document.get("differences") for document in documents))
+    return VerifiedFirmware(
+        "\n".join(lines), {"rows": documents}, not any(document.get("differences") for document in documents)
+    )
 
 
-def _compared(run: ProcessorRun | Comparison) -> dict[str, Any]:
+def _compared(run: ProcessorRun | DecisionComparison) -> dict[str, Any]:
     return {"samples": run.samples, "differences": run.differences}
 
 

@@ -1,79 +1,18 @@
-"""Display units of quantities and metrics: the only table of them. Files and data stay in SI.
-
-Where a parameter set writes pressures, torques, angles or flows in other units, those of the set take the place of the
-table's (``units/shown.py``).
-"""
+"""Quantities and metrics as people are shown them, in the units of ``units/shown.py``; files and data stay in SI."""
 
 import math
 from collections.abc import Mapping
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.metrics import Metric
-from ppafo.units import from_si, without_exponent
-from ppafo.units.shown import gauge_zero, shown_unit
+from ppafo.units import without_exponent
+from ppafo.units.shown import QUANTITIES, quantity_of_unit, shown_value, unit_of
 
 Floats = NDArray[np.float64]
 
 
-class Units(NamedTuple):
-    """The unit of a quantity in SI, and the one in which it is shown unless a parameter set writes another.
-
-    A run computes nothing up to ``zero`` [SI]: what is not larger is rounding, and is shown as 0. It is 0 for
-    quantities that are given and not computed.
-    """
-
-    si: str
-    shown: str
-    zero: float = 0.0
-
-
-QUANTITIES: Mapping[str, Units] = MappingProxyType(
-    {
-        "acceleration": Units("m/s^2", "m/s^2", 1.0e-9),
-        "angle": Units("rad", "deg", 1.0e-9),
-        "angular acceleration": Units("rad/s^2", "rad/s^2", 1.0e-9),
-        "angular velocity": Units("rad/s", "deg/s", 1.0e-9),
-        "area": Units("m^2", "mm^2"),
-        "duration": Units("s", "min"),
-        "energy per gas mass": Units("J/kg", "J/kg", 1.0e-6),
-        "energy": Units("J", "J", 1.0e-9),
-        "force": Units("N", "N", 1.0e-9),
-        "fraction": Units("1", "%", 1.0e-12),
-        "frequency": Units("Hz", "Hz"),
-        "gas mass": Units("kg", "g", 1.0e-12),
-        "gas mass per energy": Units("kg/J", "g/J", 1.0e-12),
-        "length": Units("m", "mm", 1.0e-9),
-        "mass": Units("kg", "kg"),
-        "mass flow": Units("kg/s", "g/s", 1.0e-12),
-        "part mass": Units("kg", "g"),
-        "power": Units("W", "W", 1.0e-9),
-        "pressure": Units("Pa_a", "psi_g", 1.0e-4),
-        "pressure change": Units("Pa_d", "psi_d", 1.0e-4),
-        "temperature": Units("K", "degC"),
-        "time": Units("s", "s", 1.0e-12),
-        "torque": Units("N m", "N m", 1.0e-9),
-        "velocity": Units("m/s", "m/s", 1.0e-9),
-        "volume": Units("m^3", "cm^3"),
-        "displacement per radian": Units("m^3/rad", "cm^3/rad"),
-        "volume flow": Units("m^3/s", "L/min"),
-        "body length": Units("m", "cm"),
-        "conductance": Units("m^3/(s Pa)", "L/(s bar)"),
-    }
-)
-"""Units by the kind of quantity."""
-_NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
-"""Kinds that no unit tells from another kind: whoever shows one has to name it."""
-_OF_UNIT = {
-    **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in _NAMED},
-    # Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
-    "Pa": "pressure",
-    "kg": "mass",
-}
-"""Kind of quantity by its unit in SI."""
 _OF_GAS = {"kg": "gas mass", "kg/J": "gas mass per energy"}
 """Kind of quantity of a metric by its unit in SI: masses among the metrics are masses of gas."""
 _ON_AXES = {"psi_g": "psig", "psi_a": "psia", "mm^2": "mm$^2$", "cm^3": "cm$^3$", "degC": "°C"}
@@ -84,40 +23,26 @@ _METRIC = ".4g"
 """Digits of a metric."""
 
 
-def quantity_of_unit(si_unit: str) -> str:
-    """Return the kind of quantity that has a unit in SI, empty for a plain number or a unit that is shown as it is.
-
-    ``kg`` is a mass and ``s`` a time; masses of gas and parts, shown in grams, and what lasts minutes have to be named.
-    """
-    return _OF_UNIT.get(si_unit, "")
-
-
 def si_unit(quantity: str) -> str:
     """Return the unit in SI of a quantity, as files write it; empty for a plain number."""
     return QUANTITIES[quantity].si if quantity else ""
 
 
-def _unit(quantity: str) -> str:
-    """Return the unit in which a quantity is shown: the set's, where it writes one, else the table's."""
-    units = QUANTITIES[quantity]
-    return units.shown if quantity in _NAMED else shown_unit(units.si, units.shown)
-
-
 def display_unit(quantity: str) -> str:
     """Return the unit in which a quantity is shown, as a table writes it; empty for a plain number."""
-    return _unit(quantity).removesuffix("_d") if quantity else ""
+    return unit_of(quantity).removesuffix("_d") if quantity else ""
 
 
-def change_unit(quantity: str) -> str:
+def change_unit(quantity: str, given: str = "") -> str:
     """Return the unit in which a difference of two values is shown; empty for a plain number."""
-    unit = display_unit(quantity)
+    unit = given or display_unit(quantity)
     # A difference of pressures is neither gauge nor absolute.
     return unit[:-2] if quantity == "pressure" and unit.endswith(("_g", "_a")) else unit
 
 
-def axis_unit(quantity: str) -> str:
+def axis_unit(quantity: str, given: str = "") -> str:
     """Return the unit in which a quantity is shown, as the label of an axis writes it: with raised exponents."""
-    unit = display_unit(quantity)
+    unit = given.removesuffix("_d") or display_unit(quantity)
     if unit in _ON_AXES:
         return _ON_AXES[unit]
     if quantity == "pressure":
@@ -125,33 +50,29 @@ def axis_unit(quantity: str) -> str:
     return unit.replace("m^2", "m$^2$").replace("m^3", "m$^3$").replace("s^2", "s$^2$")
 
 
-def display_value(value: float, quantity: str, atmosphere: float | None = None) -> float:
+def display_value(value: float, quantity: str, atmosphere: float | None = None, unit: str = "") -> float:
     """Return a value in SI in the unit in which it is shown.
 
-    Gauge counts from ``atmosphere`` [Pa absolute], that of the device in force unless given (``units/shown.py``).
+    Gauge counts from ``atmosphere`` [Pa absolute], of the device in force unless given (``units/shown.py``).
 
-    What is zero within the accuracy of a run is 0.
+    What is zero within the accuracy of a run is 0. ``unit`` is the one in which it was given, where that is known.
     """
     if quantity not in QUANTITIES or not math.isfinite(value):
         return float(value)
-    (si, _, zero), unit = QUANTITIES[quantity], _unit(quantity)
-    shown, further = (
-        each if si == unit else from_si(each, unit, si, gauge_zero() if atmosphere is None else atmosphere)
-        for each in (float(value), float(value) + zero)
-    )
-    return 0.0 if abs(shown) <= abs(further - shown) else shown
+    units = QUANTITIES[quantity]
+    return shown_value(value, units.si, unit or unit_of(quantity), atmosphere, units.zero)
 
 
-def display_difference(value: float, quantity: str) -> float:
-    """Return a difference of two values in SI in the unit in which it is shown."""
+def display_difference(value: float, quantity: str, unit: str = "") -> float:
+    """Return a difference of two values in SI in the unit in which it is shown, or was given."""
     # The zero of gauge pressures and of degrees Celsius falls out.
-    return display_value(value, quantity) - display_value(0.0, quantity)
+    return display_value(value, quantity, unit=unit) - display_value(0.0, quantity, unit=unit)
 
 
-def display_values(values: Floats, quantity: str, atmosphere: float | None = None) -> Floats:
-    """Return values in SI (any shape) in the unit in which they are shown."""
+def display_values(values: Floats, quantity: str, atmosphere: float | None = None, unit: str = "") -> Floats:
+    """Return values in SI (any shape) in the unit in which they are shown, or were given."""
     # Units are affine, so that two values decide all.
-    zero, one = (display_value(number, quantity, atmosphere) for number in (0.0, 1.0))
+    zero, one = (display_value(number, quantity, atmosphere, unit) for number in (0.0, 1.0))
     return values if (zero, one) == (0.0, 1.0) else zero + (one - zero) * values
 
 

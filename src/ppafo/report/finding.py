@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from ppafo.documents.json_text import json_text, plain
-from ppafo.report.kind import PLAIN, Interval, Kind
+from ppafo.report.kind import PLAIN, ConfidenceInterval, Kind
 from ppafo.report.notebook import shown
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.report.style import render_figure
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     import matplotlib.figure
 
 T_co = TypeVar("T_co", covariant=True)
-Cell = str | float | Interval | None
+Cell = str | float | ConfidenceInterval | None
 """A number in SI, an estimate with its interval, a text, or None where there is nothing to say."""
 NOTHING = "-"
 """The text of a cell in which there is nothing to say."""
@@ -67,7 +67,7 @@ class Column:
                 text = value
             elif value is None or (isinstance(value, float) and math.isnan(value)):
                 text = NOTHING
-            elif isinstance(value, Interval):
+            elif isinstance(value, ConfidenceInterval):
                 text = kind.change_interval(value) if self.is_change else kind.interval(value)
             # A count; a whole number of some quantity is shown in its unit and form.
             elif isinstance(value, int) and not kind.quantity:
@@ -92,7 +92,7 @@ def facts(rows: Iterable[Sequence[Cell]]) -> list[Column]:
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Section:
     """A part of a finding, of which all may be left out: a heading, what is said, a table, a figure, a text to copy.
 
     The table: ``columns``, of which the first ``left`` are names and set to the left; without titles they are a list of
@@ -174,7 +174,7 @@ class Finding(Generic[T_co]):
     kicker: str
     title: str
     said: Sequence[str]
-    parts: Sequence[Part]
+    parts: Sequence[Section]
     found: T_co
     passed: bool = True
     files: Mapping[str, Callable[[], bytes]] = field(default_factory=dict)
@@ -185,7 +185,7 @@ class Finding(Generic[T_co]):
     units: Mapping[str, str] = field(default_factory=units_in_force)
 
     @property
-    def figures(self) -> dict[str, Part]:
+    def figures(self) -> dict[str, Section]:
         """The parts that have a figure, by the stem of its files."""
         return {part.name: part for part in self.parts if part.name}
 
@@ -237,7 +237,7 @@ def text_of(finding: Finding[Any]) -> str:
     return "\n\n".join(block for block in blocks if block)
 
 
-def _table_lines(part: Part) -> list[str]:
+def _table_lines(part: Section) -> list[str]:
     """Return the table of a part as aligned lines, its head first, its marked rows after a mark; none without rows."""
     rows: list[tuple[str, ...]] = part.rows
     if not rows:
@@ -268,7 +268,7 @@ def page_of(finding: Finding[Any], drawn: Mapping[str, bytes]) -> bytes:
     return render_page("finding.html.jinja", values).encode()
 
 
-def _head_of(part: Part) -> list[str]:
+def _head_of(part: Section) -> list[str]:
     """Return the titles of a table; a unit in brackets at the end of one is not broken over two lines."""
     if not part.has_head:
         return []

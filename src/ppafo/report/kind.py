@@ -16,15 +16,15 @@ from ppafo.report.display_units import (
     display_values,
     metric_quantity,
     metric_words,
-    quantity_of_unit,
 )
 from ppafo.report.setting_names import label_of
 from ppafo.signals.recording import Floats
 from ppafo.units import without_exponent
+from ppafo.units.shown import quantity_of_unit
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class ConfidenceInterval:
     """An estimate and the ends of its confidence interval, all in one unit; an end may be infinite."""
 
     value: float
@@ -39,9 +39,10 @@ class Interval:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Kind of a number: words, SI unit, quantity (``display_units.QUANTITIES``; else shown in SI), and form.
+    """Kind of a number: words, SI unit, quantity (``QUANTITIES``; else shown in SI), and form.
 
     ``zero`` [Pa absolute] is the pressure from which gauge ones count, None for the atmosphere of the device.
+    ``given`` is the unit in which the user gave the number, which goes before that of the set.
     """
 
     words: str = ""
@@ -49,16 +50,19 @@ class Kind:
     quantity: str = ""
     form: str = ".4g"
     zero: float | None = None
+    given: str = ""
 
     @property
     def shown_unit(self) -> str:
         """The unit in which it is shown; empty for a plain number."""
+        if self.given:
+            return self.given.removesuffix("_d")
         return display_unit(self.quantity) if self.quantity else self.unit.removeprefix("-")
 
     @property
     def shown_change_unit(self) -> str:
         """The unit in which a difference of two values is shown."""
-        return change_unit(self.quantity) if self.quantity else self.shown_unit
+        return change_unit(self.quantity, self.given) if self.quantity else self.shown_unit
 
     @property
     def title(self) -> str:
@@ -73,16 +77,16 @@ class Kind:
     @property
     def axis_unit(self) -> str:
         """The unit for an axis, empty for a plain number."""
-        unit = axis_unit(self.quantity) if self.quantity else self.shown_unit
+        unit = axis_unit(self.quantity, self.given) if self.quantity else self.shown_unit
         return "" if unit == "1" else unit
 
     def values(self, values: ArrayLike) -> Floats:
         """Return values in SI in the unit in which they are shown."""
-        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.zero)
+        return display_values(np.asarray(values, dtype=np.float64), self.quantity, self.zero, self.given)
 
     def number(self, value: float, form: str = "") -> str:
         """Return a value in SI as text in the unit in which it is shown, without that unit."""
-        return without_exponent(display_value(value, self.quantity, self.zero), form or self.form)
+        return without_exponent(display_value(value, self.quantity, self.zero, self.given), form or self.form)
 
     def text(self, value: float, form: str = "") -> str:
         """Return a value in SI as text with the unit in which it is shown."""
@@ -94,14 +98,14 @@ class Kind:
 
     def change_number(self, value: float, form: str = ".3g") -> str:
         """Return a difference of two values in SI as text in the unit in which it is shown, without that unit."""
-        return without_exponent(display_difference(value, self.quantity), form)
+        return without_exponent(display_difference(value, self.quantity, self.given), form)
 
-    def interval(self, interval: Interval, form: str = "") -> str:
+    def interval(self, interval: ConfidenceInterval, form: str = "") -> str:
         """Return an estimate and the ends of its interval as text without unit."""
         value, low, high = (self.number(each, form) for each in (interval.value, interval.low, interval.high))
         return f"{value} [{low}, {high}]"
 
-    def change_interval(self, interval: Interval, form: str = "") -> str:
+    def change_interval(self, interval: ConfidenceInterval, form: str = "") -> str:
         """Return a difference and the ends of its interval as text without unit."""
         ends = (interval.value, interval.low, interval.high)
         value, low, high = (self.change_number(each, form or self.form) for each in ends)
@@ -123,9 +127,10 @@ def of_stored_metric(name: str, unit: str, form: str = ".4g") -> Kind:
     return Kind(metric_words(name), unit, metric_quantity(unit), form)
 
 
-def of_path(path: str, unit: str, form: str = ".6g") -> Kind:
-    """Return what the number at a path is, from its unit in SI."""
-    return Kind(label_of(path), unit, quantity_of_unit(unit), form, fixed_zero(path))
+def of_path(path: str, unit: str, form: str = ".6g", given: str = "") -> Kind:
+    """Return what the number at a path is, from its unit in SI, and the one in which it was given."""
+    quantity = quantity_of_unit(unit)
+    return Kind(label_of(path), unit, quantity, form, fixed_zero(path), given if quantity else "")
 
 
 def of_channel(name: str, unit: str) -> Kind:

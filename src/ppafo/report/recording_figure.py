@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import DataError
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.display_units import display_difference
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
@@ -99,7 +99,7 @@ def recording_figure(
     title: str = "",
     remark: str = "",
     valve: str = "",
-    joint: Joint = ANKLE,
+    joint: JointNames = ANKLE,
 ) -> "Figure":
     """Return the figure of a recording, with a panel for every quantity that it has.
 
@@ -124,7 +124,7 @@ def recording_figure(
     return draw_panels(panels, 1, _SIZE, title, remark, recording.kind)
 
 
-def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: Joint) -> Panel:
+def _panel(recording: Recording, quantity: _Quantity, valve: str, joint: JointNames) -> Panel:
     """Return the panel of a quantity of the recording."""
     kind = quantity.kind
     lines = {channel: line for channel, line in quantity.lines.items() if channel in recording}

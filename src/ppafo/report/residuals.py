@@ -66,7 +66,7 @@ def with_residuals(
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class FittedCurve:
     """Samples and a model of them at the same times, in units of ``time`` and ``level``; ``colour`` is the model's.
 
     ``change`` is what a difference of both is, ``names`` are those of both in the legend.
@@ -82,7 +82,7 @@ class Course:
     colour: str
 
 
-def course_panels(course: Course, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
+def course_panels(course: FittedCurve, look: str, legend: str, limits: Sequence[float] = ()) -> list[Panel]:
     """Return samples and model over time and, half as tall below them, their residual, with ``limits`` dashed."""
     upper = [
         readings_mark(course.names[0], course.times, course.samples, look),

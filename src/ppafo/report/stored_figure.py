@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, one_line
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.recording_figure import recording_figure
 from ppafo.signals import Recording
 from ppafo.storage import StoredResult
@@ -80,7 +80,7 @@ def stated_units(
     return counted_from(stated, STANDARD_ATMOSPHERE if atmosphere is None else atmosphere)
 
 
-def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint:
+def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> JointNames:
     """Return what the device at some keys of a file's document turns, in words; the ankle where it does not say.
 
     DataError names the key that is of another form.
@@ -90,7 +90,7 @@ def stated_joint(file: Path, document: Mapping[str, Any], *device: str) -> Joint
     for name, word in joint.items():
         if not isinstance(word, str):
             raise _other_form(file, ".".join((*device, "joint", name)), word, "a text")
-    return Joint(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
+    return JointNames(**{name: one_line(word)[:_LONGEST_SHOWN] for name, word in joint.items()})
 
 
 def _ending(file: Path, document: Mapping[str, Any]) -> str:

@@ -130,7 +130,7 @@ def mark_kind(figure: "Figure", kind: RecordingKind) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Margins:
+class FigureMargins:
     """Inches around the panels, between rows and between columns, and from a panel to the name of its value axis."""
 
     left: float
@@ -143,7 +143,11 @@ class Margins:
 
 
 def figure_of_panels(
-    size: tuple[float, float], margins: Margins, rows: int, columns: int = 1, heights: Sequence[float] | None = None
+    size: tuple[float, float],
+    margins: FigureMargins,
+    rows: int,
+    columns: int = 1,
+    heights: Sequence[float] | None = None,
 ) -> "tuple[Figure, list[list[Axes]]]":
     """Return a figure of this width and height [inches] and its panels by row, all of them over one horizontal axis."""
     figure, panel_width = _figure_with_margins(size, margins, rows, columns)
@@ -154,7 +158,7 @@ def figure_of_panels(
 
 
 def figure_of_free_panels(
-    size: tuple[float, float], margins: Margins, rows: int, columns: int, widths: Sequence[float] | None = None
+    size: tuple[float, float], margins: FigureMargins, rows: int, columns: int, widths: Sequence[float] | None = None
 ) -> "tuple[Figure, list[list[Axes]]]":
     """Return a figure of this width and height [inches] and its panels by row, each with axes of its own."""
     figure, _ = _figure_with_margins(size, margins, rows, columns)
@@ -162,7 +166,7 @@ def figure_of_free_panels(
 
 
 def _figure_with_margins(
-    size: tuple[float, float], margins: Margins, rows: int, columns: int
+    size: tuple[float, float], margins: FigureMargins, rows: int, columns: int
 ) -> "tuple[Figure, float]":
     """Return an empty figure with its margins, and the width of a panel [inches]."""
     from matplotlib.figure import Figure

@@ -104,7 +104,7 @@ class Exchange(NamedTuple):
     energy: float
 
 
-class Side(NamedTuple):
+class ChamberFlows(NamedTuple):
     """Between valve and one chamber: gas from the source and to the room [kg/s], net enthalpy through the valve [W].
 
     Then what enters the chamber [kg/s], [W], and the slopes of the line's gas [kg/s], [W] and the heat into it [W].
@@ -201,7 +201,7 @@ def observables(given: RigNumbers, state: RigState, angle: float, added_torque: 
 
 def side(
     given: RigNumbers, node: Node, regulated: float, line_mass: float, line_energy: float, source: float, vent: float
-) -> Side:
+) -> ChamberFlows:
     """Flows [kg/s], [W] between the valve and one chamber; ``source`` and ``vent`` are openings of the valve [-].
 
     ``regulated`` is the pressure of the source [Pa], ``line_mass`` [kg] and ``line_energy`` [J] are of the line.
@@ -219,7 +219,7 @@ def side(
         into = orifice_exchange(rig, port, node, 1.0, given.line_orifice, 1.0)
     # Without a line its gas keeps its 0 kg: all that the valve passes enters the chamber, and there is no wall.
     heat = wall_heat(rig, port, rig.line_volume)
-    return Side(
+    return ChamberFlows(
         supplied_mass=supplied.mass,
         vented_mass=vented.mass,
         enthalpy_in=energy,

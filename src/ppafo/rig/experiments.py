@@ -1,4 +1,4 @@
-"""The experiments of the rig. To add one: a function ``Request -> Outcome`` and one line in ``EXPERIMENTS``.
+"""Experiments of the rig. To add one: ``ExperimentRequest -> ExperimentResult``, and one line in ``EXPERIMENTS``.
 
 On the steady bench true values go in and what the instruments show comes out: static torque against pressure, flow of
 the open valve, its map, the leak across the vane. Experiments in time are solved by SciPy's LSODA: step response,
@@ -37,10 +37,10 @@ from ppafo.rig.dynamics import RigPhysics, RigState, ambient_node, leak_exchange
 from ppafo.rig.preset import (
     CHANNEL_SENSORS,
     PREFIX,
+    ExperimentRequest,
+    ExperimentResult,
     Floats,
-    Outcome,
     Preset,
-    Request,
     list_presets,
     load_preset,
     random_stream,
@@ -63,13 +63,13 @@ from ppafo.version import __version__
 
 def read_off(
     name: str,
-    request: Request,
+    request: ExperimentRequest,
     device: Device,
     interval: float,
     true: Mapping[str, Floats],
     settings: Mapping[str, float],
     fraction_of_flow_range: float = 1.0,
-) -> Outcome:
+) -> ExperimentResult:
     """Return a reading every ``interval`` [s] of true values by channel [SI]; what no sensor reads is exact."""
     count = len(next(iter(true.values())))
     fractions = {"mass_flow": fraction_of_flow_range}
@@ -84,7 +84,7 @@ def read_off(
     }
     recording = Recording(name, np.arange(count, dtype=np.float64) * interval, channels, kind="synthetic")
     offsets = {channel: sensor.offset for channel, sensor in sensors.items()}
-    return Outcome(recording, device, offsets, {"reading_interval": interval, **settings})
+    return ExperimentResult(recording, device, offsets, {"reading_interval": interval, **settings})
 
 
 STEP = 5.0 * PASCALS_PER_PSI
@@ -95,7 +95,7 @@ TORQUE_REPETITIONS = 3
 TORQUE_READING_INTERVAL = 10.0
 
 
-def record_static_torque(request: Request) -> Outcome:
+def record_static_torque(request: ExperimentRequest) -> ExperimentResult:
     """Return torque on the scale [N m] over pressure difference, three times up and down in steps of 5 psi.
 
     The vane presses on a scale and friction holds it back. It creeps and never slips, so friction is at its static
@@ -146,7 +146,7 @@ SMALL_METER = 0.1
 """Range of the flow meter for the leak as a fraction [-] of the other's."""
 
 
-def record_open_valve(request: Request) -> Outcome:
+def record_open_valve(request: ExperimentRequest) -> ExperimentResult:
     """Return the mass flow [kg/s] of the fully open valve at several pressures before and behind it."""
     device, physics = _bench(request)
     ambient = device.supply.atmospheric_pressure
@@ -168,7 +168,7 @@ def record_open_valve(request: Request) -> Outcome:
     )
 
 
-def record_valve_map(request: Request) -> Outcome:
+def record_valve_map(request: ExperimentRequest) -> ExperimentResult:
     """Return the mass flow [kg/s], above 0 into chamber 1, of the valve into the atmosphere over its command."""
     device, physics = _bench(request)
     supply, orifice = device.supply, exact_orifice(device.valve.orifice, device)
@@ -200,7 +200,7 @@ def record_valve_map(request: Request) -> Outcome:
     )
 
 
-def record_steady_leak(request: Request) -> Outcome:
+def record_steady_leak(request: ExperimentRequest) -> ExperimentResult:
     """Return the mass flow [kg/s] that maintains the pressure in chamber 1, with chamber 2 open to the atmosphere."""
     device, physics = _bench(request)
     ambient = device.supply.atmospheric_pressure
@@ -218,7 +218,7 @@ def record_steady_leak(request: Request) -> Outcome:
     return read_off("vane-leak-steady", request, device, READING_INTERVAL, true, settings, SMALL_METER)
 
 
-def _bench(request: Request) -> tuple[Device, RigPhysics]:
+def _bench(request: ExperimentRequest) -> tuple[Device, RigPhysics]:
     device = real_device(
         load_device(request.parameter_set, overrides=request.overrides, valve=request.valve), request.preset
     )
@@ -244,13 +244,13 @@ _WHOLE = 1.0e-9
 _CLOSED_VALVE = {"kind": "constant", "command": 0, "rate": "1 kHz"}
 
 
-def record_step_response(request: Request) -> Outcome:
+def record_step_response(request: ExperimentRequest) -> ExperimentResult:
     """Return the step response of figure 7: the valve opens fully and the vane turns from stop to stop."""
     scenario = _of_package("step-response", request)
     return _recorded("step-response", scenario, rig_run(scenario, request), (*_IN_MOTION, "torque"))
 
 
-def record_torque_task(request: Request) -> Outcome:
+def record_torque_task(request: ExperimentRequest) -> ExperimentResult:
     """Return the torque task of figure 8 with the controller that belongs to the kind of valve."""
     # Overrides may be of the scenario, which is chosen by the valve first.
     kind = load_device(request.parameter_set, valve=request.valve).valve.kind
@@ -258,7 +258,7 @@ def record_torque_task(request: Request) -> Outcome:
     return _recorded("torque-task", scenario, rig_run(scenario, request), (*_IN_MOTION, "reference", "torque"))
 
 
-def record_free_decay(request: Request) -> Outcome:
+def record_free_decay(request: ExperimentRequest) -> ExperimentResult:
     """Return the angle after an impulse, device on its side, both chambers open to the room."""
     motion = {"kind": "free", "angle": "25 deg", "angular_velocity": "380 deg/s", "external_torque": "0 N m"}
     scenario = _of_bench("free-decay", request, motion, {}, "2 s")
@@ -269,7 +269,7 @@ def record_free_decay(request: Request) -> Outcome:
     return _recorded("free-decay", scenario, opened, ("angle",))
 
 
-def record_vane_leak(request: Request) -> Outcome:
+def record_vane_leak(request: ExperimentRequest) -> ExperimentResult:
     """Return both pressures after chamber 1 was filled and both ports were plugged, the vane held in the middle."""
     sections = {section.partition(".")[0] for section in SECTIONS} | {"valve", "valves"}
     # What belongs to the scenario is no override of a device.
@@ -283,7 +283,7 @@ def record_vane_leak(request: Request) -> Outcome:
     return _recorded("vane-leak", scenario, plugged, ("pressure_1", "pressure_2"))
 
 
-def rig_run(scenario: Scenario, request: Request, highest_rate: float = math.inf) -> RigRun:
+def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float = math.inf) -> RigRun:
     """Return the run of a scenario on the rig of a request, recorded at most ``highest_rate`` times a second [Hz].
 
     ScenarioError for a valve that the rig does not have, and for a reference that is no torque.
@@ -334,7 +334,7 @@ def initial_state(scenario: Scenario, run: Run, physics: RigPhysics) -> RigState
     return RigState(**start)
 
 
-def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> Outcome:
+def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str, ...]) -> ExperimentResult:
     """Return what the sensors read at every sample; the torque is computed from the measured pressures."""
     solution, plant = solve_rig(bench_run), bench_run.run.plant
     pairs = zip(solution.states, solution.pressures, strict=True)
@@ -356,17 +356,19 @@ def _recorded(name: str, scenario: Scenario, bench_run: RigRun, names: tuple[str
         "impacts": solution.impacts,
         "breakaways": solution.breakaways,
     }
-    return Outcome(recording, bench_run.device, offsets, settings)
+    return ExperimentResult(recording, bench_run.device, offsets, settings)
 
 
-def _of_package(name: str, request: Request) -> Scenario:
+def _of_package(name: str, request: ExperimentRequest) -> Scenario:
     """Return a scenario of the package with the requested device."""
     document = copy.deepcopy(dict(load_scenario(name).origin.content))
     document["device"] = {"overrides": document["device"].get("overrides", []), **_device_table(request)}
     return scenario_from_dict(document, request.overrides)
 
 
-def _of_bench(name: str, request: Request, motion: dict[str, str], initial: dict[str, str], duration: str) -> Scenario:
+def _of_bench(
+    name: str, request: ExperimentRequest, motion: dict[str, str], initial: dict[str, str], duration: str
+) -> Scenario:
     document: dict[str, Any] = {
         "schema_version": 1,
         "name": name,
@@ -379,31 +381,33 @@ def _of_bench(name: str, request: Request, motion: dict[str, str], initial: dict
     return scenario_from_dict(document, request.overrides)
 
 
-def _device_table(request: Request) -> dict[str, str]:
+def _device_table(request: ExperimentRequest) -> dict[str, str]:
     table = {"set": request.parameter_set}
     return table if request.valve is None else {**table, "valve": request.valve}
 
 
 @dataclass(frozen=True, slots=True)
-class Experiment:
+class BenchExperiment:
     """An experiment: name, what is done, and the function that does it."""
 
     name: str
     summary: str
-    record: Callable[[Request], Outcome]
+    record: Callable[[ExperimentRequest], ExperimentResult]
 
 
-EXPERIMENTS: dict[str, Experiment] = {
+EXPERIMENTS: dict[str, BenchExperiment] = {
     experiment.name: experiment
     for experiment in (
-        Experiment("static-torque", "torque on a scale over pressure, three times up and down", record_static_torque),
-        Experiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
-        Experiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
-        Experiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
-        Experiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", record_steady_leak),
-        Experiment("valve-map", "flow of the valve over its command, up and down", record_valve_map),
-        Experiment("step-response", "figure 7: valve opened fully, vane from stop to stop", record_step_response),
-        Experiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
+        BenchExperiment(
+            "static-torque", "torque on a scale over pressure, three times up and down", record_static_torque
+        ),
+        BenchExperiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
+        BenchExperiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
+        BenchExperiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
+        BenchExperiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", record_steady_leak),
+        BenchExperiment("valve-map", "flow of the valve over its command, up and down", record_valve_map),
+        BenchExperiment("step-response", "figure 7: valve opened fully, vane from stop to stop", record_step_response),
+        BenchExperiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
     )
 }
 
@@ -467,7 +471,7 @@ def record(
         raise ParameterError(
             f"the simulated test bench is made for a vane, and '{one_line(device)}' has an actuator '{kind}'"
         )
-    outcome = chosen.record(Request(preset, seed, device, valve, others))
+    outcome = chosen.record(ExperimentRequest(preset, seed, device, valve, others))
     truth = {
         "notice": NOTICE,
         "units": UNITS,
@@ -493,7 +497,7 @@ def record(
     return RigRecording(outcome.recording, outcome.device, truth)
 
 
-def find_experiment(name: str) -> Experiment:
+def find_experiment(name: str) -> BenchExperiment:
     """Return the experiment of this name. ParameterError where there is none."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)

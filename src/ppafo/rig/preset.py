@@ -204,7 +204,7 @@ def load_preset(name_or_path: str | Path, overrides: Iterable[str] = ()) -> Pres
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class ExperimentRequest:
     """Experiment to be run: preset, seed, parameter set, its valve (None: the set's own), overrides of both."""
 
     preset: Preset
@@ -215,7 +215,7 @@ class Request:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ExperimentResult:
     """The result of an experiment: recording, true device, offsets that the sensors had, and further true values."""
 
     recording: Recording
@@ -346,7 +346,7 @@ _STREAMS = {name: number for number, name in enumerate(CHANNEL_SENSORS)}
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
+class SimulatedSensor:
     """Sensor of a run: its offset, its quantisation step, and the noise of every sample to come."""
 
     offset: float
@@ -367,7 +367,7 @@ def random_stream(seed: int, channel: str) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, _STREAMS[channel]])))
 
 
-def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_range: float = 1.0) -> Sensor:
+def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_range: float = 1.0) -> SimulatedSensor:
     """Return the sensor of a channel for a number of samples; one of a smaller range is finer in everything.
 
     ``fraction_of_range`` [-] scales offset, noise and step.
@@ -377,4 +377,4 @@ def sensor(preset: Preset, channel: str, seed: int, samples: int, fraction_of_ra
     stream = random_stream(seed, channel)
     # The offset comes first, so that a longer recording begins with the same noise.
     drawn = offset * float(stream.standard_normal())
-    return Sensor(drawn, resolution, noise * stream.standard_normal(samples))
+    return SimulatedSensor(drawn, resolution, noise * stream.standard_normal(samples))

@@ -24,9 +24,9 @@ from ppafo.model.plant import Openings, PlantParameters, actuator_torque
 from ppafo.model.sensors import Measurement
 from ppafo.parameters.device import Device
 from ppafo.rig.dynamics import RigNumbers, RigPhysics, RigState
-from ppafo.rig.preset import Sensor
+from ppafo.rig.preset import SimulatedSensor
 from ppafo.rig.right_hand_side import CompiledRig, Observed, VaneInputs
-from ppafo.rig.stretches import Distances, Slopes, Stretch, absolute_tolerances, solve_stretch
+from ppafo.rig.stretches import Distances, RigInterval, Slopes, absolute_tolerances, solve_stretch
 
 # The controller of a run on the rig: what it decides sample by sample, and its commands on the way to the valve.
 
@@ -96,7 +96,7 @@ class RigRun:
     physics: RigPhysics
     line_orifice: ExactOrifice
     initial: RigState
-    sensors: dict[str, Sensor]
+    sensors: dict[str, SimulatedSensor]
     """Sensors by the channel that they read: at least angle, pressure_1 and pressure_2."""
     sample_times: Floats
     """When the sensors are recorded [s], the first at 0 and the last at the end."""
@@ -317,7 +317,7 @@ class _Course:
         else:
             self.time = end
 
-    def record_stretch(self, stretch: Stretch) -> None:
+    def record_stretch(self, stretch: RigInterval) -> None:
         """Keep the samples that lie before the end of a stretch; one at its end belongs to the next."""
         times, end = self.rig_run.sample_times, float(stretch.times[-1]) - SAME_TIME
         while self.recorded < times.size and times[self.recorded] < end:

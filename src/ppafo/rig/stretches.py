@@ -60,7 +60,7 @@ def absolute_tolerances(valve_unknowns: int) -> Floats:
     return np.array([*ABSOLUTE_TOLERANCES, *[VALVE_TOLERANCE] * valve_unknowns])
 
 
-class Stretch(NamedTuple):
+class RigInterval(NamedTuple):
     """Unknowns (times, unknowns) at times [s]: the start, those wanted, and the last one, where the stretch ended."""
 
     times: Floats
@@ -75,7 +75,7 @@ def solve_stretch(
     start: float,
     end: float,
     wanted: Floats,
-) -> Stretch:
+) -> RigInterval:
     """Return the unknowns from ``start`` to ``end`` [s], or to where one of the distances falls to 0.
 
     They are given at the ``wanted`` times [s] in between, too. A distance that is 0 at the start ends nothing.
@@ -109,7 +109,7 @@ def solve_stretch(
         if event is not None or solver.status == "finished":
             times.append(last)
             states.append(interpolant(last) if event is not None else np.array(solver.y))
-            return Stretch(np.array(times), np.array(states))
+            return RigInterval(np.array(times), np.array(states))
     raise SimulationError(f"the rig's solver took {MAXIMUM_STEPS} steps up to t = {solver.t:.6g} s")
 
 

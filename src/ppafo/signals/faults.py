@@ -10,34 +10,34 @@ from numpy.typing import NDArray
 from ppafo.signals.recording import Floats
 
 GAP_SAMPLES = 10.0
-"""Usual times between samples that a gap has at least."""
+"""Shortest gap, in usual sampling intervals."""
 
 FEWEST_AT_LIMIT = 20
-"""Samples at exactly the same value from which a sensor may be at its limit."""
+"""Fewest equal samples that indicate a sensor at its limit."""
 
 MINIMUM_SAMPLES = 10
-"""Fewer do not show how large their noise is."""
+"""Fewest samples for an estimate of the noise."""
 
 _SPREAD_OF_MEDIAN = 1.4826
-"""Standard deviation of a normal distribution over the median of its sizes, which a few jumps do not move."""
+"""Standard deviation of a normal distribution over its median absolute deviation, which is robust to jumps [-]."""
 _KEPT = 3.0
-"""Standard deviations up to which a difference counts as usual."""
+"""Largest usual difference, in standard deviations."""
 _SHARE_OF_KEPT = 0.98658
-"""Standard deviation of a normal distribution cut at 3 standard deviations, over the whole's."""
+"""Standard deviation of a normal distribution truncated at 3 standard deviations, over the whole's [-]."""
 _GAIN_OF_DIFFERENCES = math.sqrt(20.0)
 """Standard deviation of the third difference of white noise over the noise's."""
 _NOISY_FRACTION = 0.2
-"""Fraction of turns from which a signal is noisy: white noise turns at two of three samples, a smooth curve hardly."""
+"""Fraction of turning points above which a signal is noisy: white noise has 2/3, a smooth curve hardly any."""
 _ABRUPT_FRACTION = 0.3
-"""Fraction of the fastest movement of a signal from which it runs into a plateau."""
+"""Slope into a plateau at a limit, as a fraction of the steepest slope of the signal."""
 _BEFORE = 5
-"""Samples over which a movement is looked at."""
+"""Samples before a plateau by which its approach is assessed."""
 _EXCEPTIONAL = 5
-"""Lengths of the next longest plateau that one lasts which is no step of a coarse converter."""
+"""Length of a plateau over the next longest one above which it is no converter step [-]."""
 _PARTS = 20
-"""Parts of a signal whose means show what lasts."""
+"""Parts of a signal whose means show a lasting change."""
 _SMOOTH = 1.0e-6
-"""Fraction of the range of a signal up to which rounding alone puts a value off the line between its neighbours."""
+"""Fraction of the range up to which a value's distance from the line between its neighbours is rounding."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Plateau:
 
 
 def longest_gap(time: Floats) -> Gap | None:
-    """Return the longest time without samples [s] where it is one of many usual intervals, else None."""
+    """Return the longest gap if it lasts many usual sampling intervals, else None."""
     # Against the median, which one gap does not move.
     intervals = np.diff(time)
     if intervals.size < 2:
@@ -75,7 +75,7 @@ def longest_gap(time: Floats) -> Gap | None:
 
 
 def lasting_change(values: Floats) -> float:
-    """Return how far the values go in what lasts: largest less smallest mean of at most 20 equal parts."""
+    """Return the range of the means of at most 20 equal parts of a signal."""
     parts = np.array_split(values, min(_PARTS, values.size))
     return float(np.ptp([part.mean() for part in parts]))
 
@@ -98,7 +98,7 @@ def longest_run(flags: NDArray[np.bool_]) -> tuple[int, int]:
 
 
 def is_at_limit(values: Floats, plateau: Plateau) -> bool:
-    """Return whether a plateau comes from a sensor at its limit: noise stops there, or the signal runs into it.
+    """Tell whether a plateau is a sensor at its limit: the noise stops there, or the signal runs into it.
 
     A signal that comes to rest by itself has noise there too, or slows down before.
     """
@@ -115,12 +115,12 @@ def is_at_limit(values: Floats, plateau: Plateau) -> bool:
 
 
 def scatters(values: Floats) -> bool:
-    """Return whether at least half of the values are off the line between their neighbours, as noise makes them."""
+    """Tell whether at least half of the values are off the line between their neighbours, as with noise."""
     return values.size > 2 and float(np.median(np.abs(np.diff(values, 2)))) > _SMOOTH * float(np.ptp(values))
 
 
 def stands_out(values: Floats, plateau: Plateau) -> bool:
-    """Return whether a plateau lasts far longer than any other value does: it is no step of a coarse converter."""
+    """Tell whether a plateau lasts far longer than any other, and is no step of a coarse converter."""
     if plateau.count < FEWEST_AT_LIMIT or plateau.count == values.size:
         return False
     # A coarse converter has such plateaus everywhere: they are compared with the longest of the others.
@@ -131,7 +131,7 @@ def stands_out(values: Floats, plateau: Plateau) -> bool:
 
 
 def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
-    """Return which samples stand out by themselves, far off the four around them; ``noise`` is a standard deviation.
+    """Mark the samples that stand out alone from the four around them; ``noise`` is a standard deviation.
 
     They are off the median of five by more than 6 times the noise, and more than 3 times what the four range over.
     """
@@ -140,7 +140,7 @@ def isolated_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
 
 def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
-    """Return which samples of what a model leaves stand out, though one beside them may: ``noise`` as above.
+    """Mark the outliers of residuals, adjacent ones included; ``noise`` is a standard deviation.
 
     They are off the median of five by more than 6 times the noise, and more than 3 times what three of the four others
     range over. An event that a model has at another time leaves a longer course, which is none of them.
@@ -152,24 +152,24 @@ def outlying_samples(values: Floats, noise: float) -> NDArray[np.bool_]:
 
 
 def off_neighbours(values: Floats) -> Floats:
-    """Return how far each value is off the median of the five around it, its own among them."""
+    """Return the distance of each value from the median of the five around it, itself included."""
     return np.asarray(np.abs(values - np.median(_five_around(values), axis=1)))
 
 
 def _five_around(values: Floats) -> Floats:
-    """Return each value with the two before and the two behind it (values, 5)."""
+    """Return each value with the two before and the two after it (values, 5)."""
     # Mirrored at the ends, where an outlier would else be three of its own five neighbours.
     return np.lib.stride_tricks.sliding_window_view(np.pad(values, 2, mode="reflect"), 5)
 
 
 _ROUNDING = 1.0e-9
-"""Fraction of a range [-] that is no step of a converter but how a file rounds."""
+"""Fraction of a range [-] below which a step is rounding of a file and not of a converter."""
 _SHARE_THAT_DIFFERS = 0.5
-"""Share of the values that may differ from all others, where a converter's step shows."""
+"""Largest fraction of distinct values in a signal with a visible converter step."""
 
 
 def resolution_of(values: Floats) -> float:
-    """Return the step of the converter that made the values [their unit], the least between two; 0 where none shows.
+    """Return the converter step of the values [their unit], the smallest difference; 0 if none is visible.
 
     One shows where most values come again, as no noise and no motion makes them.
     """
@@ -179,7 +179,7 @@ def resolution_of(values: Floats) -> float:
 
 
 def rounding_of(values: Floats, resolution: float) -> Floats:
-    """Return the standard deviation [their unit] with which each value speaks, for what its converter rounds.
+    """Return the standard deviation [their unit] of each value by the rounding of its converter.
 
     It is the resolution over sqrt(12) (GUM, JCGM 100:2008, F.2.2.1). A sensor at rest repeats one value with one error,
     so that a run of n equal values says no more than one: each of them speaks with sqrt(n) times that.
@@ -190,7 +190,7 @@ def rounding_of(values: Floats, resolution: float) -> Floats:
 
 
 def noise_of(values: Floats) -> float:
-    """Return the standard deviation of white noise [unit of the signal], from third differences that are not unusual.
+    """Return the standard deviation of white noise [unit of the signal], from the usual third differences.
 
     What the signal itself does between four samples counts as noise where it is larger; a few jumps do not matter.
     """
@@ -203,23 +203,23 @@ def noise_of(values: Floats) -> float:
 
 
 def _third_differences(values: Floats, lag: int) -> Floats:
-    """Return sizes of third differences of samples ``lag`` apart, without what a parabola through them explains."""
+    """Return the sizes of third differences of samples ``lag`` apart, each less a fitted parabola."""
     first, second, third, fourth = (values[place * lag : values.size - (3 - place) * lag] for place in range(4))
     return np.asarray(np.abs(fourth - 3.0 * third + 3.0 * second - first))
 
 
 _SHARE_OF_LAGS = 0.1
-"""Share of a recording over which noise may remember at most: beyond it, what a model lacks looks like noise."""
+"""Largest correlation time of noise, as a fraction of a recording: slower residuals are model error."""
 
 _BY_CHANCE = 8.0
 """Four standard errors of a quarter's size among differences that share samples, times the root of their number."""
 
 _QUARTER = 0.31864
-"""Size below which a quarter of normal deviates lie."""
+"""Lower quartile of the absolute value of a standard normal deviate."""
 
 
 def correlated_noise_of(values: Floats) -> float:
-    """Return the standard deviation of noise that may be correlated, in what a model leaves [its unit].
+    """Return the standard deviation of possibly correlated noise in residuals [their unit].
 
     Third differences of samples further apart see the noise that neighbours share. A quarter of the recording, where
     they are smallest, speaks for all of it, as a model that is wrong is so while something moves. The spread about the

@@ -1,4 +1,4 @@
-"""A recording seen sample by sample, for what is worked out without keeping it.
+"""Samples of a recording in sequence, for metrics that need no recording.
 
 A meter is a state of a few floats that goes through the samples of a run once. Its functions are pure and scalar, so
 that the engine can compile them into its lanes.
@@ -13,7 +13,7 @@ WALK, STEADY, REQUESTED, LED_SHANK = "walk", "steady strides", "requested torque
 
 
 class FootSample(NamedTuple):
-    """A foot on the shank of a gait: its angle and the measured one over the horizontal [rad].
+    """Foot on the shank of a gait: its angle and the measured one over the horizontal [rad].
 
     ``toe_difference`` is how much higher its toes are than the measured ones [m].
     """
@@ -64,7 +64,7 @@ class EnergySample(NamedTuple):
 
 NO_GAS = GasSample(**dict.fromkeys(GasSample._fields, 0.0))
 NO_ENERGY = EnergySample(**dict.fromkeys(EnergySample._fields, 0.0))
-"""Nothing gained yet, or energies of gas that has no balance of them."""
+"""Initial energies, also of a gas without an energy balance."""
 
 
 class Sample(NamedTuple):
@@ -110,12 +110,12 @@ SAME_LEVEL = 1.0e-9
 
 
 def is_away(reference: float, last: float, tolerance: float) -> bool:
-    """True where a reference does not rest at its last value; all in its unit."""
+    """Tell whether a reference differs from its last value; all in its unit."""
     return abs(reference - last) > tolerance
 
 
 def advance_course(course: Course, sample: Sample) -> Course:
-    """The course with one sample more, of a monotone reference: away from its last value first, then at rest."""
+    """Course of a monotone reference after one more sample: away from its last value first, then at rest."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
     return Course(
@@ -128,7 +128,7 @@ def advance_course(course: Course, sample: Sample) -> Course:
 
 @dataclass(frozen=True, slots=True)
 class MeterKind:
-    """Something worked out from samples: ``state`` is a NamedTuple class of floats, so are its nested ones.
+    """Meter: a running evaluation of samples; ``state`` is a NamedTuple class of floats, nested ones included.
 
     ``start(course, sample)`` makes it at the first sample, ``update(state, course, sample)`` at each later one. What
     ``course`` says of the hold is right up to this sample. A meter without ``needs_course`` must not look at it; one

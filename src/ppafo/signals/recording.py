@@ -1,4 +1,4 @@
-"""A recording: time and named channels with units, and the channels that the package knows by name.
+"""Recording: time and named channels with units, and the channels that the package knows by name.
 
 Measured and simulated data take the same road from here on.
 """
@@ -27,7 +27,7 @@ BETWEEN: tuple[Between, ...] = get_args(Between)
 
 @dataclass(frozen=True, slots=True)
 class ChannelKind:
-    """A known channel; a held one keeps its value until the next sample, the others run straight to it.
+    """Known channel; a held one keeps its value until the next sample, the others are linear in between.
 
     So it is where a recording does not declare otherwise.
     """
@@ -268,12 +268,12 @@ class Recording:
         return self._channel(name).unit
 
     def is_held(self, name: str) -> bool:
-        """Return whether a channel keeps its value from sample to sample; it runs straight to the next one if not."""
+        """Tell whether a channel keeps its value until the next sample; otherwise it is linear in between."""
         between = self._channel(name).between
         return (name in CHANNELS and CHANNELS[name].is_held) if between is None else between == "hold"
 
     def with_channel(self, name: str, values: ArrayLike, unit: str) -> "Recording":
-        """Return the recording with one channel added or replaced; one that is replaced stays held or linear."""
+        """Return the recording with a channel added or replaced; a replaced one keeps its interpolation."""
         between = self.channels[name].between if name in self.channels else None
         channel = Channel(np.asarray(values, dtype=np.float64), unit, between)
         return Recording(self.label, self.time, {**self.channels, name: channel}, self.kind)
@@ -291,7 +291,7 @@ class Recording:
         return Recording(self.label, self.time[inside], kept, self.kind)
 
     def resample(self, times: ArrayLike) -> "Recording":
-        """Return the recording at other times [s] within its own: the last value of a held channel, else a line."""
+        """Return the recording at other times [s] within its span, interpolated by channel: held or linear."""
         wanted = np.asarray(times, dtype=np.float64)
         if wanted.size and (wanted.min() < self.time[0] or wanted.max() > self.time[-1]):
             raise DataError(
@@ -319,7 +319,7 @@ def recording_kind(name: str) -> RecordingKind:
 
 
 def between_samples(recording: Recording, name: str, times: Floats, start: float = 0.0) -> Floats:
-    """Return a channel [SI] at times [s] that count from ``start``, as it declares: held, or on a line.
+    """Return a channel [SI] at times [s] counted from ``start``, interpolated as declared: held or linear.
 
     Before its first sample and after its last one it stands still.
     """

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ppafo.metrics.metric import Metric
 
 
-class Recorded(Protocol):
+class RecordedResult(Protocol):
     """A result of a scenario or a walk that holds its recording."""
 
     @property
@@ -36,7 +36,7 @@ class Recorded(Protocol):
         """Return its figure."""
 
 
-def channel_values(self: Recorded, channel: str | tuple[str, str]) -> Floats:
+def channel_values(self: RecordedResult, channel: str | tuple[str, str]) -> Floats:
     """Return the values of a channel in SI, ``result["torque"]``, or in a unit, ``result["pressure_1", "psi_g"]``.
 
     ``result["time"]`` are the times of the samples [s]. DataError for a channel that is not there, UnitError for a unit
@@ -50,20 +50,20 @@ def channel_values(self: Recorded, channel: str | tuple[str, str]) -> Floats:
     return self.recording.in_unit(name, unit, self.scenario.device.supply.atmospheric_pressure)
 
 
-def channel_names(self: Recorded) -> list[str]:
+def channel_names(self: RecordedResult) -> list[str]:
     """Return the time and the channels, which a notebook completes between brackets."""
     return ["time", *self.recording.names]
 
 
 @in_units(lambda result: result.scenario.device.shown)
-def html(self: Recorded) -> str:
+def html(self: RecordedResult) -> str:
     """Return metrics and figure, which a notebook shows."""
     from ppafo.report.notebook import result_html
 
     return result_html(str(self).partition("\n")[0], self.metrics, self.plot())
 
 
-def dataset(self: Recorded, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
+def dataset(self: RecordedResult, units: Mapping[str, str] | None = None) -> "xarray.Dataset":
     """Return the recording as an xarray Dataset; attributes hold units, long names and the scenario as JSON.
 
     Channels are in SI but for those with another unit in ``units``, ``{"pressure_1": "psi_g"}``.
@@ -76,7 +76,7 @@ def dataset(self: Recorded, units: Mapping[str, str] | None = None) -> "xarray.D
     return dataset_of(self.recording, scenario_document(self.scenario), units, atmosphere)
 
 
-def dataframe(self: Recorded, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
+def dataframe(self: RecordedResult, units: Mapping[str, str] | None = None) -> "pandas.DataFrame":
     """Return the channels as columns over time [s]; ``units`` as of ``dataset``."""
     table = dataset(self, units)
     frame = table.to_dataframe()

@@ -5,12 +5,13 @@ from typing import Any
 
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
-from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.graph import Follows, Graph, LinkFunction
 from ppafo.parameters.overrides import read_overrides
-from ppafo.simulation.declaration import PERIOD, RATE, RUN, Reading, quantity_text, value_at
-from ppafo.simulation.motion_kind import Clock
+from ppafo.simulation.declaration import PERIOD, RATE, RUN, DocumentReader, value_at
+from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.overrides import apply_overrides
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import shown_text
 
 MAXIMUM_STEPS = 1.0e8
 MAXIMUM_OUTPUTS = 5.0e6
@@ -27,7 +28,7 @@ TIMES = (_DURATION_PATH, _STEP_PATH, _OUTPUT_PATH, _RATE_PATH, _PERIOD_PATH)
 """Paths that decide the clock of a run."""
 
 
-def read_clock(reading: Reading) -> Clock:
+def read_clock(reading: DocumentReader) -> RunTimes:
     """Return the times of a run [s]; the step is the largest one, up to what is given, that divides the sample period.
 
     Without an output interval every step is recorded, or nearly every one where they do not divide the duration.
@@ -55,16 +56,16 @@ def read_clock(reading: Reading) -> Clock:
     if duration / used > MAXIMUM_STEPS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"with a step of {quantity_text(used, 's')} the run has {duration / used:.3g} steps, at most "
+            f"with a step of {shown_text(used, 's')} the run has {duration / used:.3g} steps, at most "
             f"{MAXIMUM_STEPS:.0e} are allowed: shorten the run or take a larger {_STEP_PATH}",
         )
     if duration / output > MAXIMUM_OUTPUTS:
         raise reading.refusal(
             _DURATION_PATH,
-            f"recorded every {quantity_text(output, 's')} the run has {duration / output:.3g} samples, at most "
+            f"recorded every {shown_text(output, 's')} the run has {duration / output:.3g} samples, at most "
             f"{MAXIMUM_OUTPUTS:.0e} are allowed: take a larger {_OUTPUT_PATH}",
         )
-    return Clock(duration, used, output, period)
+    return RunTimes(duration, used, output, period)
 
 
 def links_of_times(document: Mapping[str, Any]) -> Graph:
@@ -73,10 +74,16 @@ def links_of_times(document: Mapping[str, Any]) -> Graph:
     found: dict[str, tuple[Follows, ...]] = {}
     if not step:
         sources = (_DURATION_PATH, _PERIOD_PATH)
-        term = Term((*sources, _OUTPUT_PATH), step_with_output) if output else Term(sources, step_unless_given)
+        term = (
+            LinkFunction((*sources, _OUTPUT_PATH), step_with_output)
+            if output
+            else LinkFunction(sources, step_unless_given)
+        )
         found[_STEP_PATH] = (Follows((term,)),)
     if not output:
-        found[_OUTPUT_PATH] = (Follows((Term((_DURATION_PATH, _PERIOD_PATH, _STEP_PATH), output_unless_given),)),)
+        found[_OUTPUT_PATH] = (
+            Follows((LinkFunction((_DURATION_PATH, _PERIOD_PATH, _STEP_PATH), output_unless_given),)),
+        )
     return found
 
 
@@ -113,33 +120,33 @@ def nearest_whole(number: Numeric) -> Numeric:
     return found
 
 
-def _read_output(reading: Reading, duration: float, step: float) -> float:
+def _read_output(reading: DocumentReader, duration: float, step: float) -> float:
     """Return the time between two recorded samples: no less than a step, and a whole fraction of the duration."""
     output = reading.number(_OUTPUT_PATH, _OUTPUT)
     if output < step * (1.0 - _RELATIVE):
         raise reading.refusal(
             _OUTPUT_PATH,
-            f"must not be below {_STEP_PATH} = {quantity_text(step, 's')}; take a smaller step or record less often",
+            f"must not be below {_STEP_PATH} = {shown_text(step, 's')}; take a smaller step or record less often",
         )
     _not_above(reading, _OUTPUT_PATH, output, _DURATION_PATH, duration)
     count = duration / output
     if abs(count - round(count)) > _RELATIVE * count:
         raise reading.refusal(
-            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {quantity_text(duration, 's')}, it fits {count:.6g} times"
+            _OUTPUT_PATH, f"must divide {_DURATION_PATH} = {shown_text(duration, 's')}, it fits {count:.6g} times"
         )
     return output
 
 
-def _not_above(reading: Reading, path: str, value: float, limit_path: str, limit: float) -> None:
+def _not_above(reading: DocumentReader, path: str, value: float, limit_path: str, limit: float) -> None:
     if value > limit * (1.0 + _RELATIVE):
-        raise reading.refusal(path, f"must not be above {quantity_text(limit, 's')}, which {limit_path} gives")
+        raise reading.refusal(path, f"must not be above {shown_text(limit, 's')}, which {limit_path} gives")
 
 
 TimeTexts = Mapping[str, Mapping[str, Any]]
 """The times of a scenario by section and name, as a file gives them."""
 
 
-def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock:
+def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> RunTimes:
     """Return the clock [s] of a run with other times, which are read as overrides of the scenario ``name`` are.
 
     ScenarioError if they do not fit together.
@@ -151,7 +158,7 @@ def clock_with(name: str, given: TimeTexts, times: Mapping[str, float]) -> Clock
         if section == "controller":
             document[section] = {}
         document[section][key] = f"{value!r} {'Hz' if path == _RATE_PATH else 's'}"
-    return read_clock(Reading(name, document, frozenset(times)))
+    return read_clock(DocumentReader(name, document, frozenset(times)))
 
 
 def time_texts(base: Scenario) -> TimeTexts:
@@ -162,8 +169,8 @@ def time_texts(base: Scenario) -> TimeTexts:
         for section in ("run", "controller")
     }
     # The file speaks for the scenario only as long as nobody has changed its times in Python.
-    own = Clock(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)
-    if read_clock(Reading(base.name, texts)) == own:
+    own = RunTimes(base.run.duration, base.run.step, base.run.output_interval, base.controller.period)
+    if read_clock(DocumentReader(base.name, texts)) == own:
         return texts
     run = {"duration": base.run.duration, "step": base.run.step, "output_interval": base.run.output_interval}
     return {

@@ -22,7 +22,7 @@ from ppafo.kinds import Kinds
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity, quantities_of, range_rule
 from ppafo.model.effects.bandwidth import EFFECT as BANDWIDTH
-from ppafo.parameters.declaration import is_within
+from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.parameter_set import Entry
 from ppafo.simulation.motion_kind import MOTIONS, MotionSection, is_walk
 from ppafo.simulation.scenario import (
@@ -35,7 +35,7 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.units import format_quantity, from_si, parse_quantity, to_si
+from ppafo.units import format_quantity, parse_quantity, split_quantity, to_si
 from ppafo.units.shown import shown_unit
 
 PLAIN = ("", "1")
@@ -78,13 +78,6 @@ PURPOSE = "reference.beyond_reach"
 """Key of a file with the reason why its reference lies beyond the reach of the device."""
 _OF_REACH = ("reference.", "supply.", "actuator.", "motion.", "device.")
 """Beginnings of the paths of a reference, and of what decides how far a device reaches."""
-
-
-def changes_reach(paths: Iterable[str]) -> bool:
-    """True where a path is of a reference, or of what decides how far a device reaches."""
-    return any(path.startswith(_OF_REACH) for path in paths)
-
-
 ANGLE_LEVEL = Quantity("level", "rad", "", None, -10.0, 10.0)
 
 SUPPLY_LINE = "supply_line"
@@ -127,6 +120,11 @@ class Declared:
     def paths(self, document: Mapping[str, Any]) -> tuple[str, ...]:
         """Return every path that an override can set, beside the paths of the device."""
         return (*self.texts(document), *self.quantities(document), *self.appended)
+
+
+def changes_reach(paths: Iterable[str]) -> bool:
+    """True where a path is of a reference, or of what decides how far a device reaches."""
+    return any(path.startswith(_OF_REACH) for path in paths)
 
 
 def controlled_in(document: Mapping[str, Any]) -> str:
@@ -332,17 +330,8 @@ OF_A_VANE = Declared(
 """Possible content of the file of a vane alone; a file without supply lines can be given some."""
 
 
-_WRITTEN_UNITS = {"rad": "deg", "rad/s": "deg/s", "Pa_a": "psi_g", "Pa_d": "psi_d"}
-_ROUND = 1.0e-9
-
-
-def written_unit(si_unit: str) -> str:
-    """Return the unit in which people write what has a unit in SI: the set's or the usual one, empty for a number."""
-    return shown_unit(si_unit, _WRITTEN_UNITS.get(si_unit, "" if si_unit in PLAIN else si_unit))
-
-
 @dataclass(frozen=True, slots=True)
-class Reading:
+class DocumentReader:
     """A document with what messages call it; ``overridden`` are the paths that an override has set."""
 
     file: str
@@ -383,7 +372,8 @@ class Reading:
         if not isinstance(value, str) and quantity.unit not in PLAIN:
             raise self.refusal(path, f"a number without a unit; must be {_form(quantity, result)}")
         if not is_within(result, quantity):
-            raise self.refusal(path, range_rule(quantity, limits(quantity, atmosphere)))
+            given = split_quantity(value)[1] if isinstance(value, str) else quantity.unit
+            raise self.refusal(path, range_rule(quantity, limits_text(quantity, given)))
         return result
 
     def _of_what(self, path: str, quantity: Quantity) -> str:
@@ -403,40 +393,7 @@ class Reading:
         }
 
 
-def quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
-    """Return an SI value in the unit in which people write it: degrees, psi; rounding errors are left out."""
-    unit = written_unit(si_unit)
-    number = from_si(value, unit, si_unit, atmosphere)
-    # A number so small that nine places would show nothing of it stays as it is.
-    return format_quantity(round(number, 9) if abs(number) > _ROUND else number, unit)
-
-
-def short_quantity_text(value: float, si_unit: str, atmosphere: float = STANDARD_ATMOSPHERE) -> str:
-    """Return an SI value as ``quantity_text`` does, with six digits, for a message."""
-    unit = written_unit(si_unit)
-    return f"{from_si(value, unit, si_unit, atmosphere):.6g} {unit}".rstrip()
-
-
 def _form(quantity: Quantity, number: float) -> str:
     if quantity.unit in PLAIN:
         return "a number"
-    unit = written_unit(quantity.unit)
-    return f"a text with its unit, for example '{format_quantity(number, unit)}'"
-
-
-def limits(quantity: Quantity, atmosphere: float) -> str:
-    """Return the range of a value as text, in the unit in which people write it: ``at least 0 deg``.
-
-    ``atmosphere`` [Pa absolute] is what gauge pressures are measured from.
-    """
-    # The limits of a pressure are absolute; in gauge they would move with the atmosphere.
-    unit = written_unit(quantity.unit) if quantity.unit != "Pa_a" else "Pa_a"
-    unit = "" if unit in PLAIN else unit
-    lower, upper = (
-        f"{from_si(limit, unit, quantity.unit, atmosphere):.6g} {unit}".rstrip() if math.isfinite(limit) else ""
-        for limit in (quantity.minimum, quantity.maximum)
-    )
-    beyond = "at least" if quantity.minimum_allowed else "more than"
-    parts = [f"{beyond} {lower}"] if lower else []
-    parts += [f"at most {upper}"] if upper else []
-    return " and ".join(parts)
+    return f"a text with its unit, for example '{format_quantity(number, shown_unit(quantity.unit))}'"

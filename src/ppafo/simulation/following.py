@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.graph import Follows, Graph, LinkFunction
 from ppafo.parameters.plant import number_under
-from ppafo.simulation.declaration import SUPPLY_LINES, Reading, line_paths, value_at
+from ppafo.simulation.declaration import SUPPLY_LINES, DocumentReader, line_paths, value_at
 
 if TYPE_CHECKING:
     from ppafo.model.regulator import SupplyLines
 
 
 def read_followers(
-    reading: Reading,
+    reading: DocumentReader,
     sections: Mapping[str, tuple[Quantity, ...]],
-    terms: Mapping[str, Term],
+    terms: Mapping[str, LinkFunction],
     device: Device,
     present: Mapping[str, float],
 ) -> tuple[dict[str, float], Graph]:

@@ -7,7 +7,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.model.ports import load_torque
-from ppafo.parameters.graph import Term
+from ppafo.parameters.graph import LinkFunction
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
@@ -86,7 +86,7 @@ def settings_of(scenario: Scenario, law: ControllerKind) -> tuple[Quantity, ...]
     return law_settings(law, scenario.controlled)
 
 
-def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, Term]:
+def terms_of(scenario: Scenario, law: ControllerKind) -> dict[str, LinkFunction]:
     """Return what the gains of a law follow on the device of a scenario, by name."""
     return loop_terms(scenario.device, law, scenario.motion.motion_kind.sees(scenario), scenario.controlled)
 
@@ -111,9 +111,5 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
     of_joint = any(gain.computed for gain in gains) and scenario.controlled == ANGLE
-    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, _loads_of(scenario) if of_joint else ())
-
-
-def _loads_of(scenario: Scenario) -> tuple[str, ...]:
-    """Return the sections of the effects that load the joint of a scenario."""
-    return tuple(effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws)
+    loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
+    return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())

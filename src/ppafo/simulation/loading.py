@@ -49,7 +49,7 @@ from ppafo.simulation.declaration import (
     THERMAL_GAS,
     WALL_AREA,
     Declared,
-    Reading,
+    DocumentReader,
     changes_reach,
     controlled_in,
     controller_settings,
@@ -57,12 +57,11 @@ from ppafo.simulation.declaration import (
     line_entries,
     line_quantities,
     quantities,
-    quantity_text,
     reference_settings,
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
-from ppafo.simulation.motion_kind import MOTIONS, Clock
+from ppafo.simulation.motion_kind import MOTIONS, RunTimes
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.numbers import check_parts
 from ppafo.simulation.overrides import OverriddenDocument, apply_overrides, device_paths, is_of_device
@@ -84,6 +83,7 @@ from ppafo.simulation.scenario import (
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.simulation.torque_loop import LEG_PATHS, PERIOD_PATH, loop_terms, seen_in_scenario
 from ppafo.units import format_quantity, split_quantity
+from ppafo.units.shown import shown_in, shown_text, written_text
 
 _SECTION = "assumed"
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
@@ -122,58 +122,65 @@ def build_scenario(request: ScenarioRequest, changed: OverriddenDocument) -> Sce
     ScenarioError or ParameterError for the first value that cannot be used.
     """
     document = changed.document
-    reading = Reading(request.file, document, changed.paths)
+    reading = DocumentReader(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
-    clock = read_clock(reading)
-    section = MOTIONS[kind_at(document, "motion")].section
-    assert section is not None, "walks are built from another layout"
-    before = Reading(request.file, request.content)
-    run = RunSettings(
-        clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
-    )
-    motion = section.read(reading, device, clock.duration, clock.step, request.folder)
-    initial, links = _initial(reading, device.supply)
-    sensors = _sensors(reading, clock)
-    lines = read_supply_line(reading, device)
-    controlled = _controlled(reading)
-    reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
-    control, of_control = _control(reading, device, clock.period, sensors, lines, motion, reference)
-    scenario = Scenario(
-        name=document["name"],
-        description=document.get("description", ""),
-        device=device,
-        run=run,
-        motion=motion,
-        initial=initial,
-        controller=control,
-        reference=reference,
-        sensors=sensors,
-        assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
-        origin=origin_of(request, document, hardware.valve),
-        gas_model=read_gas_model(reading),
-        supply_line=lines,
-        links={**links, **of_reference, **of_control},
-        controlled=controlled,
-        beyond_reach=_purpose(reading, request.overrides),
-    )
-    problem = reference_problem(scenario)
-    if problem:
-        raise ScenarioError(f"{request.file}: {problem}")
-    # Refuse what only a vane has.
-    try:
-        if lines is not None:
-            device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
-        law = CONTROLLERS[scenario.controller.kind]
-        if law.needs_reference and law.controls == (TORQUE,):
-            # These open the valve by their own idea of the device, where a command above 0 raises the torque.
-            able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
-            device.check_pressurised(f"the controller '{scenario.controller.kind}'", f"; take one of {able}")
-        if law.plan is not None:
-            scenario.device.check_torque_constant("a fixed-point controller")
-    except ParameterError as error:
-        raise _of_device(reading, error) from error
-    return scenario
+    # Refusals are in the units of the set.
+    with shown_in(device.shown):
+        clock = read_clock(reading)
+        section = MOTIONS[kind_at(document, "motion")].section
+        assert section is not None, "walks are built from another layout"
+        before = DocumentReader(request.file, request.content)
+        run = RunSettings(
+            clock.duration, clock.step, clock.output_interval, tolerance=reading.number("run.tolerance", ACCURACY)
+        )
+        motion = section.read(reading, device, clock.duration, clock.step, request.folder)
+        initial, links = _initial(reading, device.supply)
+        sensors = _sensors(reading, clock)
+        lines = read_supply_line(reading, device)
+        controlled = _controlled(reading)
+        reference, of_reference = _reference(reading, controlled, device.supply.atmospheric_pressure)
+        control, of_control = _control(reading, device, clock.period, sensors, lines, motion, reference)
+        purpose = (
+            ""
+            if changes_reach(override.typed for override in request.overrides)
+            else value_at(reading.document, PURPOSE)
+        )
+        scenario = Scenario(
+            name=document["name"],
+            description=document.get("description", ""),
+            device=device,
+            run=run,
+            motion=motion,
+            initial=initial,
+            controller=control,
+            reference=reference,
+            sensors=sensors,
+            assumptions=(*read_assumptions(before, reading, hardware, request.overrides), *assumed_lines(reading)),
+            origin=origin_of(request, document, hardware.valve),
+            gas_model=read_gas_model(reading),
+            supply_line=lines,
+            links={**links, **of_reference, **of_control},
+            controlled=controlled,
+            beyond_reach=str(purpose or ""),
+        )
+        problem = reference_problem(scenario)
+        if problem:
+            raise ScenarioError(f"{request.file}: {problem}")
+        # Refuse what only a vane has.
+        try:
+            if lines is not None:
+                device.check_pressurised(f"a [{SUPPLY_LINE}] with its regulators")
+            law = CONTROLLERS[scenario.controller.kind]
+            if law.needs_reference and law.controls == (TORQUE,):
+                # These open the valve by their own idea of the device, where a command above 0 raises the torque.
+                able = ", ".join(name for name, other in CONTROLLERS.items() if len(other.controls) > 1)
+                device.check_pressurised(f"the controller '{scenario.controller.kind}'", f"; take one of {able}")
+            if law.plan is not None:
+                scenario.device.check_torque_constant("a fixed-point controller")
+        except ParameterError as error:
+            raise _of_device(reading, error) from error
+        return scenario
 
 
 def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str, named: Iterable[str] = ()) -> Origin:
@@ -182,7 +189,7 @@ def origin_of(request: ScenarioRequest, document: Mapping[str, Any], valve: str,
     return Origin(request.path, document["device"]["set"], valve, overrides, request.content)
 
 
-def read_hardware(reading: Reading, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
+def read_hardware(reading: DocumentReader, request: ScenarioRequest, overrides: tuple[Override, ...]) -> Hardware:
     """Return the parameter set with the overrides of the file and then the caller's."""
     section, in_file = reading.document["device"], request.content.get("device", {})
     valve = section.get("valve")
@@ -224,7 +231,7 @@ def set_name(name: str, folder: Path) -> str:
     return str(folder / name) if is_path and name not in list_sets() else name
 
 
-def read_device(reading: Reading, hardware: Hardware) -> Device:
+def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
     """Return the device of a parameter set with its overrides; ParameterError for what is missing or contradicts."""
     try:
         return build_device(hardware.parameter_set, hardware.valve, hardware.links)
@@ -232,12 +239,12 @@ def read_device(reading: Reading, hardware: Hardware) -> Device:
         raise _of_device(reading, error) from error
 
 
-def _of_device(reading: Reading, error: ParameterError) -> ParameterError:
+def _of_device(reading: DocumentReader, error: ParameterError) -> ParameterError:
     """Return the error with the scenario it happened in, on one line whatever the names are."""
     return ParameterError(f"{reading.file}: [device]: {one_line(error)}")
 
 
-def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
+def _initial(reading: DocumentReader, supply: Supply) -> tuple[Initial, Graph]:
     """Return the pressures [Pa absolute] of the chambers at the start, and which pressures of the supply they follow.
 
     Each is a number or a word; a word follows its pressure, a number in gauge the atmosphere.
@@ -263,7 +270,7 @@ def _initial(reading: Reading, supply: Supply) -> tuple[Initial, Graph]:
 
 
 def _control(
-    reading: Reading,
+    reading: DocumentReader,
     device: Device,
     period: float,
     sensors: Sensors,
@@ -292,7 +299,7 @@ def _control(
     return Control(kind, {path.partition(".")[2]: number for path, number in followed.items()}, period), links
 
 
-def _controlled(reading: Reading) -> str:
+def _controlled(reading: DocumentReader) -> str:
     """Return what the reference is of; ScenarioError where the controller cannot follow it."""
     controlled, kind = controlled_in(reading.document), kind_at(reading.document, "controller")
     law = CONTROLLERS[kind]
@@ -308,7 +315,7 @@ def _controlled(reading: Reading) -> str:
     )
 
 
-def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
+def _reference(reading: DocumentReader, controlled: str, atmosphere: float) -> tuple[ProfileChoice, Graph]:
     """Return what the controller follows, and which levels of it follow the atmosphere [Pa absolute].
 
     ScenarioError where the controller needs a reference and none is given.
@@ -330,24 +337,18 @@ def _reference(reading: Reading, controlled: str, atmosphere: float) -> tuple[Pr
     return choice, {path: follow for path, follow in links.items() if follow}
 
 
-def _purpose(reading: Reading, overrides: Iterable[Override]) -> str:
-    """Return why a file asks for a reference beyond reach; "" where an override makes it another reference or reach."""
-    purpose = "" if changes_reach(override.typed for override in overrides) else value_at(reading.document, PURPOSE)
-    return str(purpose or "")
-
-
-def _sensors(reading: Reading, clock: Clock) -> Sensors:
+def _sensors(reading: DocumentReader, clock: RunTimes) -> Sensors:
     values: dict[str, Any] = reading.section("sensors", SENSORS)
     if values["delay"] > clock.duration:
         raise reading.refusal("sensors.delay", "must not be longer than run.duration: nothing would ever be measured")
     if values["delay"] / clock.step > MAXIMUM_STEPS_OF_DELAY:
-        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
+        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * clock.step, "s")
         raise reading.refusal("sensors.delay", f"must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps")
     return Sensors(**values, seed=int(reading.number("sensors.seed", SEED)))
 
 
 def read_assumptions(
-    before: Reading, reading: Reading, hardware: Hardware, overrides: Iterable[Override]
+    before: DocumentReader, reading: DocumentReader, hardware: Hardware, overrides: Iterable[Override]
 ) -> tuple[Assumption, ...]:
     """Return every assumption that still has a value; one that an override replaced says what it was ``before``.
 
@@ -370,7 +371,7 @@ def read_assumptions(
     return tuple(assumptions)
 
 
-def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
+def _value(reading: DocumentReader, hardware: Hardware, path: str) -> str | None:
     """Return the value at a path as written in the file or, where it has none, the default; None without either."""
     written = value_at(reading.document, path)
     if written is not None and path in OF_A_VANE.paths(reading.document):
@@ -387,10 +388,10 @@ def _value(reading: Reading, hardware: Hardware, path: str) -> str | None:
         quantity = hardware.parameter_set.declarations().get(full)
     if quantity is not None and quantity.default is None and quantity.follows:
         return "what follows from the device"
-    return None if quantity is None or quantity.default is None else quantity_text(quantity.default, quantity.unit)
+    return None if quantity is None or quantity.default is None else written_text(quantity.default, quantity.unit)
 
 
-def read_gas_model(reading: Reading) -> GasModel | None:
+def read_gas_model(reading: DocumentReader) -> GasModel | None:
     """Return how the gas takes up heat in SI, None where it keeps its temperature."""
     if kind_at(reading.document, "gas_model") != THERMAL:
         return None
@@ -402,7 +403,7 @@ def read_gas_model(reading: Reading) -> GasModel | None:
     return model
 
 
-def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
+def read_supply_line(reading: DocumentReader, device: Device) -> SupplyLine | None:
     """Return the lines of a file in SI, None where it has no such section: then supply pressures are constant.
 
     ScenarioError where dorsiflexion is set to more than the line has that feeds its regulator.
@@ -412,7 +413,7 @@ def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
     supply = device.supply
     if supply.dorsiflexion_pressure > supply.pressure:
         first, second = (
-            quantity_text(pressure, "Pa_a", supply.atmospheric_pressure)
+            shown_text(pressure, "Pa_a", atmosphere=supply.atmospheric_pressure)
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         raise ScenarioError(
@@ -423,7 +424,7 @@ def read_supply_line(reading: Reading, device: Device) -> SupplyLine | None:
     return SupplyLine(**{line: RegulatedLine(**numbers) for line, numbers in read.items()})
 
 
-def assumed_lines(reading: Reading) -> tuple[Assumption, ...]:
+def assumed_lines(reading: DocumentReader) -> tuple[Assumption, ...]:
     """Return the values of the lines that the file leaves to their defaults, with the reason for each."""
     if value_at(reading.document, SUPPLY_LINE) is None:
         return ()
@@ -554,7 +555,7 @@ def scenario_of(request: ScenarioRequest, layout: Layout) -> Scenario:
     paths = [f"{section}.{name}" for section in FORMS for name in value_at(changed.document, section) or ()]
     pair = in_two_forms(paths)
     if pair is not None:
-        raise Reading(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
+        raise DocumentReader(request.file, changed.document, changed.paths).refusal(pair[1], either(pair[1]))
     return layout.build(request, changed)
 
 

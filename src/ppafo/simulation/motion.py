@@ -24,7 +24,7 @@ from ppafo.simulation.declaration import (
     LOCKED_ANGLE,
     SUPPLY_LINE,
     THERMAL,
-    Reading,
+    DocumentReader,
     kind_at,
     motion_quantities,
     profile_settings,
@@ -32,7 +32,7 @@ from ppafo.simulation.declaration import (
     shank_settings,
     value_at,
 )
-from ppafo.simulation.motion_kind import VANE, Clock, Measured, MotionSection, ProfileTable, Seen
+from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSection, ProfileTable, RunTimes
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.schema import profile_table, shank_table
@@ -85,7 +85,7 @@ class VaneKind:
         document |= {} if scenario.supply_line is None else {SUPPLY_LINE: {}}
         return quantities(document, of_motion) | elsewhere
 
-    def clock(self, scenario: Scenario, times: Mapping[str, Any]) -> "tuple[Clock, tuple[Problem, ...]]":
+    def clock(self, scenario: Scenario, times: Mapping[str, Any]) -> "tuple[RunTimes, tuple[Problem, ...]]":
         """Return the clock with other times [s], by path, and what does not fit together."""
         from ppafo.simulation.ensemble.vane import clock
 
@@ -103,7 +103,7 @@ class VaneKind:
         """Return the controller as it is in its catalogue."""
         return CONTROLLERS[scenario.controller.kind]
 
-    def sees(self, scenario: Scenario) -> Seen:
+    def sees(self, scenario: Scenario) -> LawSignals:
         """Return how the controller sees what it controls, with the foot of a leg or without."""
         from ppafo.simulation.torque_loop import seen_in_scenario
 
@@ -152,7 +152,7 @@ def _measured_prescribed(scenario: Scenario, run: "Run", times: "Floats", rows: 
     return measured_prescribed(scenario, run, times, rows)
 
 
-def _read_angle(reading: Reading, device: Device) -> float:
+def _read_angle(reading: DocumentReader, device: Device) -> float:
     """Return the angle [rad] of the vane; ScenarioError where it is not between the stops of the device."""
     angle, stops = reading.number(LOCKED_ANGLE, ANGLE), (device.actuator.angle_min, device.actuator.angle_max)
     if not stops[0] - TOLERANCE <= angle <= stops[1] + TOLERANCE:
@@ -160,7 +160,7 @@ def _read_angle(reading: Reading, device: Device) -> float:
     return angle
 
 
-def _read_free(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> FreeMotion:
+def _read_free(reading: DocumentReader, device: Device, _duration: float, _step: float, _folder: Path) -> FreeMotion:
     _read_angle(reading, device)
     numbers = reading.section("motion", FREE)
     return FreeMotion(numbers["angle"], numbers["angular_velocity"], numbers["external_torque"])
@@ -175,7 +175,9 @@ FREE_MOTION = VaneKind(
 """Equation (1), with a constant external torque."""
 
 
-def _read_locked(reading: Reading, device: Device, _duration: float, _step: float, _folder: Path) -> PrescribedMotion:
+def _read_locked(
+    reading: DocumentReader, device: Device, _duration: float, _step: float, _folder: Path
+) -> PrescribedMotion:
     return PrescribedMotion(ProfileChoice("constant", {"level": _read_angle(reading, device)}), "locked")
 
 
@@ -189,7 +191,9 @@ LOCKED_MOTION = VaneKind(
 """A vane on a test bench that is clamped: its profile is constant."""
 
 
-def _read_prescribed(reading: Reading, device: Device, duration: float, step: float, _folder: Path) -> PrescribedMotion:
+def _read_prescribed(
+    reading: DocumentReader, device: Device, duration: float, step: float, _folder: Path
+) -> PrescribedMotion:
     profile = read_profile(reading, _PROFILE, ANGLE_LEVEL)
     problem = profile_problem(stops_of(device), profile, duration, step)
     if problem:
@@ -216,7 +220,7 @@ PRESCRIBED_MOTION = VaneKind(
 """The ankle goes along a profile whatever the device does."""
 
 
-def _read_leg(reading: Reading, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
+def _read_leg(reading: DocumentReader, device: Device, _duration: float, _step: float, folder: Path) -> FreeMotion:
     """Return the motion with a leg whose shank goes along a profile without corners or as in a gait."""
     _read_angle(reading, device)
     numbers: dict[str, Any] = reading.section("motion", LEG)

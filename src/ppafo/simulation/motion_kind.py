@@ -25,7 +25,7 @@ ScenarioType_contra = TypeVar("ScenarioType_contra", contravariant=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Clock:
+class RunTimes:
     """Duration, longest step, output interval and sample period [s]; the step divides the sample period."""
 
     duration: float
@@ -34,7 +34,7 @@ class Clock:
     period: float
 
 
-class Seen(NamedTuple):
+class LawSignals(NamedTuple):
     """Signals of a law: the row of its signals, their delay, and the paths that fill the row.
 
     ``places`` makes the two angles [rad] between which the joint is of the stops and the row. ``turning`` makes inertia
@@ -97,7 +97,9 @@ class MotionKind(Protocol[ScenarioType_contra]):
     def quantities(self, scenario: ScenarioType_contra, /) -> dict[str, Quantity]:
         """Return the declaration of the numbers of a scenario beside those of its device, by path."""
 
-    def clock(self, scenario: ScenarioType_contra, times: Mapping[str, Any], /) -> "tuple[Clock, tuple[Problem, ...]]":
+    def clock(
+        self, scenario: ScenarioType_contra, times: Mapping[str, Any], /
+    ) -> "tuple[RunTimes, tuple[Problem, ...]]":
         """Return the clock with other times [s], by path, and what is wrong with it."""
 
     def switches(self, scenario: ScenarioType_contra, /) -> tuple[Any, ...]:
@@ -109,7 +111,7 @@ class MotionKind(Protocol[ScenarioType_contra]):
     def law(self, scenario: ScenarioType_contra, /) -> "ControllerKind":
         """Return the controller with what the motion adds to it."""
 
-    def sees(self, scenario: ScenarioType_contra, /) -> Seen:
+    def sees(self, scenario: ScenarioType_contra, /) -> LawSignals:
         """Return how the controller sees what it controls."""
 
     def follows_reference(self, scenario: ScenarioType_contra, /) -> bool:

@@ -15,7 +15,7 @@ from ppafo.model.orifice import area_conductance, sonic_conductance_mass
 from ppafo.model.valves.proportional import spool_lag
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 from ppafo.parameters.device import VANE, Device, SonicOrifice
-from ppafo.parameters.graph import Term
+from ppafo.parameters.graph import LinkFunction
 from ppafo.simulation.declaration import SUPPLY_LINE, SUPPLY_LINES
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 
@@ -128,7 +128,7 @@ def rest_of(volume: float, growth: float, stops: Range) -> float:
     return max(volume - 0.5 * growth * (stops.angle_max - stops.angle_min), LEAST_SHARE * volume)
 
 
-def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term]:
+def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, LinkFunction]:
     """Return what each ``nominal_`` setting follows, by the names of ``NOMINAL``.
 
     The valve of another package is not known: then ``nominal_flow`` is 0, and the observer off.
@@ -136,58 +136,60 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Term
     valve, kind = device.valve, VALVES[device.valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
     is_pair, is_known = valve.kind in _PAIRS, valve.kind in (*_PAIRS, _SPOOL)
-    terms = {name: Term((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
+    terms = {name: LinkFunction((path,)) for name, path in _SAME.items()} | _chamber_terms(device)
     terms |= {
-        "gas_product": Term(_MASS, product_of),
+        "gas_product": LinkFunction(_MASS, product_of),
         "valve_conductance": _conductance(device, VALVE),
         "leak_conductance": _conductance(device, LEAK),
         "flow": in_its_form(
             device,
             VALVE,
-            Term((*_GAS, *AREA_PATHS[VALVE]), flow_of_area),
-            Term((*_MASS, SONIC_PATHS[VALVE][0]), flow_of_sonic),
+            LinkFunction((*_GAS, *AREA_PATHS[VALVE]), flow_of_area),
+            LinkFunction((*_MASS, SONIC_PATHS[VALVE][0]), flow_of_sonic),
         )
         if is_known
-        else Term(_ANY, no),
+        else LinkFunction(_ANY, no),
         "critical_ratio": in_its_form(
-            device, VALVE, Term(_GAS[1:2], critical_pressure_ratio), Term(SONIC_PATHS[VALVE][1:])
+            device, VALVE, LinkFunction(_GAS[1:2], critical_pressure_ratio), LinkFunction(SONIC_PATHS[VALVE][1:])
         ),
         # Not a number that varies: the source is there because a term needs one.
-        "relieving": Term(_ANY, yes if device.supply.takes_back else no),
-        "pair": Term(_ANY, yes if is_pair else no),
-        "delay": Term(("valve.delay",)) if valve.kind == _SPOOL else Term(_ANY, no),
-        "lag": Term(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
+        "relieving": LinkFunction(_ANY, yes if device.supply.takes_back else no),
+        "pair": LinkFunction(_ANY, yes if is_pair else no),
+        "delay": LinkFunction(("valve.delay",)) if valve.kind == _SPOOL else LinkFunction(_ANY, no),
+        "lag": LinkFunction(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
         if valve.kind == _SPOOL
-        else Term(_ANY, no),
-        "joining_time": Term(("valve.joining_time", "valve.holding_time"), time_of_joint)
+        else LinkFunction(_ANY, no),
+        "joining_time": LinkFunction(("valve.joining_time", "valve.holding_time"), time_of_joint)
         if "joining_time" in names
-        else Term(_ANY, no),
+        else LinkFunction(_ANY, no),
     }
     for name in ("opening_delay", "closing_delay", "switching_interval", "dead_band"):
-        terms[name] = Term((f"valve.{name}",)) if name in names and is_known else Term(_ANY, no)
+        terms[name] = LinkFunction((f"valve.{name}",)) if name in names and is_known else LinkFunction(_ANY, no)
     for number, line in enumerate(SUPPLY_LINES, start=1):
         path = f"{SUPPLY_LINE}.{line}"
         of_line = {
-            "line_droop": Term((f"{path}.droop", *_MASS), per_content),
-            "line_largest_flow": Term((f"{path}.largest_flow", *_MASS), as_content),
-            "line_volume": Term((f"{path}.volume",)),
+            "line_droop": LinkFunction((f"{path}.droop", *_MASS), per_content),
+            "line_largest_flow": LinkFunction((f"{path}.largest_flow", *_MASS), as_content),
+            "line_volume": LinkFunction((f"{path}.volume",)),
         }
-        terms |= {f"{name}_{number}": Term(_ANY, no) if lines is None else term for name, term in of_line.items()}
-    terms["line_relieving"] = Term(_ANY, yes if lines is not None and first(lines.relieving) else no)
+        terms |= {
+            f"{name}_{number}": LinkFunction(_ANY, no) if lines is None else term for name, term in of_line.items()
+        }
+    terms["line_relieving"] = LinkFunction(_ANY, yes if lines is not None and first(lines.relieving) else no)
     return {NOMINAL[name]: term for name, term in terms.items()}
 
 
-def _conductance(device: Device, section: str) -> Term:
+def _conductance(device: Device, section: str) -> LinkFunction:
     """Return what the conductance [kg/(s Pa)] of an orifice follows."""
     return in_its_form(
         device,
         section,
-        Term((*_GAS, *AREA_PATHS[section]), conductance_of_area),
-        Term((*_MASS, SONIC_PATHS[section][0]), conductance_of_sonic),
+        LinkFunction((*_GAS, *AREA_PATHS[section]), conductance_of_area),
+        LinkFunction((*_MASS, SONIC_PATHS[section][0]), conductance_of_sonic),
     )
 
 
-def in_its_form(device: Device, section: str, of_area: Term, of_sonic: Term) -> Term:
+def in_its_form(device: Device, section: str, of_area: LinkFunction, of_sonic: LinkFunction) -> LinkFunction:
     """Return the term of the form that the orifice of a section has, beside the one of its other form."""
     orifice = device.valve.orifice if section == VALVE else device.actuator.leak
     of_area, of_sonic = replace(of_area, orifice=section), replace(of_sonic, orifice=section)
@@ -196,21 +198,21 @@ def in_its_form(device: Device, section: str, of_area: Term, of_sonic: Term) -> 
     return replace(of_area, in_other_form=of_sonic)
 
 
-def _chamber_terms(device: Device) -> dict[str, Term]:
+def _chamber_terms(device: Device) -> dict[str, LinkFunction]:
     """Return what torque constant, growth and dead volumes follow; of another kind, of a vane like it."""
-    own = {f"chamber_rest_{number}": Term((f"actuator.dead_volume_{number}",)) for number in (1, 2)}
+    own = {f"chamber_rest_{number}": LinkFunction((f"actuator.dead_volume_{number}",)) for number in (1, 2)}
     if device.actuator.kind == VANE:
         names = ("torque_constant", "displacement_per_radian", "dead_volume_1", "dead_volume_2")
-        growth = Term(("actuator.displacement_per_radian",))
-        return {name: Term((f"actuator.{name}",)) for name in names} | own | {"chamber_growth": growth}
+        growth = LinkFunction(("actuator.displacement_per_radian",))
+        return {name: LinkFunction((f"actuator.{name}",)) for name in names} | own | {"chamber_growth": growth}
     chambers = chambers_of(device)
 
-    def term(frame: Callable[..., float]) -> Term:
+    def term(frame: Callable[..., float]) -> LinkFunction:
         made = made_of(frame, f"{frame.__name__}_of_device", BelievedParts(chambers.function))
-        return Term(chambers.sources, made, chambers.rows)
+        return LinkFunction(chambers.sources, made, chambers.rows)
 
     return own | {
-        "chamber_growth": Term(chambers.sources, chambers.growth, chambers.rows),
+        "chamber_growth": LinkFunction(chambers.sources, chambers.growth, chambers.rows),
         "torque_constant": term(torque_per_pressure),
         # By virtual work a chamber grows with the angle as its torque does with the pressure.
         "displacement_per_radian": term(torque_per_pressure),

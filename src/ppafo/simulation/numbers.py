@@ -77,9 +77,11 @@ def check_parts(scenario: Scenario) -> None:
     if not isinstance(scenario.controlled, str) or scenario.controlled not in CONTROLLED:
         raise refusal("controlled", scenario.controlled, f"must be one of {', '.join(CONTROLLED)}")
     absent = {f"{section}.{name}" for section in ORIFICES for name in other_form(scenario.device, section)} | {_RATE}
-    take = taken_number()
+    take, named = taken_number(), scenario.device.effects
     for path, quantity in declared_numbers(scenario).items():
-        if path in absent:
+        section, _, name = path.partition(".")
+        # An effect that the device does not name has its defaults.
+        if path in absent or (section == EFFECT_SETTINGS and name.partition(".")[0] not in named):
             continue
         value = number_under(scenario, _attributes(path, scenario))
         try:
@@ -88,7 +90,7 @@ def check_parts(scenario: Scenario) -> None:
         except ValueError:
             is_good = False
         if not is_good:
-            raise refusal(path, value, range_rule(quantity, limits_text(quantity)))
+            raise refusal(path, value, range_rule(quantity, limits_text(quantity, quantity.unit)))
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:

@@ -2,20 +2,18 @@
 
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.parameters.device import Actuator, Device
+from ppafo.parameters.device import Device
 from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import static_torque
 from ppafo.simulation.mean_chambers import gauge_of, usual_place
 
 
-def place_of_gains(actuator: Actuator) -> float:
-    """Angle [rad] at which the gains of a law take the chambers of an actuator that moves."""
-    return usual_place(float(actuator.angle_min), float(actuator.angle_max))
-
-
 def quicker_at(device: Device, angle: float, controlled: str) -> float:
     """Rate of a torque or pressure at an angle [rad] over its rate where the gains are computed [-]."""
-    here, there = (_rate_per_flow(device, place, controlled) for place in (angle, place_of_gains(device.actuator)))
+    here, there = (
+        _rate_per_flow(device, place, controlled)
+        for place in (angle, usual_place(float(device.actuator.angle_min), float(device.actuator.angle_max)))
+    )
     return here / there if there > 0.0 else 1.0
 
 

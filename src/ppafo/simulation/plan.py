@@ -113,7 +113,7 @@ class CarriedLeg:
 
 
 @dataclass(frozen=True, slots=True)
-class Steps:
+class TimeGrid:
     """Length of a step [s], how many there are, how many to a sample of the controller and of the recording.
 
     ``needs_parts`` is true where the error decides about the parts of a step; ``tolerance`` is the error over the one
@@ -128,7 +128,7 @@ class Steps:
     tolerance: Any = 1.0
 
 
-StepRule = Callable[[PlantParameters], Steps]
+StepRule = Callable[[PlantParameters], TimeGrid]
 Start = Callable[[PlantParameters], PlantState]
 
 
@@ -236,7 +236,7 @@ def _foot(components: Components) -> FootPhases | None:
     return foot
 
 
-def _program(components: Components, steps: Steps, walk: Walk | None, has_delay: bool) -> Program:
+def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
     worn = None if walk is None else walk.groups()
@@ -309,7 +309,7 @@ def plan_vane(scenario: Scenario, leg: CarriedLeg | None = None) -> tuple[Run, t
     return run, (too_many_steps(scenario, run.step, run.step_count), *problems)
 
 
-def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
+def scenario_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     """The steps of a scenario: the largest that divides a sample of its controller, in parts where the error asks."""
     counts = step_counts(
         scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
@@ -329,7 +329,7 @@ def scenario_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
         needs_parts = np.logical_not(
             is_slow(plant, step, *volumes_of(model, plant, held, room, room), scenario.stiffness)
         )
-    return Steps(
+    return TimeGrid(
         step=counts.step,
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),

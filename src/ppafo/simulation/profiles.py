@@ -12,9 +12,9 @@ from ppafo.model.columns import at, over_runs
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, Controlled, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
-from ppafo.simulation.declaration import Reading, kind_at, profile_settings, quantity_text
+from ppafo.simulation.declaration import DocumentReader, kind_at, profile_settings
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, shown_text
 
 MAXIMUM_CHECKED_TIMES = 20_000
 TOLERANCE = 1.0e-9
@@ -43,7 +43,7 @@ def profile_bounds(choice: ProfileChoice) -> tuple[float, float]:
     return lowest, highest
 
 
-def read_profile(reading: Reading, section: str, prescribed: Quantity) -> ProfileChoice:
+def read_profile(reading: DocumentReader, section: str, prescribed: Quantity) -> ProfileChoice:
     """Return a function of time with all its settings in SI."""
     kind = kind_at(reading.document, section)
     return ProfileChoice(kind, reading.section(section, profile_settings(kind, prescribed)))
@@ -69,7 +69,7 @@ class Limits(NamedTuple):
 
     def text(self, value: float) -> str:
         """A value in the unit in which people write it."""
-        return quantity_text(value, self.unit, self.room)
+        return shown_text(value, self.unit, atmosphere=self.room)
 
     def of_run(self, run: int) -> "Limits":
         """The limits of one run."""
@@ -124,7 +124,7 @@ def profile_problem(
 
 def range_text(stops: tuple[float, float]) -> str:
     """Return the range between two stops [rad] for a message."""
-    return f"{quantity_text(stops[0], 'rad')} to {quantity_text(stops[1], 'rad')}"
+    return f"{shown_text(stops[0], 'rad')} to {shown_text(stops[1], 'rad')}"
 
 
 @in_units(lambda scenario: scenario.device.shown)

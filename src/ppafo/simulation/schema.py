@@ -145,34 +145,29 @@ def file_model(name: str, own: dict[str, Any], sections: Container[str] = declar
         **own,
     }
     if "gas_model" in sections:
-        fields["gas_model"] = optional(_gas_table(), "how the gas in the chambers behaves; isothermal unless given")
+        isothermal = kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
+        thermal = kind_field(declaration.THERMAL, "the gas warms and cools: energy balance, heat through the walls")
+        fields["gas_model"] = optional(
+            one_of(
+                [
+                    table("IsothermalGas", isothermal),
+                    table("ThermalGas", thermal | quantity_fields(declaration.THERMAL_GAS)),
+                ]
+            ),
+            "how the gas in the chambers behaves; isothermal unless given",
+        )
     if declaration.SUPPLY_LINE in sections:
         what = "regulators and lines of the gas; constant pressures unless given"
-        fields[declaration.SUPPLY_LINE] = optional(_supply_line_table(), what)
+        lines = {
+            line: optional(
+                table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
+            )
+            for line in declaration.SUPPLY_LINES
+        }
+        fields[declaration.SUPPLY_LINE] = optional(table("SupplyLine", lines), what)
     reasons = "assumed values, which no source gives, and why these"
     fields["assumed"] = (dict[str, str], Field(default_factory=dict, description=reasons))
     return table(name, fields)
-
-
-def _gas_table() -> Any:
-    isothermal = kind_field(declaration.ISOTHERMAL, "the gas keeps its temperature, as in the paper")
-    thermal = kind_field(declaration.THERMAL, "the gas warms and cools: energy balance, heat through the walls")
-    return one_of(
-        [
-            table("IsothermalGas", isothermal),
-            table("ThermalGas", thermal | quantity_fields(declaration.THERMAL_GAS)),
-        ]
-    )
-
-
-def _supply_line_table() -> Any:
-    lines = {
-        line: optional(
-            table(f"{model_name(line)}Line", quantity_fields(declaration.line_quantities(line))), f"{line} line"
-        )
-        for line in declaration.SUPPLY_LINES
-    }
-    return table("SupplyLine", lines)
 
 
 def scenario_file(document: Mapping[str, Any] | None = None) -> type[BaseModel]:

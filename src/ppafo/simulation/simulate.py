@@ -51,7 +51,7 @@ class Status:
         return self.kind == "completed"
 
 
-class Measured(NamedTuple):
+class RunMetrics(NamedTuple):
     """The channels of a run, its metrics by name, and how it ended if it was completed, in words."""
 
     recording: Recording
@@ -64,13 +64,13 @@ class Measuring:
 
     __slots__ = ("_measured",)
 
-    def __init__(self, measured: Measured | Callable[[], Measured]) -> None:
+    def __init__(self, measured: RunMetrics | Callable[[], RunMetrics]) -> None:
         self._measured = measured
 
-    def __call__(self) -> Measured:
+    def __call__(self) -> RunMetrics:
         """Return recording, metrics and end, the same at every call."""
         # What makes them holds all rows of the run, so it is let go once they are made.
-        if not isinstance(self._measured, Measured):
+        if not isinstance(self._measured, RunMetrics):
             self._measured = self._measured()
         return self._measured
 
@@ -79,7 +79,7 @@ class Measuring:
 
     __hash__ = None  # type: ignore[assignment]  # recordings have no hash
 
-    def __reduce__(self) -> tuple[type["Measuring"], tuple[Measured]]:
+    def __reduce__(self) -> tuple[type["Measuring"], tuple[RunMetrics]]:
         """Copy and pickle what was measured: the program of the run stays in this process."""
         return Measuring, (self(),)
 
@@ -253,13 +253,13 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
     return Result(scenario, status, versions, engine, Measuring(measure))
 
 
-def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> Measured:
+def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> RunMetrics:
     """Recording and metrics of a record (samples, rows), and how a completed run ended."""
     from ppafo.metrics.metric import Metrics
 
     by_path = {path: np.ascontiguousarray(record[:, row]) for path, row in rows.items()}
     recording, metrics, ended = scenario.motion.motion_kind.measured(scenario, run, times, by_path)
-    return Measured(recording, Metrics(metrics), ended)
+    return RunMetrics(recording, Metrics(metrics), ended)
 
 
 def _status(outcome: BatchResult, record: Floats, rows: dict[str, int], times: Floats) -> Status:

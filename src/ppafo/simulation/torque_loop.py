@@ -19,11 +19,11 @@ from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
 from ppafo.model.declaration import Number, PlainFunction, row_with
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Term
+from ppafo.parameters.graph import LinkFunction
 from ppafo.parameters.plant import valve_settings
 from ppafo.simulation.declaration import LOCKED_ANGLE
 from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of, usual_place
-from ppafo.simulation.motion_kind import Seen
+from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
 PERIOD_PATH = "controller.period"
@@ -488,11 +488,11 @@ class LoopFrames(NamedTuple):
 
 _PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
 _ANGLE = (*_PRESSURES, "sensors.delay", *_OF_ANGLE, *_OF_DEVICE)
-IN_WALK = Seen(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
+IN_WALK = LawSignals(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
 """The torque in a walk."""
-IN_SCENARIO = Seen(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"), places=anywhere)
+IN_SCENARIO = LawSignals(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"), places=anywhere)
 """A torque or a pressure of a vane alone."""
-LOCKED = Seen(
+LOCKED = LawSignals(
     signals=Locked, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay", LOCKED_ANGLE), places=where_locked
 )
 """The same of a joint that is locked at an angle."""
@@ -505,28 +505,24 @@ _PLACES: dict[str, tuple[tuple[type, type], tuple[str, ...], Callable[[Range, An
 """Rows of a joint and of a leg, and settings of a reference that say between which angles the joint is to be."""
 
 
-def _of_angle(reference: str, has_leg: bool) -> Seen:
-    rows, names, places = _PLACES.get(reference, _PLACES[""])
-    return Seen(
-        signals=rows[has_leg],
-        late=time_with_angle,
-        paths=(*_ANGLE, *(LEG_PATHS if has_leg else ()), *(f"reference.{name}" for name in names)),
-        places=places,
-        turning=turning_with_foot if has_leg else turning_alone,
-    )
-
-
-def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False, reference: str = "") -> Seen:
+def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False, reference: str = "") -> LawSignals:
     """Return how the law of a vane alone sees what is controlled, by its kind of reference.
 
     The joint may have a leg's foot, or be locked.
     """
     if controlled == ANGLE:
-        return _of_angle(reference, has_leg)
+        rows, names, places = _PLACES.get(reference, _PLACES[""])
+        return LawSignals(
+            signals=rows[has_leg],
+            late=time_with_angle,
+            paths=(*_ANGLE, *(LEG_PATHS if has_leg else ()), *(f"reference.{name}" for name in names)),
+            places=places,
+            turning=turning_with_foot if has_leg else turning_alone,
+        )
     return LOCKED if is_locked else IN_SCENARIO
 
 
-def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFrames:
+def _frames(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> LoopFrames:
     """Return the loops of a device for a law that sees what is controlled in some way.
 
     With the valve's orifice as a sonic conductance or as an area.
@@ -563,7 +559,9 @@ def _frames(device: Device, seen: Seen, controlled: str, sonic: bool) -> LoopFra
     return LoopFrames(loop=loop, reach=reach, torque_loop=inner, rows=rows, sources=sources, joint=joint)
 
 
-def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str = TORQUE) -> dict[str, Term]:
+def loop_terms(
+    device: Device, law: ControllerKind, seen: LawSignals, controlled: str = TORQUE
+) -> dict[str, LinkFunction]:
     """Return what the gains of a law follow on a device, by the names of ``control.torque_loop`` and ``angle_loop``.
 
     ``controlled`` says what the law controls, ``seen`` how it sees that.
@@ -571,7 +569,7 @@ def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str 
     of_area, of_sonic = (_frames(device, seen, controlled, sonic) for sonic in (False, True))
     names = {quantity.name for quantity in VALVES[device.valve.kind].quantities}
 
-    def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> Term:
+    def in_form(frames: LoopFrames, frame: PlainFunction, by: PlainFunction, settings: tuple[str, ...]) -> LinkFunction:
         # A law of the angle alone has the torque loop inside it.
         own_loop = frames.loop if TORQUE in law.controls else frames.torque_loop
         if frame is gain_of_joint:
@@ -581,9 +579,9 @@ def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str 
             made = made_of(frame, f"{by.__name__}_of_device", ReachParts(frames.reach, by))
         else:
             made = made_of(frame, f"{by.__name__}_of_device", GainParts(own_loop, by))
-        return Term((*frames.sources, *settings), made, frames.rows)
+        return LinkFunction((*frames.sources, *settings), made, frames.rows)
 
-    def term(frame: PlainFunction, by: PlainFunction, *settings: str) -> Term:
+    def term(frame: PlainFunction, by: PlainFunction, *settings: str) -> LinkFunction:
         return in_its_form(device, VALVE, in_form(of_area, frame, by, settings), in_form(of_sonic, frame, by, settings))
 
     terms = {name: term(gain_of_loop, by) for name, by in _OF_LOOP.items()}
@@ -598,5 +596,5 @@ def loop_terms(device: Device, law: ControllerKind, seen: Seen, controlled: str 
     gain = next((quantity.name for quantity in law.quantities if torque_loop.PROPORTIONAL_GAIN in quantity.follows), "")
     path = f"controller.{gain}"
     terms[torque_loop.INTEGRAL_GAIN] = term(gain_of_loop_and_setting, torque_loop.integral_gain, path)
-    terms[torque_loop.LEARNING_GAIN] = Term((path,), torque_loop.learning_gain)
+    terms[torque_loop.LEARNING_GAIN] = LinkFunction((path,), torque_loop.learning_gain)
     return terms

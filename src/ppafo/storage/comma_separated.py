@@ -40,7 +40,7 @@ _OWN_COLUMNS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class HeaderColumn:
     """Column as its header declares it: channel (or time), the unit of its numbers, interpolation between samples."""
 
     name: str
@@ -55,7 +55,7 @@ class Column:
         return CHANNELS[self.name].unit if self.name in CHANNELS else self.unit
 
 
-def parse_header(cells: list[str]) -> list[Column]:
+def parse_header(cells: list[str]) -> list[HeaderColumn]:
     """Return the columns of a header such as ``time [s]``, ``pressure_1 [psi_g]``; time comes first.
 
     DataError for one that cannot be read.
@@ -83,7 +83,7 @@ def parse_header(cells: list[str]) -> list[Column]:
         if word and between is None:
             hint = nearest_name(word, BETWEEN)
             raise DataError(f"column '{name}': behind its unit may stand {' or '.join(BETWEEN)}, not '{word}'{hint}")
-        columns.append(Column(name, unit, between))
+        columns.append(HeaderColumn(name, unit, between))
     names = [column.name for column in columns]
     if names[0] != TIME:
         raise DataError(f"the first column must be '{TIME} [{TIME_UNIT}]', it is '{names[0]}'")
@@ -123,7 +123,7 @@ def check_clock(time: Floats, lines: Sequence[int], noun: str = "line") -> None:
         )
 
 
-def in_si(column: Column, values: Floats, atmosphere: float) -> Floats:
+def in_si(column: HeaderColumn, values: Floats, atmosphere: float) -> Floats:
     """Return the values in the unit in which a recording keeps them; gauge counts from ``atmosphere`` [Pa absolute].
 
     UnitError for a unit that does not fit.

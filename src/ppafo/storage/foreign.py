@@ -24,7 +24,7 @@ from ppafo.storage.column_map import (
     in_map,
     shown_names,
 )
-from ppafo.storage.comma_separated import Column, check_clock, in_si
+from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si
 from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes
 from ppafo.storage.frames import remedy_for
@@ -55,7 +55,13 @@ def read_mapped_matlab(file: MatlabFile, columns: ColumnMap, map_name: str) -> M
         date = columns.channels[TIME].date
         if date is not None:
             dates = file.texts.get(_variable(f"channels.{TIME}.date", date, file))
-        size = _common_length(numbers, clock)
+        lengths = {name: values.size for name, values in numbers.items()}
+        if clock:
+            lengths[TIME] = len(clock)
+        if len(set(lengths.values())) != 1:
+            listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
+            raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
+        size = next(iter(lengths.values()))
         for name, values in numbers.items():
             gaps = np.flatnonzero(~np.isfinite(values))
             if gaps.size:
@@ -83,17 +89,6 @@ def _variable(key: str, column: int | str, file: MatlabFile) -> str:
     return name
 
 
-def _common_length(numbers: dict[str, Floats], clock: list[str] | None) -> int:
-    """Return the number of samples that all columns have; DataError where they have several, or there is no column."""
-    lengths = {name: values.size for name, values in numbers.items()}
-    if clock:
-        lengths[TIME] = len(clock)
-    if len(set(lengths.values())) != 1:
-        listed = ", ".join(f"channels.{name} has {length}" for name, length in lengths.items())
-        raise DataError(f"all columns must have the same number of samples: {listed or 'there is no column'}")
-    return next(iter(lengths.values()))
-
-
 # The direction of a movement, up or down, from how fast a recorded channel moves, as a column map asks for it.
 
 _SHORTEST = 1e-12
@@ -115,7 +110,19 @@ def with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
         threshold = parse_quantity(wanted.threshold, rate_unit)
     with refused_as(DataError, f"direction.window = {wanted.window!r}", UnitError):
         window = parse_quantity(wanted.window, TIME_UNIT)
-    rate = wanted.sign * _smoothed_rate(recording.time, recording[wanted.of], window)
+    # The slope [1/s] between the means of the half windows [s] before and after each sample.
+    sum_of_values = np.concatenate(([0.0], np.cumsum(recording[wanted.of])))
+    sum_of_times = np.concatenate(([0.0], np.cumsum(recording.time)))
+    here = np.arange(recording.time.size)
+    # At least the sample itself on either side, where the window is shorter than a sample.
+    first = np.minimum(np.searchsorted(recording.time, recording.time - 0.5 * window), here)
+    end = np.maximum(np.searchsorted(recording.time, recording.time + 0.5 * window, side="right"), here + 1)
+    count_before, count_after = here - first + 1, end - here
+    mean_before = (sum_of_values[here + 1] - sum_of_values[first]) / count_before
+    mean_after = (sum_of_values[end] - sum_of_values[here]) / count_after
+    time_before = (sum_of_times[here + 1] - sum_of_times[first]) / count_before
+    time_after = (sum_of_times[end] - sum_of_times[here]) / count_after
+    rate = wanted.sign * np.asarray((mean_after - mean_before) / np.maximum(time_after - time_before, _SHORTEST))
     direction = np.where(rate > threshold, 1.0, np.where(rate < -threshold, -1.0, 0.0))
     moving = np.flatnonzero(direction)
     if moving.size == 0:
@@ -127,22 +134,6 @@ def with_direction(recording: Recording, wanted: MappedDirection) -> Recording:
     is_reversed = np.diff(direction[moving]) != 0.0
     sweeps[moving] = np.concatenate(([1], 1 + np.cumsum(is_reversed)))
     return directed.with_channel("repetition", sweeps, PLAIN_NUMBER)
-
-
-def _smoothed_rate(time: Floats, values: Floats, window: float) -> Floats:
-    """Return the slope [1/s] between the means of the half windows [s] before and after each sample."""
-    sum_of_values = np.concatenate(([0.0], np.cumsum(values)))
-    sum_of_times = np.concatenate(([0.0], np.cumsum(time)))
-    here = np.arange(time.size)
-    # At least the sample itself on either side, where the window is shorter than a sample.
-    first = np.minimum(np.searchsorted(time, time - 0.5 * window), here)
-    end = np.maximum(np.searchsorted(time, time + 0.5 * window, side="right"), here + 1)
-    count_before, count_after = here - first + 1, end - here
-    mean_before = (sum_of_values[here + 1] - sum_of_values[first]) / count_before
-    mean_after = (sum_of_values[end] - sum_of_values[here]) / count_after
-    time_before = (sum_of_times[here + 1] - sum_of_times[first]) / count_before
-    time_after = (sum_of_times[end] - sum_of_times[here]) / count_after
-    return np.asarray((mean_after - mean_before) / np.maximum(time_after - time_before, _SHORTEST))
 
 
 _MASS_FLOW = "kg/s"
@@ -250,7 +241,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
     if mapped.constant is not None:
         with refused_as(DataError, f"channels.{name}.constant = {mapped.constant!r}", UnitError):
             value, unit = split_number(mapped.constant)
-            column = Column(name, _flow_unit(name, unit, mapped, surroundings.gas) or PLAIN_NUMBER)
+            column = HeaderColumn(name, _flow_unit(name, unit, mapped, surroundings.gas) or PLAIN_NUMBER)
             values = in_si(column, np.full(table.size, value), surroundings.atmosphere)
             return Channel(values, column.si_unit, mapped.between, column.unit)
     numbers = table.numbers.get(name, np.empty(0))
@@ -262,7 +253,7 @@ def _channel(name: str, mapped: MappedChannel, table: MappedTable, surroundings:
         values, unit = values * multiple, f"{unit} {unit_of_multiple}".removeprefix(f"{PLAIN_NUMBER} ").strip()
         key += f" with times = {mapped.times!r}"
     with refused_as(DataError, f"channels.{name}.{key}", UnitError):
-        column = Column(name, _flow_unit(name, unit, mapped, surroundings.gas))
+        column = HeaderColumn(name, _flow_unit(name, unit, mapped, surroundings.gas))
         return Channel(in_si(column, values, surroundings.atmosphere), column.si_unit, mapped.between, column.unit)
 
 
@@ -270,7 +261,7 @@ def _flow_unit(name: str, unit: str, mapped: MappedChannel, gas: str) -> str:
     """Return the unit of a channel, with reference condition and gas where it is a volume flow for a mass flow."""
     from ppafo.units import is_volume_flow, with_condition
 
-    is_flow = Column(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
+    is_flow = HeaderColumn(name, unit).si_unit == _MASS_FLOW and unit not in ("", PLAIN_NUMBER) and is_volume_flow(unit)
     if not is_flow:
         if mapped.at is not None or mapped.gas is not None:
             raise UnitError("at and gas belong to a volume flow, such as 'L/min', in the place of a mass flow")

@@ -14,7 +14,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, one_line, refused_as
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, recording_kind
-from ppafo.storage.comma_separated import Column, check_clock, in_si, parse_header
+from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si, parse_header
 
 PANDAS_READERS = {
     ".xlsx": "read_excel({path!r})",
@@ -41,13 +41,20 @@ def is_frame(value: object) -> bool:
 
 def remedy_for(path: str | Path) -> str:
     """Advice to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
-    suffix = Path(path).suffix.lower()
-    call = (PANDAS_READERS | OTHER_READERS).get(suffix)
-    if call is None:
-        return ""
-    table = f"pandas.{call.format(path=str(path))}"
-    written = f"{table}.to_csv({f'{path}.csv'!r}, index=False)"
-    return f"; in Python give the table itself, {table}, or write it as CSV: {written}"
+    table = _read_by_pandas(path)
+    # The same advice, behind the one to do without a file.
+    return f"; in Python give the table itself, {table}, or{written_as_csv(path)[1:]}" if table else ""
+
+
+def written_as_csv(path: str | Path) -> str:
+    """Advice to write a table of another format as CSV with pandas; empty for an unknown suffix."""
+    table = _read_by_pandas(path)
+    return f"; write it as CSV: {table}.to_csv({f'{path}.csv'!r}, index=False)" if table else ""
+
+
+def _read_by_pandas(path: str | Path) -> str:
+    call = (PANDAS_READERS | OTHER_READERS).get(Path(path).suffix.lower())
+    return "" if call is None else f"pandas.{call.format(path=str(path))}"
 
 
 def recording_of_frame(
@@ -152,7 +159,7 @@ def _numbers(name: str, values: Any) -> Any:
 def _recording(
     cells: Sequence[str], values: Sequence[Any], label: str, kind: RecordingKind, atmosphere: float
 ) -> Recording:
-    columns: list[Column] = parse_header(list(cells))
+    columns: list[HeaderColumn] = parse_header(list(cells))
     if not len(values[0]):
         raise DataError("has a header but no samples")
     series = []

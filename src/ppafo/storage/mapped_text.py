@@ -71,7 +71,11 @@ def read_mapped_text(content: bytes, columns: ColumnMap, map_name: str) -> Mappe
         lines = _with_stamps_as_column(lines, columns)
     with in_map(map_name):
         table = _begin(lines, columns)
-        indices = _indices(table, columns, lines)
+        indices = {
+            name: _index_of(f"channels.{name}.column", mapped.column, table, lines)
+            for name, mapped in columns.channels.items()
+            if mapped.column is not None
+        }
         date = columns.channels[TIME].date
         date_index = None if date is None else _index_of(f"channels.{TIME}.date", date, table, lines)
     time_index = indices.get(TIME)
@@ -123,7 +127,7 @@ def _with_stamps_as_column(lines: list[str], columns: ColumnMap) -> list[str]:
     return stamped
 
 
-class _Table(NamedTuple):
+class _StartedTable(NamedTuple):
     """A table that was begun: names of the columns (none without a header), first row of numbers, and all rows."""
 
     names: list[str]
@@ -135,7 +139,7 @@ class _Table(NamedTuple):
         return self.names[index] if self.names else str(index + 1)
 
 
-def _begin(lines: list[str], columns: ColumnMap) -> _Table:
+def _begin(lines: list[str], columns: ColumnMap) -> _StartedTable:
     """Return the table in the lines of a file; DataError where it has no header or no row of numbers."""
     rows = _split(lines, columns)
     head = next(rows, None)
@@ -148,7 +152,7 @@ def _begin(lines: list[str], columns: ColumnMap) -> _Table:
     if first is None:
         remedy = ": header = false, if the first line is one of numbers" if columns.header else ""
         raise DataError(f"has no rows of numbers{remedy}")
-    return _Table(names, first[1], chain([first], rows))
+    return _StartedTable(names, first[1], chain([first], rows))
 
 
 def _split(lines: list[str], columns: ColumnMap) -> Rows:
@@ -171,16 +175,7 @@ def _cells(line: str, number: int, columns: ColumnMap) -> list[str]:
         raise DataError(f"line {number} cannot be read: {error}") from error
 
 
-def _indices(table: _Table, columns: ColumnMap, lines: list[str]) -> dict[str, int]:
-    """Return the index of the column of each channel that has one."""
-    return {
-        name: _index_of(f"channels.{name}.column", mapped.column, table, lines)
-        for name, mapped in columns.channels.items()
-        if mapped.column is not None
-    }
-
-
-def _index_of(key: str, column: int | str, table: _Table, lines: list[str]) -> int:
+def _index_of(key: str, column: int | str, table: _StartedTable, lines: list[str]) -> int:
     """Return the index of a column, from 0, that the map has at ``key`` as a number from 1 or as a name."""
     names = table.names
     if isinstance(column, int):
@@ -221,7 +216,7 @@ def _other_line(lines: list[str], names: list[str], column: str) -> str:
     return ""
 
 
-def _check_width(row: list[str], line: int, table: _Table, last_index: int, columns: ColumnMap) -> None:
+def _check_width(row: list[str], line: int, table: _StartedTable, last_index: int, columns: ColumnMap) -> None:
     """Refuse a row that has not as many cells as the header or the first row, beside empty ones at its end."""
     width, first_width = len(row), len(table.first_row)
     expected = len(table.names) or first_width

@@ -102,7 +102,12 @@ def open_matlab(path: str | Path) -> MatlabFile:
     contents = _Contents()
     try:
         if content[_HDF5_AT : _HDF5_AT + len(_HDF5)] == _HDF5:
-            _read_hdf5(path, contents)
+            import h5py
+
+            with h5py.File(path, "r") as file:
+                for name, node in _own_items(file):
+                    if not name.startswith("#"):
+                        _add(name, _tree_of_hdf5(node, file, 0), 0, contents)
         else:
             _read_older(path, contents)
     except _OF_DAMAGE as error:
@@ -176,15 +181,6 @@ def _tree_of(value: Any) -> Tree:
     return value
 
 
-def _read_hdf5(path: str | Path, contents: _Contents) -> None:
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        for name, node in _own_items(file):
-            if not name.startswith("#"):
-                _add(name, _tree_of_hdf5(node, file, 0), 0, contents)
-
-
 def _own_items(group: Any) -> Iterator[tuple[str, Any]]:
     """Give name and content of each item; none is opened before it is known to lie in this file."""
     import h5py
@@ -234,7 +230,11 @@ def _add(name: str, tree: Tree, depth: int, contents: _Contents) -> None:
     if isinstance(tree, dict):
         for key, inner in tree.items():
             _add(f"{name}.{key}", inner, depth + 1, contents)
-        _add_labelled(name, contents)
+        labels = next((contents.texts[f"{name}.{key}"] for key in _LABELS if f"{name}.{key}" in contents.texts), [])
+        for number, label in enumerate(labels, start=1):
+            column = contents.columns.get(f"{name}.data(:,{number})")
+            if column is not None and f"{name}.data(:,{len(labels) + 1})" not in contents.columns and label:
+                contents.columns.setdefault(label, column)
     elif isinstance(tree, list):
         if tree and all(isinstance(text, str) for text in tree):
             contents.texts[name] = tree
@@ -268,12 +268,3 @@ def _lines_of(name: str, matrix: Floats) -> Iterator[tuple[str, Floats]]:
         yield from ((f"{name}(:,{number + 1})", matrix[:, number]) for number in range(columns))
     if rows <= _MOST_COLUMNS:
         yield from ((f"{name}({number + 1},:)", matrix[number]) for number in range(rows))
-
-
-def _add_labelled(name: str, contents: _Contents) -> None:
-    """Add the columns of ``data`` by their labels, where a structure has as many of them."""
-    labels = next((contents.texts[f"{name}.{key}"] for key in _LABELS if f"{name}.{key}" in contents.texts), [])
-    for number, label in enumerate(labels, start=1):
-        column = contents.columns.get(f"{name}.data(:,{number})")
-        if column is not None and f"{name}.data(:,{len(labels) + 1})" not in contents.columns and label:
-            contents.columns.setdefault(label, column)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import write_file
@@ -55,14 +55,14 @@ def global_attributes(recording: Recording, scenario: Mapping[str, Any] | None) 
     return attributes
 
 
-def joint_of(scenario: Mapping[str, Any] | None) -> Joint:
+def joint_of(scenario: Mapping[str, Any] | None) -> JointNames:
     """Return the joint that the device of a scenario's document turns; the ankle where it does not say."""
     device = (scenario or {}).get("device")
     joint = device.get("joint") if isinstance(device, Mapping) else None
-    return Joint(**joint) if isinstance(joint, Mapping) else ANKLE
+    return JointNames(**joint) if isinstance(joint, Mapping) else ANKLE
 
 
-def channel_attributes(recording: Recording, name: str, joint: Joint = ANKLE) -> dict[str, str]:
+def channel_attributes(recording: Recording, name: str, joint: JointNames = ANKLE) -> dict[str, str]:
     """Return unit and long name of a channel, about a joint; a plain number has the unit 1, as NetCDF asks."""
     unit = recording.unit(name)
     summary = joint.said(CHANNELS[name].summary) if name in CHANNELS else name.replace("_", " ")

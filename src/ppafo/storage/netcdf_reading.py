@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.errors import DataError, one_line
 from ppafo.signals import Channel, Recording, recording_kind
-from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
+from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes
 from ppafo.storage.netcdf import BETWEEN, PLAIN_NUMBER_IN_NETCDF
 
@@ -68,7 +68,14 @@ def _recording_in(content: bytes, label: str) -> Recording:
         for name, variable in variables.items():
             if variable.size != variables[TIME].size:
                 raise DataError(f"'{name}' has {variable.size} values for {variables[TIME].size} times")
-            _check_filters(name, variable)
+            # Only the common filters: gzip within gzip grows without limit.
+            properties = variable.id.get_create_plist()
+            filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
+            behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
+            if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
+                raise DataError(
+                    f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed"
+                )
         _check_memory(variables, len(content))
         for name, variable in variables.items():
             _check_is_whole(name, variable)
@@ -97,15 +104,6 @@ def _own_variables(file: Any) -> dict[str, Any]:
         if variable.is_virtual or variable.external:
             raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
     return variables
-
-
-def _check_filters(name: str, variable: Any) -> None:
-    """Refuse numbers that are stored neither plain nor by the common filters: gzip within gzip grows without limit."""
-    properties = variable.id.get_create_plist()
-    filters = [properties.get_filter(number)[0] for number in range(properties.get_nfilters())]
-    behind_gzip = filters[filters.index(_GZIP) + 1 :] if _GZIP in filters else []
-    if not set(filters) <= _SUPPORTED_FILTERS or not set(behind_gzip) <= {_FLETCHER}:
-        raise DataError(f"'{name}' is compressed in a way that is not supported; save it with gzip, or uncompressed")
 
 
 def _check_memory(variables: Mapping[str, Any], file_bytes: int) -> None:
@@ -158,31 +156,27 @@ def _channel(name: str, variable: Any) -> Channel:
     for key in _GAPS:
         if key in variable.attrs and np.isin(values, np.asarray(variable.attrs[key], dtype=np.float64)).any():
             raise DataError(f"'{name}' has gaps ('{key}'); fill them or cut the file there")
-    for key in _LIMITS:
+    for key, wanted in _LIMITS.items():
         if key in variable.attrs:
-            _check_limits(name, values, key, np.atleast_1d(np.asarray(variable.attrs[key], dtype=np.float64)))
+            limits = np.atleast_1d(np.asarray(variable.attrs[key], dtype=np.float64))
+            if limits.size != wanted:
+                raise DataError(f"'{name}': its attribute '{key}' has {limits.size} numbers, it must have {wanted}")
+            is_outside = np.zeros(values.size, dtype=bool)
+            if key != "valid_max":
+                is_outside |= values < limits[0]
+            if key != "valid_min":
+                is_outside |= values > limits[-1]
+            rows = np.flatnonzero(is_outside)
+            if rows.size:
+                first = int(rows[0])
+                raise DataError(
+                    f"'{name}' has {rows.size} values that are not valid ('{key}'), the first {values[first]:g} at row "
+                    f"{first + 1}; correct them, cut the file there, or correct the attribute"
+                )
     # The channel itself refuses a word that it does not know.
     between: Any = _attribute(variable, BETWEEN) or None
     unit = _attribute(variable, "units")
     return Channel(values, PLAIN_NUMBER if unit == PLAIN_NUMBER_IN_NETCDF else unit, between)
-
-
-def _check_limits(name: str, values: Floats, key: str, limits: Floats) -> None:
-    """Refuse values outside the limits that an attribute, ``valid_min``, ``valid_max`` or ``valid_range``, states."""
-    if limits.size != _LIMITS[key]:
-        raise DataError(f"'{name}': its attribute '{key}' has {limits.size} numbers, it must have {_LIMITS[key]}")
-    is_outside = np.zeros(values.size, dtype=bool)
-    if key != "valid_max":
-        is_outside |= values < limits[0]
-    if key != "valid_min":
-        is_outside |= values > limits[-1]
-    rows = np.flatnonzero(is_outside)
-    if rows.size:
-        first = int(rows[0])
-        raise DataError(
-            f"'{name}' has {rows.size} values that are not valid ('{key}'), the first {values[first]:g} at row "
-            f"{first + 1}; correct them, cut the file there, or correct the attribute"
-        )
 
 
 def _attribute(owner: Any, name: str) -> str:

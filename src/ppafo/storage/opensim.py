@@ -79,7 +79,11 @@ def read_opensim(path: str | Path, gaps: Sequence[str] = ()) -> OpenSimTable:
         labels = told_apart(written)
         row_lines = _row_lines(lines, label_line + 1, header)
         table = _numbers(lines, row_lines, labels, gaps)
-        kept = _without_repeated_ends(table)
+        # Some tools repeat the last time.
+        count = len(table)
+        while count > 1 and table[count - 1, 0] == table[count - 2, 0]:
+            count -= 1
+        kept = table[:count]
         time = kept[:, 0]
         check_growing(time, row_lines[: len(kept)])
     except DataError as error:
@@ -132,14 +136,6 @@ def _numbers(lines: list[str], row_lines: range, labels: list[str], gaps: Sequen
     return table
 
 
-def _without_repeated_ends(table: Floats) -> Floats:
-    """Return a table without the last rows that repeat a time, as some tools write them."""
-    count = len(table)
-    while count > 1 and table[count - 1, 0] == table[count - 2, 0]:
-        count -= 1
-    return table[:count]
-
-
 def _said_of_width(header: _Header, width: int) -> list[str]:
     """Return a remark where the header states another number of columns than labels and rows have."""
     if header.column_count in (None, width):
@@ -167,7 +163,10 @@ def _header(lines: list[str]) -> _Header:
     for number, line in enumerate((line.strip() for line in lines[:end]), start=1):
         count = _COUNT.match(line)
         if count is not None:
-            counts[count[1].lower()] = _whole_number(count[1], count[2], number)
+            text = count[2]
+            if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
+                raise DataError(f"line {number}: {count[1]} is {one_line(text)[:LONGEST_SHOWN]!r}, not a whole number")
+            counts[count[1].lower()] = int(text)
         says_degrees = _says_degrees(line, number)
         if says_degrees is not None:
             if in_degrees is not None and says_degrees != in_degrees:
@@ -185,13 +184,6 @@ def _header(lines: list[str]) -> _Header:
         kind=kind or "measured",
         is_old="datacolumns" in counts,
     )
-
-
-def _whole_number(key: str, text: str, line: int) -> int:
-    """Return the count that the header has at a key."""
-    if not (text.isascii() and text.isdigit() and len(text) <= _MOST_DIGITS):
-        raise DataError(f"line {line}: {key} is {one_line(text)[:LONGEST_SHOWN]!r}, not a whole number")
-    return int(text)
 
 
 def _says_degrees(line: str, number: int) -> bool | None:

@@ -349,7 +349,14 @@ def _read_file(file: Path, atmosphere: float) -> Recording:
         check_can_be_read(file, read_netcdf, "h5py")
         return read_netcdf(file)
     if file.suffix.lower() in TEXT_SUFFIXES:
-        return _read_text(file, atmosphere)
+        recording = read_csv(file, atmosphere=atmosphere)
+        run_file = file.parent / RUN_FILE
+        if file.name != CSV_FILE or not run_file.exists():
+            return recording
+        described = read_document(file.parent)["recording"]
+        with refused_as(DataError, run_file, DataError):
+            kind = recording_kind(str(described.get("kind", recording.kind)))
+        return replace(recording, label=str(described.get("label", recording.label)), kind=kind)
     if file.suffix.lower() == ".parquet":
         from ppafo.storage.frames import read_parquet
 
@@ -368,15 +375,3 @@ def _read_file(file: Path, atmosphere: float) -> Recording:
         f"{file}: is no .nc, .parquet or {', '.join(TEXT_SUFFIXES)} file and no result folder"
         f"{remedy_for(file) or other}"
     )
-
-
-def _read_text(file: Path, atmosphere: float) -> Recording:
-    """Return the recording in a table of text; in a result folder, with label and kind of ``run.json`` beside it."""
-    recording = read_csv(file, atmosphere=atmosphere)
-    run_file = file.parent / RUN_FILE
-    if file.name != CSV_FILE or not run_file.exists():
-        return recording
-    described = read_document(file.parent)["recording"]
-    with refused_as(DataError, run_file, DataError):
-        kind = recording_kind(str(described.get("kind", recording.kind)))
-    return replace(recording, label=str(described.get("label", recording.label)), kind=kind)

@@ -27,7 +27,7 @@ _Path = Annotated[Text, Field(description="what is varied: a path as for --set, 
 _Only = Annotated[Texts, Field(description="names of the configurations in which it varies; default: all")]
 
 
-class Configuration(StrictTable):
+class ConfigurationSection(StrictTable):
     """Base scenario of a study; all configurations get the same draws."""
 
     name: Annotated[str, Field(pattern=NAME, max_length=100, description="label in tables and figures")]
@@ -163,7 +163,7 @@ class Correlation(StrictTable):
     coefficient: Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
-class Sample(StrictTable):
+class SamplingSection(StrictTable):
     """Sampling: number and method of the draws; the whole sample is taken at every point of the grid."""
 
     method: Literal["random", "latin_hypercube", "sobol"]
@@ -171,7 +171,7 @@ class Sample(StrictTable):
     seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
 
 
-class Outputs(StrictTable):
+class OutputsSection(StrictTable):
     """Section of a study file: which metrics, traces and bands are kept of every run."""
 
     metrics: Annotated[Texts | Literal["all"], Field(description="names of metrics, or 'all'")] = ()
@@ -210,7 +210,7 @@ class StudyFile(StrictTable):
     schema_version: SchemaVersion
     name: Annotated[str, Field(pattern=NAME, max_length=100)]
     description: Annotated[str, Field(description="what this study asks, and why")] = ""
-    configurations: Annotated[tuple[Configuration, ...], Field(strict=False, min_length=1)]
+    configurations: Annotated[tuple[ConfigurationSection, ...], Field(strict=False, min_length=1)]
     vary: Annotated[tuple[Annotated[Varied, Field(discriminator="kind")], ...], Field(strict=False)] = ()
     correlations: Annotated[tuple[Correlation, ...], Field(strict=False)] = ()
     runs_of_chunk: Annotated[
@@ -221,8 +221,8 @@ class StudyFile(StrictTable):
             description="runs computed and written together; default: chosen automatically",
         ),
     ] = None
-    sample: Annotated[Sample | None, Field(description="required if there are distributions")] = None
-    outputs: Annotated[Outputs, Field(description="what is kept of each run")]
+    sample: Annotated[SamplingSection | None, Field(description="required if there are distributions")] = None
+    outputs: Annotated[OutputsSection, Field(description="what is kept of each run")]
 
 
 def json_schema() -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 
 Floats = NDArray[np.float64]
 
@@ -157,7 +157,7 @@ FEWEST_EFFECTIVE = 50.0
 """Draws that must carry a mean before its interval by the central limit theorem is believed to half a percent."""
 
 
-def replicates_interval(values: Floats, replicates: int, confidence: float) -> Interval:
+def replicates_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
     """Return the mean with Student's interval from the spread between replicates.
 
     Value j belongs to replicate j % ``replicates``; nan has no value. Without a value in every replicate the ends are
@@ -169,13 +169,13 @@ def replicates_interval(values: Floats, replicates: int, confidence: float) -> I
     parts = [values[number::replicates][known[number::replicates]] for number in range(replicates)]
     mean = float(np.mean(values[known])) if known.any() else math.nan
     if min(part.size for part in parts) == 0:
-        return Interval(mean, -math.inf, math.inf)
+        return ConfidenceInterval(mean, -math.inf, math.inf)
     error = float(np.std([np.mean(part) for part in parts], ddof=1)) / math.sqrt(replicates)
     reach = float(stdtrit(replicates - 1, 0.5 + 0.5 * confidence)) * error
-    return Interval(mean, mean - reach, mean + reach)
+    return ConfidenceInterval(mean, mean - reach, mean + reach)
 
 
-def floored_interval(values: Floats, replicates: int, confidence: float) -> Interval:
+def floored_interval(values: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
     """Return the mean with the wider of two intervals: spread between replicates, and as many independent draws.
 
     Evenly placed draws make replicates agree on what all of them miss: where rare values decide, the spread between
@@ -190,7 +190,7 @@ def floored_interval(values: Floats, replicates: int, confidence: float) -> Inte
         return spread
     plain = float(ndtri(0.5 + 0.5 * confidence)) * float(np.std(known)) / math.sqrt(known.size)
     reach = max(0.5 * spread.width, plain)
-    return Interval(spread.value, spread.value - reach, spread.value + reach)
+    return ConfidenceInterval(spread.value, spread.value - reach, spread.value + reach)
 
 
 def jackknife_reach(left_out: Floats, confidence: float) -> Floats:
@@ -229,7 +229,7 @@ def is_carried(effective: float, draws: int) -> bool:
     return effective >= min(FEWEST_EFFECTIVE, 0.5 * draws)
 
 
-def noise_interval(values: Floats, others: Floats, confidence: float) -> Interval | None:
+def noise_interval(values: Floats, others: Floats, confidence: float) -> ConfidenceInterval | None:
     """Return the fraction of the variance that is due to noise, with its interval; None where nothing varies.
 
     ``others`` (draws,) are the first of the draws of ``values`` with an independent noise stream: half the mean square
@@ -251,20 +251,20 @@ def noise_interval(values: Floats, others: Floats, confidence: float) -> Interva
     share = float(np.mean(within)) / scale
     error = math.sqrt(float(np.mean((within - share * whole) ** 2)) / first.size) / scale
     reach = float(ndtri(0.5 + 0.5 * confidence)) * error
-    return Interval(*(min(1.0, max(0.0, value)) for value in (share, share - reach, share + reach)))
+    return ConfidenceInterval(*(min(1.0, max(0.0, value)) for value in (share, share - reach, share + reach)))
 
 
-def fraction_interval(hits: int, draws: int, confidence: float) -> Interval:
+def fraction_interval(hits: int, draws: int, confidence: float) -> ConfidenceInterval:
     """Return a fraction with the exact interval of Clopper and Pearson (1934)."""
     from scipy.special import betaincinv
 
     tail = 0.5 - 0.5 * confidence
     low = float(betaincinv(hits, draws - hits + 1, tail)) if hits > 0 else 0.0
     high = float(betaincinv(hits + 1, draws - hits, 1.0 - tail)) if hits < draws else 1.0
-    return Interval(hits / draws, low, high)
+    return ConfidenceInterval(hits / draws, low, high)
 
 
-def share_interval(hits: Floats, replicates: int, confidence: float) -> Interval:
+def share_interval(hits: Floats, replicates: int, confidence: float) -> ConfidenceInterval:
     """Return the fraction of draws with a property, and its interval from the spread between replicates.
 
     ``hits`` (draws,) is 1 where a draw has it, 0 where not, nan where that is not known. Where fewer than two draws for
@@ -276,10 +276,10 @@ def share_interval(hits: Floats, replicates: int, confidence: float) -> Interval
     if min(count, known.size - count) < 2 * replicates:
         return fraction_interval(count, known.size, confidence)
     interval = replicates_interval(hits, replicates, confidence)
-    return Interval(interval.value, max(0.0, interval.low), min(1.0, interval.high))
+    return ConfidenceInterval(interval.value, max(0.0, interval.low), min(1.0, interval.high))
 
 
-def quantile_interval(values: Floats, share: float, confidence: float) -> Interval:
+def quantile_interval(values: Floats, share: float, confidence: float) -> ConfidenceInterval:
     """Return a quantile with the interval of two order statistics, which holds for any distribution.
 
     The number of draws below the quantile is binomial (David and Nagaraja, Order Statistics, section 7.1). An end is
@@ -290,13 +290,13 @@ def quantile_interval(values: Floats, share: float, confidence: float) -> Interv
     ordered, tail = np.sort(values), 0.5 - 0.5 * confidence
     lower = int(binom.ppf(tail, values.size, share))
     upper = int(binom.ppf(1.0 - tail, values.size, share)) + 1
-    return Interval(
+    return ConfidenceInterval(
         float(np.quantile(ordered, share)),
         float(ordered[lower - 1]) if lower >= 1 else -math.inf,
         float(ordered[upper - 1]) if upper <= values.size else math.inf,
     )
 
 
-def fraction_text(fraction: Interval) -> str:
+def fraction_text(fraction: ConfidenceInterval) -> str:
     """Return a fraction with its interval in percent."""
     return f"{100.0 * fraction.value:.3g} % [{100.0 * fraction.low:.3g}, {100.0 * fraction.high:.3g}]"

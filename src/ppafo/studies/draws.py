@@ -16,7 +16,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
-from ppafo.studies.study import Configuration, Drawn, Sample, Study, with_followers
+from ppafo.studies.study import Configuration, Drawn, SamplingPlan, Study, with_followers
 from ppafo.units import parse_quantity
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
@@ -53,7 +53,7 @@ class Uncertainty:
 
     def random_columns(self, first: int, count: int, seed: int) -> Columns:
         """Return independent draws number ``first`` to ``first + count - 1`` of the stream that ``seed`` names."""
-        sample = Sample("random", first + count, seed)
+        sample = SamplingPlan("random", first + count, seed)
         return self.columns(uniform_numbers(sample, len(self.drawn), first, count))
 
     def replicated_columns(self, first: int, count: int, seed: int) -> Columns:
@@ -69,7 +69,7 @@ class Uncertainty:
             own = numbers % REPLICATES == replicate
             if own.any():
                 start, length = int(numbers[own][0]) // REPLICATES, int(np.count_nonzero(own))
-                sample = Sample("sobol", start + length, replicate_seed(seed, replicate))
+                sample = SamplingPlan("sobol", start + length, replicate_seed(seed, replicate))
                 uniform[own] = uniform_numbers(sample, len(self.drawn), start, length)
         return self.columns(uniform)
 
@@ -212,22 +212,15 @@ def level_of(text: str, metric: str, what: str, atmosphere: float | None) -> flo
     """
     atmospheres = (0.0, STANDARD_ATMOSPHERE) if atmosphere is None else (atmosphere,)
     # The same under two atmospheres: an absolute pressure, or no pressure at all.
-    level = common_level(text, METRICS[metric].unit, what, atmospheres)
+    unit = METRICS[metric].unit
+    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
+    level = levels.pop() if len(levels) == 1 else None
     if level is None:
         raise StudyError(
             f"{what}: a gauge pressure counts from {ATMOSPHERE_PATH}, which varies here; give an absolute pressure, "
             "for example '446 kPa_a'"
         )
     return level
-
-
-def common_level(text: str, unit: str, what: str, atmospheres: Collection[float]) -> float | None:
-    """Return a level in a unit of metrics; None for a gauge pressure under several atmospheres [Pa absolute].
-
-    StudyError, whose message ``what`` begins, where the unit does not fit.
-    """
-    levels = {_number(text, _OUTCOME_LEVELS.get(unit, unit), what, atmosphere) for atmosphere in atmospheres}
-    return levels.pop() if len(levels) == 1 else None
 
 
 def difference_of(text: str, metric: str, what: str) -> float:
@@ -242,7 +235,7 @@ def _number(text: str, unit: str, what: str, atmosphere: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class MetricLimit:
     """A metric with the largest value that it may have [SI], or the smallest where not ``is_most``, and its text."""
 
     metric: str

@@ -31,7 +31,7 @@ from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Above
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
-from ppafo.studies.study import Axis, Configuration, Drawn, Sample, Study, valid_outputs
+from ppafo.studies.study import Axis, Configuration, Drawn, SamplingPlan, Study, valid_outputs
 from ppafo.studies.varying import VariedPath, axis_or_distribution, in_its_unit, stated_normal, texts_of, varied_path
 
 STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
@@ -95,7 +95,7 @@ def load_study(
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class StudySource:
     """Source of a study: its name in messages, folder of its relative paths, and its bytes, None for data."""
 
     file: str
@@ -103,16 +103,16 @@ class Source:
     text: bytes
 
 
-def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Source]:
+def read_source(kind: TomlKind, named: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], StudySource]:
     """Return a document that may be changed, and where it is from: a file of a kind, by name or path, or data."""
     if isinstance(named, Mapping):
         kind.check_depth(named, kind.noun)
-        return copy.deepcopy(dict(named)), Source(kind.noun, Path(), b"")
-    source = Source(label(str(named)), Path(named).parent, kind.read(named))
+        return copy.deepcopy(dict(named)), StudySource(kind.noun, Path(), b"")
+    source = StudySource(label(str(named)), Path(named).parent, kind.read(named))
     return kind.parse(source.text, source.file), source
 
 
-def _build(parsed: declared.StudyFile, document: dict[str, Any], source: Source) -> Study:
+def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySource) -> Study:
     """Return the study of a file, with everything in SI units; StudyError for what cannot be run as it is written.
 
     ``document`` is the file as plain data, which the study keeps.
@@ -179,7 +179,7 @@ def _check_set_or_varied(parsed: declared.StudyFile, configurations: Sequence[Co
             )
 
 
-def _configuration(entry: declared.Configuration, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
+def _configuration(entry: declared.ConfigurationSection, folder: Path, overrides: Sequence[str] = ()) -> Configuration:
     """Return a configuration whose scenario has its own overrides and, over these, others."""
     with refused_as(StudyError, f"configuration '{entry.name}'", ScenarioError, ParameterError, DataError):
         scenario = load_scenario(placed(entry.scenario, folder), entry.overrides)
@@ -304,15 +304,15 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None
     return factor
 
 
-def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Sample:
+def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> SamplingPlan:
     """Return how the distributions are drawn; without any, one run at each point of the grid."""
     if not drawn:
         if parsed.sample is not None:
             raise StudyError("[sample] is given, but nothing has a distribution; omit it")
-        return Sample(None, 1, 0)
+        return SamplingPlan(None, 1, 0)
     if parsed.sample is None:
         raise StudyError("'sample' is missing: distributions need [sample] with method and runs")
     # The direction numbers of SciPy's sequence end there.
     if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
         raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")
-    return Sample(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)
+    return SamplingPlan(parsed.sample.method, parsed.sample.runs, parsed.sample.seed)

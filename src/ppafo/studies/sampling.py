@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
-from ppafo.studies.study import Drawn, Sample
+from ppafo.studies.study import Drawn, SamplingPlan
 
 Words = NDArray[np.uint64]
 Factor = tuple[tuple[float, ...], ...]
@@ -38,10 +38,24 @@ MAXIMUM_SOBOL_DIMENSIONS = 21201
 """Dimensions for which SciPy has direction numbers (Joe and Kuo, 2008)."""
 
 
-def uniform_numbers(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
+def uniform_numbers(sample: SamplingPlan, dimensions: int, first: int, count: int) -> Floats:
     """Return numbers in (0, 1), shape (count, dimensions), for the draws from ``first`` on."""
     if sample.method == "sobol":
-        return _sobol(sample, dimensions, first, count)
+        from scipy.stats import qmc
+
+        key = (sample.seed, dimensions)
+        with _LOCK:
+            engine = _ENGINES.get(key)
+            if engine is None or engine.num_generated > first:
+                engine = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(sample.seed))
+                _ENGINES[key] = engine
+                if len(_ENGINES) > _MAXIMUM_ENGINES:
+                    del _ENGINES[next(iter(_ENGINES))]
+            if first > engine.num_generated:
+                engine.fast_forward(first - engine.num_generated)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # that a stretch of the sequence is no power of two
+                return np.asarray(engine.random(count)) + 2.0 ** -(_SOBOL_BITS + 1)
     # Philox numbers: a draw takes a whole number of its steps of four words.
     steps = -(-dimensions // _WORDS_PER_STEP)
     generator = np.random.Philox(key=sample.seed)
@@ -64,25 +78,6 @@ _ENGINES: dict[tuple[int, int], Any] = {}
 _LOCK = threading.Lock()
 _MAXIMUM_ENGINES = 64
 """Engines that are remembered; the one that was made first goes first."""
-
-
-def _sobol(sample: Sample, dimensions: int, first: int, count: int) -> Floats:
-    """Return scrambled Sobol numbers, moved by half of their last bit so that none is 0."""
-    from scipy.stats import qmc
-
-    key = (sample.seed, dimensions)
-    with _LOCK:
-        engine = _ENGINES.get(key)
-        if engine is None or engine.num_generated > first:
-            engine = qmc.Sobol(dimensions, scramble=True, bits=_SOBOL_BITS, rng=np.random.default_rng(sample.seed))
-            _ENGINES[key] = engine
-            if len(_ENGINES) > _MAXIMUM_ENGINES:
-                del _ENGINES[next(iter(_ENGINES))]
-        if first > engine.num_generated:
-            engine.fast_forward(first - engine.num_generated)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # that a stretch of the sequence is no power of two
-            return np.asarray(engine.random(count)) + 2.0 ** -(_SOBOL_BITS + 1)
 
 
 def permute(numbers: Words, size: int, seed: int, stream: int) -> Words:

@@ -39,7 +39,7 @@ class Outputs:
         return tuple(dict.fromkeys((*self.trajectories, *self.bands)))
 
 
-def valid_outputs(outputs: declared.Outputs, scenarios: Sequence[Scenario]) -> Outputs:
+def valid_outputs(outputs: declared.OutputsSection, scenarios: Sequence[Scenario]) -> Outputs:
     """Return the outputs in SI units; StudyError for a name that does not exist."""
     metrics = tuple(METRICS) if outputs.metrics == "all" else tuple(outputs.metrics)
     _check_names(
@@ -119,7 +119,7 @@ class Drawn:
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class SamplingPlan:
     """Method, number of draws and seed; one draw, without a method, where nothing has a distribution."""
 
     method: SamplingMethod | None
@@ -146,7 +146,7 @@ class Study:
     drawn: tuple[Drawn, ...]
     same: Mapping[str, str]
     scores: tuple[tuple[float, ...], ...] | None
-    sample: Sample
+    sample: SamplingPlan
     outputs: Outputs
     runs_of_chunk: int | None
     units: Mapping[str, str]

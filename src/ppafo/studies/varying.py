@@ -11,11 +11,10 @@ import numpy as np
 from ppafo.errors import ScenarioError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
-from ppafo.parameters.declaration import alternatives, is_within
+from ppafo.parameters.declaration import alternatives, fits, is_within, limits_text
 from ppafo.parameters.graph import counts_from, gauge_link
 from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
 from ppafo.simulation import declaration
-from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.loading import parameter_set_of
 from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
@@ -34,8 +33,8 @@ from ppafo.studies.distributions import (
 )
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Axis, Drawn
-from ppafo.units import from_si, parse_quantity, split_pressure_kind, split_quantity
-from ppafo.units.shown import shown_unit
+from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
+from ppafo.units.shown import shown_unit, shown_value
 
 WHOLE = (NOISE, "wearer.person")
 """Paths of numbers that name one of many: a random seed, and a person of the population."""
@@ -51,24 +50,21 @@ class VariedPath:
     """A path with its declaration, and the pressure [Pa absolute] from which gauge pressures count.
 
     Values of one that ``is_gauge`` are counted from the atmosphere of their run, which varies; others are absolute.
+    ``given`` is the unit in which values were given, "" where they were not.
     """
 
     path: str
     quantity: Quantity
     atmosphere: float
     is_gauge: bool = False
+    given: str = ""
 
     def level(self, value: str | float) -> float:
         """Return a value of the path in SI; UnitError where the unit does not fit or the path does not allow it."""
         number = self._in_si(value, self.quantity)
         if not is_within(number, self.quantity):
-            lowest, highest = self.quantity.minimum, self.quantity.maximum
-            word = "at least" if self.quantity.minimum_allowed else "more than"
-            # Limits of a pressure are absolute, whatever its values count from.
-            quote = replace(self, is_gauge=False).quote
-            limits = [f"{word} {quote(lowest)}"] if math.isfinite(lowest) else []
-            limits += [f"at most {quote(highest)}"] if math.isfinite(highest) else []
-            raise UnitError(f"{self.path} must be {' and '.join(limits)}")
+            given = split_quantity(value)[1] if isinstance(value, str) else ""
+            raise UnitError(f"{self.path} must be {limits_text(self.quantity, given)}")
         return _parse(str(value), self.quantity, 0.0) if self.is_gauge else number
 
     def distance(self, value: str | float) -> float:
@@ -80,11 +76,10 @@ class VariedPath:
         return self._in_si(value, replace(self.quantity, unit=unit))
 
     def quote(self, value: float) -> str:
-        """Return a value of the path as messages write it."""
-        unit = written_unit(self.quantity.unit) if self.quantity.unit != "Pa_a" else shown_unit("Pa_a", "Pa_a")
+        """Return a value of the path as messages write it, with six digits, in the unit in which it was given."""
+        unit = self.given or shown_unit(self.quantity.unit)
         unit, zero = (f"{split_pressure_kind(unit)[0]}_g", 0.0) if self.is_gauge else (unit, self.atmosphere)
-        said = "" if unit in declaration.PLAIN else unit
-        return f"{from_si(value, unit, self.quantity.unit, zero):.6g} {said}".rstrip()
+        return f"{shown_value(value, self.quantity.unit, unit, zero):.6g} {unit}".rstrip()
 
     def _in_si(self, value: str | float, quantity: Quantity) -> float:
         if isinstance(value, str):
@@ -131,6 +126,13 @@ def value_at(path: str, scenario: Scenario) -> float | None:
         return float(of_clock[path]) if path in of_clock else number_at(scenario, path)
     except (AttributeError, KeyError, TypeError):
         return None
+
+
+def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
+    """Return a path whose values are said in the unit of the first text that has one."""
+    units = (split_quantity(text)[1] for text in texts if isinstance(text, str))
+    unit = next(filter(None, units), "")
+    return replace(varied, given=unit) if fits(unit, varied.quantity.unit) else varied
 
 
 def in_its_unit(varied: VariedPath, texts: Iterable[object]) -> VariedPath:

@@ -30,7 +30,7 @@ from ppafo.storage.parquet import (
 )
 from ppafo.storage.places import Place, place_at, read_document
 from ppafo.studies.distributions import Floats
-from ppafo.studies.study import Configuration, Study
+from ppafo.studies.study import Study
 from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_of, varied_columns
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import follows, unvaried, with_companions
@@ -56,7 +56,7 @@ _BYTES_OF_FILE = 12_000
 
 
 @dataclass(frozen=True, slots=True)
-class Task:
+class ChunkTask:
     """Work for a process beside the number of a chunk: study, address of the folder, threads, plug-in modules."""
 
     study: Study
@@ -75,14 +75,14 @@ class Finished:
 
 
 @dataclass(frozen=True, slots=True)
-class Store:
+class StudyStore:
     """The results of a study at a place, written chunk by chunk."""
 
     study: Study
     place: Place
 
     @classmethod
-    def claim(cls, study: Study, location: Place, agreed: bool, threads: int | None) -> "Store":
+    def claim(cls, study: Study, location: Place, agreed: bool, threads: int | None) -> "StudyStore":
         """Give a place to a study, or refuse it: of another study, of an earlier version, without room."""
         names = location.names()
         if MANIFEST in names:
@@ -174,7 +174,7 @@ def check_types(table: "pa.Table", name: str) -> None:
             raise DataError(f"{name}: column '{one_line(field.name)}' is of type {kind}")
 
 
-def compute_chunk(task: Task, number: int) -> tuple[Finished, bytes]:
+def compute_chunk(task: ChunkTask, number: int) -> tuple[Finished, bytes]:
     """Return the file of a chunk, computed here and not yet written: a row for every run, in SI units, nan for none."""
     study, part = task.study, chunk(task.study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
@@ -216,12 +216,16 @@ def _columns_of_endings(
     """Return how each run ended, when and why it failed, whether its loop oscillates, and whether it follows."""
     configuration = study.configurations[part.configuration]
     varied = varied_columns(study, configuration, dict(values))
+    counted = result.metrics.get(REVERSALS, np.full(result.status.size, np.nan))
+    most = most_reversals(configuration.scenario)
     return {
         "status": TableColumn(encode_texts(result.status, STATUSES), _PLAIN, "how the run ended"),
         "failure_time": TableColumn(result.failure_time, "s", "time at which the run diverged"),
         "reason": TableColumn(texts_of_some(result.reasons, result.status.size), _PLAIN, "why the run has no metrics"),
         OSCILLATES: TableColumn(
-            _flags(configuration, result), _PLAIN, "1 where the loop oscillates, empty where that is not known"
+            np.where(np.isfinite(counted) & np.isfinite(most), (counted > most).astype(np.float64), np.nan),
+            _PLAIN,
+            "1 where the loop oscillates, empty where that is not known",
         ),
         FOLLOWS: TableColumn(
             follows(result.metrics, configuration.scenario, varied, study.gauge),
@@ -259,10 +263,10 @@ def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dic
     return columns
 
 
-def work_on_chunk(task: Task, number: int) -> Finished:
+def work_on_chunk(task: ChunkTask, number: int) -> Finished:
     """Compute and write a chunk: what a worker of a cluster does."""
     take_plugins(task.plugins)
-    return Store(task.study, place_at(task.address)).write(*compute_chunk(task, number))
+    return StudyStore(task.study, place_at(task.address)).write(*compute_chunk(task, number))
 
 
 def trace_column(channel: str) -> str:
@@ -296,13 +300,6 @@ def _result(study: Study, part: Chunk, values: dict[str, Floats], threads: int |
             study.gauge,
             outputs.errors,
         )
-
-
-def _flags(configuration: Configuration, result: EnsembleResult) -> Floats:
-    """Return for each run whether its torque loop oscillates: 1 or 0, nan where it failed or nobody can say."""
-    counted = result.metrics.get(REVERSALS, np.full(result.status.size, np.nan))
-    most = most_reversals(configuration.scenario)
-    return np.where(np.isfinite(counted) & np.isfinite(most), (counted > most).astype(np.float64), np.nan)
 
 
 def stored_unit(unit: str) -> str:

@@ -309,7 +309,7 @@ def documents_of(collector: SourceCollector) -> dict[str, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class ReadableUnit:
     """Readable form of a translation unit: short names, and nothing unused.
 
     ``names`` are the short names by the module's own, where no two are the same; ``declared`` are structs that the
@@ -327,7 +327,7 @@ def c_source(
     title: str,
     places: Mapping[str, Sequence[str]] | None = None,
     prelude: str = "prelude.h",
-    reading: Reading | None = None,
+    reading: ReadableUnit | None = None,
 ) -> str:
     """A translation unit with all functions of a module; one for ``reading`` is shorter.
 
@@ -400,7 +400,7 @@ class _Writer:
     outer: set[str]
     places: Mapping[str, Sequence[str]]
     functions: Mapping[str, str]
-    reading: Reading | None = None
+    reading: ReadableUnit | None = None
     structs: list[Items | Row] = field(default_factory=list)
     made: set[Type] = field(default_factory=set)
     names: dict[Type, str] = field(default_factory=dict)

@@ -182,7 +182,7 @@ def _names_of(statement: Statement) -> frozenset[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class ScopeNames:
     """Names of a definition: all of them, those that are read, those that only count; looked for once."""
 
     every: frozenset[str]
@@ -190,7 +190,7 @@ class Names:
     counters: frozenset[str]
 
     @classmethod
-    def of(cls, definition: ast.FunctionDef) -> "Names":
+    def of(cls, definition: ast.FunctionDef) -> "ScopeNames":
         """The names of a definition."""
         nodes = list(_nodes(definition))
         named = [node for node in nodes if isinstance(node, ast.Name)]

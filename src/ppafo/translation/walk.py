@@ -17,7 +17,7 @@ from ppafo.engine.compilers import LIBRARY, UntranslatableError
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.errors import ProgramError, nearest_name
 from ppafo.translation import typed
-from ppafo.translation.scopes import Names, changed, needed
+from ppafo.translation.scopes import ScopeNames, changed, needed
 from ppafo.translation.typed import FUNCTIONS, Function, Module, Parameter, Statement, Term, converted
 from ppafo.translation.value_types import (
     BOOL,
@@ -461,7 +461,7 @@ class _ModuleWalk:
     done: dict[tuple[str, tuple[Type, ...]], Function] = field(default_factory=dict)
     open: set[tuple[str, tuple[Type, ...]]] = field(default_factory=set)
     names: set[str] = field(default_factory=set)
-    found: dict[str, Names] = field(default_factory=dict)
+    found: dict[str, ScopeNames] = field(default_factory=dict)
     module: Module = field(default_factory=Module)
 
     def function(self, name: str, types: tuple[Type, ...]) -> Function:
@@ -516,7 +516,7 @@ class _FunctionWalk:
         self.definition = definition
         self.types: dict[str, Type] = {}
         if definition.name not in module.found:
-            module.found[definition.name] = Names.of(definition)
+            module.found[definition.name] = ScopeNames.of(definition)
         names = module.found[definition.name]
         self.names, self.read = names.every, names.read
         self.given = {argument.arg for argument in definition.args.args}

@@ -17,19 +17,19 @@ from ppafo.translation.value_types import BOOL, INT, INT16, INT32, Items, Row, S
 MOST_TURNS = 64
 
 
-class Interval(NamedTuple):
+class IntegerRange(NamedTuple):
     """The range of a whole number: its lowest and its highest value."""
 
     low: int
     high: int
 
 
-Range: TypeAlias = "Interval | tuple[Range, ...]"
+Range: TypeAlias = "IntegerRange | tuple[Range, ...]"
 """Interval of a number, or ranges of the fields of a struct or the items of a tuple."""
 Names: TypeAlias = "dict[str, Range]"
 
-TRUTH = Interval(0, 1)
-_WIDTHS = ((INT16, Interval(-(2**15), 2**15 - 1)), (INT32, Interval(-(2**31), 2**31 - 1)))
+TRUTH = IntegerRange(0, 1)
+_WIDTHS = ((INT16, IntegerRange(-(2**15), 2**15 - 1)), (INT32, IntegerRange(-(2**31), 2**31 - 1)))
 
 
 class Narrowed(NamedTuple):
@@ -53,10 +53,10 @@ def narrowed(module: Module, given: Mapping[str, Range]) -> Narrowed:
 
 def hull(first: Range, other: Range) -> Range:
     """Return the smallest range in which two ranges lie."""
-    if isinstance(first, Interval) and isinstance(other, Interval):
-        return Interval(min(first.low, other.low), max(first.high, other.high))
-    assert not isinstance(first, Interval)
-    assert not isinstance(other, Interval)
+    if isinstance(first, IntegerRange) and isinstance(other, IntegerRange):
+        return IntegerRange(min(first.low, other.low), max(first.high, other.high))
+    assert not isinstance(first, IntegerRange)
+    assert not isinstance(other, IntegerRange)
     return tuple(hull(*pair) for pair in zip(first, other, strict=True))
 
 
@@ -77,7 +77,7 @@ class _Ranges:
 
     functions: Mapping[str, Function]
     names: dict[tuple[str, str], Range] = field(default_factory=dict)
-    terms: dict[int, Interval] = field(default_factory=dict)
+    terms: dict[int, IntegerRange] = field(default_factory=dict)
     parts: dict[Type, Range] = field(default_factory=dict)
     returned: dict[str, Range] = field(default_factory=dict)
 
@@ -104,7 +104,7 @@ class _Ranges:
     def note(self, kind: Type, value: Range) -> None:
         """All rows of one name, and all tuples of one form, are one type in the end."""
         if isinstance(kind, Row | Items):
-            assert not isinstance(value, Interval)
+            assert not isinstance(value, IntegerRange)
             self.parts[kind] = hull(self.parts.get(kind, value), value)
             for part, own in zip(types_in(kind), value, strict=True):
                 self.note(part, own)
@@ -133,15 +133,15 @@ class _Ranges:
     def count(self, function: Function, loop: typed.Count, names: Names, results: list[Range]) -> None:
         """A loop, turn by turn: after it names hold what they may hold after any number of turns that it can take."""
         start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
-        assert isinstance(start, Interval)
-        assert isinstance(stop, Interval)
+        assert isinstance(start, IntegerRange)
+        assert isinstance(stop, IntegerRange)
         if start.low != start.high or stop.high - start.low > MOST_TURNS:
             raise _refused(function, f"a loop of more than {MOST_TURNS} turns, or whose beginning is not written out")
         # A loop without a turn leaves the counter as it was; it has a width all the same.
-        self.keep(function, dict(names), loop.name, INT, Interval(start.low, max(start.low, stop.high)))
+        self.keep(function, dict(names), loop.name, INT, IntegerRange(start.low, max(start.low, stop.high)))
         after = dict(names) if stop.low <= start.low else None
         for turn in range(start.low, stop.high):
-            names[loop.name] = Interval(turn, turn)
+            names[loop.name] = IntegerRange(turn, turn)
             self.run(function, loop.body, names, results)
             # From here on the loop may have ended.
             if turn + 1 >= stop.low:
@@ -157,7 +157,7 @@ class _Ranges:
             value = names[term.detail]
         elif term.kind in ("field", "item") and len(parts) == 1:
             whole = parts[0]
-            assert not isinstance(whole, Interval)
+            assert not isinstance(whole, IntegerRange)
             kind = term.parts[0].type
             index = [name for name, _ in kind.fields].index(term.detail) if isinstance(kind, Row) else int(term.detail)
             value = whole[index]
@@ -168,30 +168,30 @@ class _Ranges:
         elif term.kind == "choice":
             value = hull(parts[1], parts[2])
         else:
-            value = _calculated(function, term, [part for part in parts if isinstance(part, Interval)])
+            value = _calculated(function, term, [part for part in parts if isinstance(part, IntegerRange)])
         self.note(term.type, value)
-        if isinstance(value, Interval):
+        if isinstance(value, IntegerRange):
             # A term in a loop or in a function that is called twice is worked out for several ranges.
             known = self.terms.get(id(term), value)
-            self.terms[id(term)] = every = Interval(min(known.low, value.low), max(known.high, value.high))
+            self.terms[id(term)] = every = IntegerRange(min(known.low, value.low), max(known.high, value.high))
             if term.type == INT and _width(every) is None:
                 raise _refused(function, f"a value from {every.low} to {every.high}, beyond 32 bits")
         return value
 
 
-def _calculated(function: Function, term: Term, parts: list[Interval]) -> Interval:
+def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> IntegerRange:
     """Range of a sum, a product with a power of two, a shift, a choice of the smaller or larger."""
     if term.kind == "number":
-        return Interval(int(term.detail), int(term.detail))
+        return IntegerRange(int(term.detail), int(term.detail))
     if term.kind in _COMPARISONS:
         return TRUTH
     if term.kind == "negative":
-        return Interval(-parts[0].high, -parts[0].low)
+        return IntegerRange(-parts[0].high, -parts[0].low)
     if term.kind == "convert" and term.parts[0].type == BOOL:
         return parts[0]
     # A mask of ones keeps what is below it, also of negative numbers in two's complement.
     if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
-        return Interval(0, parts[1].high)
+        return IntegerRange(0, parts[1].high)
     if term.kind == "*" and not any(part.low == part.high and part.low.bit_count() == 1 for part in parts):
         raise _refused(function, "a product that is not with a power of two, for which there may be no multiplier")
     if term.kind not in _SIGNS:
@@ -199,7 +199,7 @@ def _calculated(function: Function, term: Term, parts: list[Interval]) -> Interv
     # Sums, products, shifts, min and max have their extremes at the ends of both ranges.
     left, other = parts
     ends = [_SIGNS[term.kind](left, right) for left in left for right in other]
-    return Interval(min(ends), max(ends))
+    return IntegerRange(min(ends), max(ends))
 
 
 def _join(names: Names, other: Names) -> None:
@@ -212,7 +212,7 @@ def _refused(function: Function, what: str) -> ProgramError:
     return ProgramError(f"{function.source}: {what}, which cannot be taken to whole numbers of 16 and 32 bits")
 
 
-def _width(interval: Interval) -> Scalar | None:
+def _width(interval: IntegerRange) -> Scalar | None:
     """The narrowest type that holds a range; None where none does."""
     return next((kind for kind, own in _WIDTHS if own.low <= interval.low and interval.high <= own.high), None)
 
@@ -235,12 +235,12 @@ class _Narrowing:
         """A type with widths for what is held."""
         if isinstance(kind, Row | Items):
             every = self.ranges.parts[kind]
-            assert not isinstance(every, Interval)
+            assert not isinstance(every, IntegerRange)
             if isinstance(kind, Row):
                 pairs = zip(kind.fields, every, strict=True)
                 return Row(kind.name, tuple((name, self.type_of(inner, own)) for (name, inner), own in pairs))
             return Items(tuple(self.type_of(*pair) for pair in zip(kind.types, every, strict=True)))
-        assert isinstance(value, Interval)
+        assert isinstance(value, IntegerRange)
         width = _width(value)
         if kind == INT and width is None:
             raise _refused(self.item, f"a value from {value.low} to {value.high}, beyond 32 bits")

@@ -1,4 +1,6 @@
-"""Units at the edge: text and units in, SI floats out, and back. Inside the package there are only SI floats.
+"""Conversion of units at the interface: text with units in, SI floats out, and back.
+
+Inside the package all floats are SI.
 
 Four rules go beyond arithmetic:
 

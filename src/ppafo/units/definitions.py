@@ -1,4 +1,4 @@
-"""The units that exist, and what each is in base units.
+"""Known units and their definitions in base units.
 
 pint reads them. Its answers for units in the files of the package are kept in ``known_units.json``, so that most
 processes start without it; ``scripts/known_units.py`` writes that file.
@@ -73,14 +73,14 @@ DECIMALS = decimal.Context(
     clamp=0,
     traps=[decimal.InvalidOperation, decimal.DivisionByZero, decimal.Overflow],
 )
-"""Arithmetic of units, whatever a host program has set for its own decimals: every operation on them uses it."""
+"""Decimal context of all unit arithmetic, independent of the settings of a host program."""
 PRESSURE = {"[mass]": 1, "[length]": -1, "[time]": -2}
 KINDS = {"g": "gauge pressure", "a": "absolute pressure", "d": "pressure difference"}
 _KIND_BELONGS = "_g, _a and _d belong to a unit of pressure that stands alone, such as psi_g"
 
 
 class ParsedUnit(NamedTuple):
-    """A unit as data: a value in base units (m, kg, s, K, mol, rad) is ``scale`` times the one in it plus ``offset``.
+    """Unit as data: a value in base units (m, kg, s, K, mol, rad) is ``scale`` times the value plus ``offset``.
 
     ``dimensions`` are the powers of the base dimensions, such as ``[mass]`` and ``[angle]``.
     """
@@ -95,10 +95,10 @@ class ParsedUnit(NamedTuple):
 
 
 class UnknownUnitError(UnitError):
-    """A name in a unit is none; ``name`` is that one, ``unit`` all of it in normal spelling without its kind."""
+    """Unknown name in a unit; ``name`` is the name, ``unit`` the whole unit in normal spelling without its kind."""
 
     def __init__(self, name: str, unit: str) -> None:
-        """Keep both, for what may be meant."""
+        """Keep both for a suggestion."""
         self.name, self.unit = name, unit
         others = ", ".join(other for other in UNITS if other not in PRESSURES)
         pressures = ", ".join(f"{pressure}_{kind}" for pressure in PRESSURES[:3] for kind in KINDS)
@@ -111,7 +111,7 @@ class UnknownUnitError(UnitError):
 
 @functools.lru_cache(maxsize=512)
 def parse_unit(unit: str) -> tuple[ParsedUnit, str]:
-    """Return a unit as data, and ``g``, ``a`` or ``d`` for a pressure that says so; else an empty text.
+    """Return a unit as data, and the kind of a pressure, ``g``, ``a`` or ``d``; empty for any other unit.
 
     UnitError for what is no unit.
     """
@@ -126,7 +126,7 @@ def parse_unit(unit: str) -> tuple[ParsedUnit, str]:
 
 @functools.cache
 def known_units() -> dict[str, ParsedUnit]:
-    """Return the kept units by their normal spelling."""
+    """Return the stored units by their normal spelling."""
     from importlib.resources import files  # what speaks of units reads none yet
 
     told = json.loads((files("ppafo") / "known_units.json").read_text(encoding="utf-8"))
@@ -134,7 +134,7 @@ def known_units() -> dict[str, ParsedUnit]:
 
 
 def unit_by_pint(unit: str) -> ParsedUnit:
-    """Return a unit as pint reads it, be it gauge, absolute or a difference; UnitError where it does not exist."""
+    """Return a unit as parsed by pint, without the kind of a pressure; UnitError for an unknown one."""
     import pint
 
     bare, _ = split_pressure_kind(unit)
@@ -159,7 +159,7 @@ def unit_by_pint(unit: str) -> ParsedUnit:
 
 @functools.cache
 def _registry() -> "pint.UnitRegistry[Any]":
-    """Build the registry of the units above: milliseconds, where pint's own list takes a tenth of a second."""
+    """Build a registry of the definitions above: a millisecond, against a tenth of a second for pint's own list."""
     import pint
 
     # Decimals throughout, so that a unit's factor is what its definition says.

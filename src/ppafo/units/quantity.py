@@ -1,4 +1,4 @@
-"""Texts with a unit to SI floats, and back."""
+"""Conversion between texts with a unit and SI floats."""
 
 import difflib
 import functools
@@ -20,7 +20,7 @@ _LEVEL, _DIFFERENCE = "Pa_a", "Pa_d"
 
 
 def hint(unknown: UnknownUnitError, kind: str, si_unit: str | None) -> str:
-    """Return ``, did you mean 'mm^2'?``: the unit with the nearest name that makes it fit ``si_unit``, or nothing.
+    """Return ``, did you mean 'mm^2'?``: the nearest unit that is compatible with ``si_unit``, or an empty text.
 
     Where it is not known what is wanted only another case of the same letters is meant.
     """
@@ -79,7 +79,7 @@ def _kinds(kind: str, si_unit: str | None) -> tuple[str, ...]:
 
 
 def pressures_to_write(unit: str, si_unit: str) -> str:
-    """Return how a pressure says what it is where a level or a difference is wanted."""
+    """Return the forms of a pressure unit where a level or a difference is required."""
     if si_unit == _DIFFERENCE:
         return f"write {unit}_d for a difference"
     return f"write {unit}_g for gauge or {unit}_a for absolute"
@@ -87,7 +87,7 @@ def pressures_to_write(unit: str, si_unit: str) -> str:
 
 LEVEL, DIFFERENCE = "Pa_a", "Pa_d"
 SI = "SI"
-"""The unit of a number that is in SI already, whatever it is the number of: programs have such."""
+"""Unit of a number that is in SI already, whatever its quantity: set by programs."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _NOT_ZERO = re.compile(r"[^eE]*[1-9]", re.ASCII)
@@ -103,7 +103,7 @@ def split_quantity(text: str) -> tuple[float, str]:
 
 
 def split_number(text: str) -> tuple[float, str]:
-    """Return number and unit of a text, whatever the unit is.
+    """Return the number and the unit of a text; the unit is not checked.
 
     It is for one who knows what unit is wanted, and with it says what does not fit.
     """
@@ -126,7 +126,7 @@ def split_number(text: str) -> tuple[float, str]:
 
 
 def number_text(text: str) -> str:
-    """Return a text for ``float`` or ``int``, which take digits of any script and ``1_000``; ValueError for those."""
+    """Return a text that is an ASCII number for ``float`` or ``int``; ValueError for other digits and for ``1_000``."""
     if not text.isascii() or "_" in text:
         raise ValueError(f"{quote(text)} is not a number")
     return text
@@ -162,7 +162,7 @@ _LARGEST_WITHOUT_EXPONENT = 1.0e6
 
 
 def without_exponent(value: float, form: str) -> str:
-    """Return a number formatted as ``form`` says, in plain digits where that would write thousands with an exponent.
+    """Return a number formatted by ``form``, without an exponent for thousands.
 
     Zero has neither a sign nor an exponent.
 
@@ -179,12 +179,12 @@ def without_exponent(value: float, form: str) -> str:
 
 
 def percentage(fraction: float, digits: int) -> str:
-    """Return a fraction [-] as a percentage of so many digits, in which hundreds are no powers of ten: ``120 %``."""
+    """Return a fraction [-] as a percentage with so many significant digits, without an exponent: ``120 %``."""
     return f"{float(f'{100.0 * fraction:.{digits}g}'):.12g} %"
 
 
 def check_unit(unit: str, near: str | None = None) -> None:
-    """Refuse a unit that does not exist or is not written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``.
+    """Check that a unit exists and is written as ``kg``, ``N m s/rad`` or ``m^3/(s Pa)``; UnitError if not.
 
     Of an unknown one only a unit is suggested that could stand for ``near``, where that is given.
     """
@@ -205,7 +205,7 @@ def _read(unit: str, si_unit: str | None) -> tuple[ParsedUnit, str]:
 
 
 def base_value(value: float, unit: str) -> float:
-    """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its own unit, whatever its dimension is."""
+    """Return ``value`` in the base units (m, kg, s, K, mol, rad) of its unit, of any dimension."""
     parsed, kind = _read(unit, None)
     base = float(parsed.in_base(_decimal(value)))
     return base + (STANDARD_ATMOSPHERE if kind == "g" else 0.0)
@@ -218,7 +218,7 @@ def dimension(unit: str) -> dict[str, int]:
 
 @functools.lru_cache(maxsize=512)
 def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
-    """Return scale, offset and whether the atmosphere is to be added; in decimals, so that 8.4 g is 0.0084 kg."""
+    """Return scale, offset and whether to add the atmosphere; in decimals, so that 8.4 g is exactly 0.0084 kg."""
     if unit == SI:
         return Decimal(1), Decimal(0), False
     wanted, _ = read_unit(si_unit)
@@ -245,7 +245,7 @@ def conversion(unit: str, si_unit: str) -> tuple[Decimal, Decimal, bool]:
 
 
 def _is_flow_without_mass(unit: str) -> bool:
-    """Tell whether a unit is a volume per time, with nothing behind it that makes it a mass."""
+    """Tell whether a unit is a volume per time without the gas and condition that make it a mass flow."""
     try:
         return not flow_of(unit)[1] and is_volume_flow(unit)
     except UnitError:

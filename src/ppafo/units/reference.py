@@ -1,4 +1,4 @@
-"""Volume flow at a reference condition: the mass flow of a gas, which is what ``L/min (ANR, air)`` says.
+"""Volume flow at a reference condition, which is the mass flow of a gas: ``L/min (ANR, air)``.
 
 ``m_dot = rho q``, where rho = p M/(R T) is the density of an ideal gas of molar mass M at the condition. Air in the
 atmosphere of ISO 8778, which is humid, has the 1.185 kg/m^3 of ISO 6358.
@@ -27,7 +27,7 @@ _MOLAR_MASS = {"[mass]": 1, "[substance]": -1}
 
 
 class Condition(NamedTuple):
-    """Temperature [K] and pressure [Pa absolute] at which a volume of gas is counted; humid as in ISO 8778, or dry."""
+    """Reference temperature [K] and pressure [Pa absolute] of a volume of gas; humid as in ISO 8778, or dry."""
 
     temperature: float
     pressure: float
@@ -42,7 +42,7 @@ CONDITIONS: dict[str, Condition] = {
     "DIN 1343": Condition(273.15, STANDARD_ATMOSPHERE),
     "ISO 2533": Condition(288.15, STANDARD_ATMOSPHERE),
 }
-"""Conditions by name: of pneumatics, of normal litres, of the standard atmosphere at sea level."""
+"""Reference conditions by name: of pneumatics, of normal litres, of the standard atmosphere at sea level."""
 
 _BEHIND = re.compile(r"(?P<flow>.*[^/ ]) *\((?P<words>[^()]*)\)|(?P<bare>.*[^/ ])[ _]+(?P<name>ANR)")
 _NORMAL = re.compile(
@@ -55,7 +55,7 @@ _EXAMPLE = "70 degF, 14.696 psi_a"
 
 
 def flow_of(unit: str) -> tuple[str, str, bool]:
-    """Return the volume flow in a unit, the words behind it, and whether it calls itself normal or standard.
+    """Return the volume flow in a unit, the words after it, and whether it is called normal or standard.
 
     The words are the condition, and the gas where it is said; empty where there are none.
     """
@@ -76,13 +76,13 @@ def flow_of(unit: str) -> tuple[str, str, bool]:
 
 
 def is_volume_flow(unit: str) -> bool:
-    """Tell whether a unit is a volume per time, be its reference condition said or not; UnitError for no unit."""
+    """Tell whether a unit is a volume per time, with or without a reference condition; UnitError for no unit."""
     flow, _, is_normal = flow_of(unit)
     return is_normal or parse_unit(flow)[0].dimensions == VOLUME_FLOW
 
 
 def with_condition(unit: str, condition: str, gas: str) -> str:
-    """Return a unit of volume flow with what is known of its condition and gas and not said in it."""
+    """Return a unit of volume flow, completed by the known condition and gas."""
     flow, words, is_normal = flow_of(unit)
     said = [word.strip() for word in _split(words) if word.strip()]
     own = [word for word in said if _is_gas(word)]
@@ -122,7 +122,7 @@ def _write(example: str) -> str:
 
 
 def without_condition(unit: str) -> str:
-    """Return what is asked of a volume flow in place of a mass flow: its reference condition and its gas."""
+    """Return the message about a volume flow without reference condition and gas, where a mass flow is required."""
     named, normal, own = (with_condition(unit, at, "air") for at in ("ANR", "DIN 1343", _EXAMPLE))
     return (
         f"'{unit}' is a volume flow without its reference condition, by which it is a mass flow: write '{named}' "
@@ -174,7 +174,7 @@ def condition_of(text: str, unit: str) -> Condition:
 
 
 def _split(words: str) -> list[str]:
-    """Return what commas, semicolons and 'and' separate; a comma between digits is a decimal one."""
+    """Return the words between commas, semicolons and 'and'; a comma between digits is a decimal comma."""
     return re.split(r"(?<!\d),|,(?!\d)|;|\band\b|&|@", words)
 
 

@@ -1,23 +1,88 @@
-"""Display units of numbers: the units in which the author of a parameter set wrote them.
+"""Display units of numbers: the one in which a number was given, else the set's, else the catalogue's.
 
-Gauge pressures count from the atmosphere of the device of which they are. It stands beside the units, so that text,
+``QUANTITIES`` is the only table of shown units, and ``shown_text`` what writes a number in one. Files and data stay in
+SI. Gauge pressures count from the atmosphere of the device of which they are. It stands beside the units, so that text,
 tables and axes have one zero, and so do saved results, which keep both as ``shown``. Outside of ``shown_in`` the
 package's own choices hold.
 """
 
 import contextlib
 import functools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from types import MappingProxyType
-from typing import ParamSpec, TypeVar
+from typing import NamedTuple, ParamSpec, TypeVar
 
 from ppafo.constants import STANDARD_ATMOSPHERE
+from ppafo.units.quantity import from_si, without_exponent
 from ppafo.units.spelling import split_pressure_kind
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
+
+class Units(NamedTuple):
+    """The unit of a quantity in SI, and the one in which it is shown unless a parameter set writes another.
+
+    A run computes nothing up to ``zero`` [SI]: what is not larger is rounding, and is shown as 0. It is 0 for
+    quantities that are given and not computed.
+    """
+
+    si: str
+    shown: str
+    zero: float = 0.0
+
+
+QUANTITIES: Mapping[str, Units] = MappingProxyType(
+    {
+        "acceleration": Units("m/s^2", "m/s^2", 1.0e-9),
+        "angle": Units("rad", "deg", 1.0e-9),
+        "angular acceleration": Units("rad/s^2", "rad/s^2", 1.0e-9),
+        "angular velocity": Units("rad/s", "deg/s", 1.0e-9),
+        "area": Units("m^2", "mm^2"),
+        "duration": Units("s", "min"),
+        "energy per gas mass": Units("J/kg", "J/kg", 1.0e-6),
+        "energy": Units("J", "J", 1.0e-9),
+        "force": Units("N", "N", 1.0e-9),
+        "fraction": Units("1", "%", 1.0e-12),
+        "frequency": Units("Hz", "Hz"),
+        "gas mass": Units("kg", "g", 1.0e-12),
+        "gas mass per energy": Units("kg/J", "g/J", 1.0e-12),
+        "length": Units("m", "mm", 1.0e-9),
+        "mass": Units("kg", "kg"),
+        "mass flow": Units("kg/s", "g/s", 1.0e-12),
+        "part mass": Units("kg", "g"),
+        "power": Units("W", "W", 1.0e-9),
+        "pressure": Units("Pa_a", "psi_g", 1.0e-4),
+        "pressure change": Units("Pa_d", "psi_d", 1.0e-4),
+        "temperature": Units("K", "degC"),
+        "time": Units("s", "s", 1.0e-12),
+        "torque": Units("N m", "N m", 1.0e-9),
+        "velocity": Units("m/s", "m/s", 1.0e-9),
+        "volume": Units("m^3", "cm^3"),
+        "displacement per radian": Units("m^3/rad", "cm^3/rad"),
+        "volume flow": Units("m^3/s", "L/min"),
+        "body length": Units("m", "cm"),
+        "conductance": Units("m^3/(s Pa)", "L/(s bar)"),
+    }
+)
+"""Units by the kind of quantity."""
+NAMED = ("gas mass", "part mass", "body length", "duration", "fraction")
+"""Kinds that no unit tells from another kind: whoever shows one has to name it."""
+_OF_UNIT = {
+    **{units.si: quantity for quantity, units in QUANTITIES.items() if quantity not in NAMED},
+    # Metrics and channels write Pa for a level; of the quantities in kg the plain one is meant.
+    "Pa": "pressure",
+    "kg": "mass",
+}
+"""Kind of quantity by its unit in SI."""
+_WRITTEN = {"Pa": "Pa_a", "-": "1"}
+"""What the unit of a metric or a channel is called as the unit of a number in a file."""
+_PER_PRESSURE = {"N/Pa": "N", "N m/Pa": "N m"}
+"""Units in SI of what a pressure gives, and of what it gives; the pressure is in the unit of the set."""
+_DIGITS = 9
+"""Digits that stay of what is written to be read again: what lies beyond them is the rounding of a unit."""
 GAUGE_ZERO = "gauge_zero"
 """Key, beside units by their unit in SI, of the absolute pressure from which gauge pressures count."""
 
@@ -35,7 +100,7 @@ def shown_in(units: Mapping[str, str]) -> Iterator[None]:
 
 
 def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return what lets a function say and draw in the units that ``units`` returns of its arguments."""
+    """Return a decorator: the function writes and draws in the units that ``units`` returns for its arguments."""
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         @functools.wraps(function)
@@ -49,7 +114,7 @@ def in_units(units: Callable[..., Mapping[str, str]]) -> Callable[[Callable[P, R
 
 
 def pressure_units(level: str) -> dict[str, str]:
-    """Return the units of levels and differences of pressure, by unit in SI, of who writes levels as ``bar_g``."""
+    """Return the display units of pressure levels and differences, by SI unit, for levels written as ``bar_g``."""
     unit, kind = split_pressure_kind(level)
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
@@ -60,16 +125,76 @@ def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
 
 
 def gauge_zero() -> float:
-    """Return the absolute pressure [Pa] from which gauge pressures are counted where they are shown."""
+    """Return the absolute pressure [Pa] from which displayed gauge pressures count."""
     stated = _chosen.get().get(GAUGE_ZERO)
     return STANDARD_ATMOSPHERE if stated is None else float(stated.removesuffix(" Pa_a"))
 
 
 def units_in_force() -> dict[str, str]:
-    """Return the chosen units by unit in SI; empty where the package's own choices hold."""
+    """Return the chosen display units by SI unit; empty for the defaults of the package."""
     return dict(_chosen.get())
 
 
-def shown_unit(si_unit: str, default: str) -> str:
-    """Return the unit in which numbers of a unit in SI are shown, ``default`` where none was chosen."""
-    return _chosen.get().get(si_unit, default)
+def quantity_of_unit(si_unit: str) -> str:
+    """Return the kind of quantity that has a unit in SI, empty for a plain number or a unit that is shown as it is.
+
+    ``kg`` is a mass and ``s`` a time; masses of gas and parts, shown in grams, and what lasts minutes have to be named.
+    """
+    return _OF_UNIT.get(si_unit, "")
+
+
+def shown_unit(si_unit: str) -> str:
+    """Return the unit in which numbers of a unit in SI are shown: the chosen one, else the table's; "" for a number."""
+    chosen, si_unit = _chosen.get(), _WRITTEN.get(si_unit, si_unit)
+    if si_unit in chosen:
+        return chosen[si_unit]
+    if si_unit in _PER_PRESSURE:
+        return f"{shown_unit(_PER_PRESSURE[si_unit])}/{shown_unit('Pa_d').removesuffix('_d')}"
+    quantity = quantity_of_unit(si_unit)
+    return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
+
+
+def unit_of(quantity: str) -> str:
+    """Return the unit in which a kind of quantity is shown."""
+    return QUANTITIES[quantity].shown if quantity in NAMED else shown_unit(QUANTITIES[quantity].si)
+
+
+def shown_value(
+    value: float, si_unit: str, unit: str = "", atmosphere: float | None = None, zero: float = 0.0
+) -> float:
+    """Return a value in SI in a unit, or in the one in which it is shown; what is not larger than ``zero`` is 0.
+
+    Gauge counts from ``atmosphere`` [Pa absolute], that of the device in force unless given.
+    """
+    known, unit = _WRITTEN.get(si_unit, si_unit), unit or shown_unit(si_unit)
+    if unit in (known, "") or not math.isfinite(value):
+        return 0.0 if abs(value) <= zero else float(value)
+    room = gauge_zero() if atmosphere is None else atmosphere
+    shown, further = (from_si(each, unit, known, room) for each in (float(value), float(value) + zero))
+    return 0.0 if abs(shown) <= abs(further - shown) else shown
+
+
+def shown_text(value: float, si_unit: str, form: str = ".6g", atmosphere: float | None = None, unit: str = "") -> str:
+    """Return a value in SI as text with the unit in which it is shown; what is zero within the accuracy of a run is 0.
+
+    ``unit`` is the one in which it was given, where that is known; gauge counts from ``atmosphere`` [Pa absolute].
+
+    >>> shown_text(5.201e-4, "m^2"), shown_text(4.0e5, "Pa_a", unit="bar_a"), shown_text(1.0e-17, "N m")
+    ('520.1 mm^2', '4 bar_a', '0 N m')
+    """
+    quantity, unit = quantity_of_unit(si_unit), unit or shown_unit(si_unit)
+    zero = QUANTITIES[quantity].zero if quantity else 0.0
+    number = without_exponent(shown_value(value, si_unit, unit, atmosphere, zero), form)
+    # A difference of pressures is neither gauge nor absolute.
+    return f"{number} {unit.removesuffix('_d')}".rstrip()
+
+
+def written_text(value: float, si_unit: str, atmosphere: float | None = None, unit: str = "") -> str:
+    """Return a value in SI as text to be read again, in the unit in which it is shown, without the rounding of units.
+
+    >>> written_text(206842.71879504 + 101325.0, "Pa_a"), written_text(3.929e-9, "m^3/(s Pa)")
+    ('30 psi_g', '0.3929 L/(s bar)')
+    """
+    unit = unit or shown_unit(si_unit)
+    number = shown_value(value, si_unit, unit, atmosphere)
+    return f"{float(f'{number:.{_DIGITS}g}')!r}".removesuffix(".0") + f" {unit}".rstrip()

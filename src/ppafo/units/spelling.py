@@ -15,7 +15,7 @@ UNITS = (
     *("L", "in", "ft", "lb", "lbf", "oz", "ozf", "kgf", "percent"),
 )
 PRESSURES = ("Pa", "bar", "psi", "atm", "Torr", "mHg", "inHg", "mWC", "inWC")
-"""Units of pressure that are one word."""
+"""Units of pressure of one word."""
 
 LONGEST_UNIT = 60
 _MOST_FACTORS = 4
@@ -109,7 +109,7 @@ _FORCES = {
     "kg/cm^2": "kgf/cm^2",
     "kg/mm^2": "kgf/mm^2",
 }
-"""A pound, an ounce or a kilogram that turns or presses is a force."""
+"""Spellings in which a pound, an ounce or a kilogram is a force."""
 
 
 _KIND_OF_QUOTIENT = re.compile(
@@ -144,17 +144,18 @@ def split_pressure_kind(unit: str) -> tuple[str, str]:
         is_clear = len(normal) <= LONGEST_UNIT and _EXPRESSION.fullmatch(below) is not None
         example = f"'{below}'" if is_clear else "it like 'mm^2', 'N m s/rad' or 'm^3/(s Pa)'"
         raise UnitError(f"{quote(unit)} is not a unit; write {example}")
-    normal = in_products(normal)
+    spaced = re.sub(r"[A-Za-zµ]+(?![A-Za-zµ]|_[gad])", lambda word: as_product(word[0]) or word[0], normal)
+    normal = re.sub(rf"/({FACTOR}(?: {FACTOR})+)", r"/(\1)", spaced) if spaced != normal else normal
     return _FORCES.get(normal, normal), kind
 
 
 def says_kind(unit: str) -> bool:
-    """Tell whether a word behind a unit says which pressure it is."""
+    """Tell whether a word after a unit states the kind of a pressure."""
     return _kind_of_pressure(unit.translate(_CHARACTERS).strip(" "))[1] != ""
 
 
 def _kind_of_pressure(text: str) -> tuple[str, str]:
-    """Return a pressure without the word that says its kind, as in ``psig``, ``bar (abs)``, ``kPa gauge``."""
+    """Return a pressure unit without the word of its kind, and the kind: ``psig``, ``bar (abs)``, ``kPa gauge``."""
     match = _KIND.fullmatch(text)
     word = "" if match is None else match["word"]
     if match is None and "/" in text:
@@ -166,17 +167,8 @@ def _kind_of_pressure(text: str) -> tuple[str, str]:
     return match["unit"], next(kind for kind, words in _KIND_WORDS.items() if word in words)
 
 
-def in_products(unit: str) -> str:
-    """Return a unit whose joined names have their spaces, ``N m`` for ``Nm``; a product below a stroke in parentheses.
-
-    A unit without joined names stays as it is.
-    """
-    spaced = re.sub(r"[A-Za-zµ]+(?![A-Za-zµ]|_[gad])", lambda word: as_product(word[0]) or word[0], unit)
-    return re.sub(rf"/({FACTOR}(?: {FACTOR})+)", r"/(\1)", spaced) if spaced != unit else unit
-
-
 def as_product(name: str) -> str:
-    """Return a name as known units with spaces, ``N m`` for ``Nm``; an empty text where it is known or no product.
+    """Return a joined name as known units with spaces, ``N m`` for ``Nm``; empty if it is known or no product.
 
     No unit is there twice, so that ``Nmm`` is ``N mm``; of the rest short ones come first: ``Nms`` is ``N m s``.
     """
@@ -202,11 +194,11 @@ def as_product(name: str) -> str:
 
 @functools.cache
 def spellings() -> frozenset[str]:
-    """Return the names of units with every prefix that they may have."""
+    """Return the names of units with all their prefixes."""
     return frozenset(prefix + unit for unit in (*UNITS, "l") for prefix in ("", "µ", *PREFIXES))
 
 
 def quote(text: object) -> str:
-    """Return a short quotation of what was given, on one line."""
+    """Return a short quotation of a value, on one line."""
     quoted = repr(text)
     return quoted if len(quoted) <= 50 else f"{quoted[:46]}...'"

@@ -20,7 +20,7 @@ from ppafo.simulation.recorded.clock import regular_interval
 from ppafo.simulation.recorded.replay import with_fixed_volume
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.scenario import Leg
-from ppafo.units import from_si
+from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import (
     ACCEPTABLE_FRACTION,
     ANGLE,
@@ -29,12 +29,12 @@ from ppafo.validation.compared import (
     PRESSURE_1,
     PRESSURE_2,
     PRESSURE_DIFFERENCE,
-    Limit,
+    ErrorLimit,
     Thresholds,
     parse_thresholds,
 )
 from ppafo.validation.initial import INITIAL_REMEDIES
-from ppafo.validation.measured import Measured, supply_gauge
+from ppafo.validation.measured import MeasuredRecording, supply_gauge
 from ppafo.validation.replay import Motion, Replay, Replayed, replay_recording
 
 DEFAULT_LIMIT = 0.02
@@ -65,7 +65,7 @@ _AT_LIMIT = 0.99
 
 
 @dataclass(frozen=True, slots=True)
-class Curve:
+class ComparedCurve:
     """A channel of both: measured values at their times, the model's at its own, full range, unit of an error, limit.
 
     ``usual_zero`` is what sensors of any bench are off by; ``limit`` is the one that was given for it, if any.
@@ -79,7 +79,7 @@ class Curve:
     model_values: Floats
     full_range: float
     usual_zero: float
-    limit: Limit | None = None
+    limit: ErrorLimit | None = None
 
     def shift(self, delay: float, times: Floats) -> Floats:
         """Return the model, ``delay`` [s] later, at some times; before and after its values it stands still."""
@@ -99,7 +99,7 @@ class Delay:
         return 0.0 if self.is_at_limit else self.value
 
 
-def estimate_delay(curves: list[Curve], limit: float) -> Delay:
+def estimate_delay(curves: list[ComparedCurve], limit: float) -> Delay:
     """Return the delay, at most ``limit`` [s] either way, that brings the channels together best, in full ranges."""
     if limit <= 0.0 or not curves:
         return Delay(0.0, is_at_limit=False)
@@ -212,7 +212,7 @@ class RecordingAgreement:
         return all(channel.passes for channel in self.channels)
 
 
-def channel_agreement(curve: Curve, delay: float) -> ChannelAgreement:
+def channel_agreement(curve: ComparedCurve, delay: float) -> ChannelAgreement:
     """Return the errors in one channel with the model shifted by ``delay`` [s].
 
     Without a limit of its own an RMS error passes up to 3 % of full range or half of the variance, whichever is less,
@@ -257,7 +257,7 @@ def noise_in(values: Floats, full_range: float) -> float:
     return max(math.hypot(noise_of(values), resolution_of(values) / math.sqrt(8.0)), LEAST_NOISE * full_range)
 
 
-def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> Replay:
+def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Replay:
     """Return the replay of a recording on a device, or on a fixed volume in its place."""
     motion, initial = settings.motion, settings.initial
     if settings.volume is not None:
@@ -269,7 +269,7 @@ def replay_of(measured: Measured, device: Device, settings: ReplaySettings) -> R
     return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
 
 
-def compare_recording(measured: Measured, device: Device, settings: ReplaySettings) -> RecordingAgreement:
+def compare_recording(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> RecordingAgreement:
     """Return how far the model of a device is from one recording, on the inputs of that recording."""
     request = replay_of(measured, device, settings)
     replayed = replay_recording(request)
@@ -305,7 +305,9 @@ def measured_values(recording: Recording, name: str) -> Floats | None:
     return recording[name]
 
 
-def _curves(measured: Measured, replayed: Replayed, device: Device, settings: ReplaySettings) -> list[Curve]:
+def _curves(
+    measured: MeasuredRecording, replayed: Replayed, device: Device, settings: ReplaySettings
+) -> list[ComparedCurve]:
     """Return the channels that the recording has and that the model was not given; DataError where there are none."""
     gauge = supply_gauge(measured.recording, device)
     # Channels that say nothing where the vane is locked, or where there is none.
@@ -318,7 +320,7 @@ def _curves(measured: Measured, replayed: Replayed, device: Device, settings: Re
         if values is not None and name not in replayed.inputs and name not in silent:
             times, limit = measured.recording.time, settings.thresholds.limit(name)
             curves.append(
-                Curve(
+                ComparedCurve(
                     channel=name,
                     unit=kind.unit,
                     times=times,
@@ -336,7 +338,8 @@ def _curves(measured: Measured, replayed: Replayed, device: Device, settings: Re
     return curves
 
 
-def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
+@in_units(lambda _, device, *__: device.shown)
+def _remarks(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> tuple[str, ...]:
     """Return what was taken otherwise than the set or the recording has it: the supply, the samples, the vane."""
     remarks = []
     gauge_of_set = device.supply.pressure - device.supply.atmospheric_pressure
@@ -351,14 +354,16 @@ def _remarks(measured: Measured, device: Device, settings: ReplaySettings) -> tu
         used = {"supply.pressure": device.supply.pressure}
         if settings.volume is None and not (measured.has(DORSIFLEXION_SUPPLY) or device.supply.has_one_pressure):
             used["supply.dorsiflexion_pressure"] = device.supply.dorsiflexion_pressure
-        atmosphere, unit = device.supply.atmospheric_pressure, device.shown.get("Pa_a", "psi_g")
-        shown = [f"{path} = {from_si(value, unit, 'Pa_a', atmosphere):.4g} {unit}" for path, value in used.items()]
+        atmosphere = device.supply.atmospheric_pressure
+        shown = [f"{path} = {shown_text(value, 'Pa_a', '.4g', atmosphere)}" for path, value in used.items()]
         verb = "was" if len(shown) == 1 else "were"
         remarks.append(f"the supply pressure was not recorded; {' and '.join(shown)} {verb} used")
     if regular_interval(measured.recording.time) is None:
         remarks.append("samples are not regular in time; changes of the command were moved to the nearest step")
     if settings.volume is not None:
-        remarks.append(f"chamber 1 was treated as a fixed volume of {settings.volume * 1e6:.4g} cm^3 without a vane")
+        remarks.append(
+            f"chamber 1 was treated as a fixed volume of {shown_text(settings.volume, 'm^3', '.4g')} without a vane"
+        )
     elif settings.motion == "locked":
         remarks.append("the vane was locked at its initial angle; the angle is not compared")
     if settings.motion == "measured":

@@ -23,17 +23,17 @@ from ppafo.simulation.recorded.usual_errors import (
     SensorErrors,
     usual_errors,
 )
-from ppafo.units import from_si
+from ppafo.units.shown import shown_in, shown_unit, shown_value
 from ppafo.validation.agreement import ReplaySettings, replay_of
-from ppafo.validation.change import SENSORS, Candidate, Change, Sensor
+from ppafo.validation.change import SENSORS, CandidateCause, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
-from ppafo.validation.measured import Measured
+from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import replayed_scenario
 
 
-def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> Change:
+def _sensed(names: Iterable[str], kind: str, about: float, size: float) -> ModelChange:
     """Return sensors that are off by a gain about a value, a zero or a delay."""
-    return Change(dict.fromkeys(names, replace(Sensor(about=about), **{kind: size})))
+    return ModelChange(dict.fromkeys(names, replace(SensorModel(about=about), **{kind: size})))
 
 
 _MISREAD_UNITS = {
@@ -70,7 +70,9 @@ def _groups(names: Collection[str]) -> Iterator[_Group]:
         yield _Group(channels, words, "seem" if has_several else "seems")
 
 
-def exchanges(device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]) -> Iterator[Candidate]:
+def exchanges(
+    device: Device, names: Collection[str], units: Mapping[str, AbstractSet[str]]
+) -> Iterator[CandidateCause]:
     """Yield mistakes without a size: units, gauge or absolute, swapped channels and signs.
 
     ``units`` are those that files declare of channels that move, empty where they declare none. A chamber that stays at
@@ -84,26 +86,28 @@ def exchanges(device: Device, names: Collection[str], units: Mapping[str, Abstra
                 continue
             words = f"{group} {verb} to be {unit}"
             change = partial(_sensed, channels, "gain", atmosphere)
-            yield Candidate(words, words, change, (factor,), is_of_unit=True)
+            yield CandidateCause(words, words, change, (factor,), is_of_unit=True)
         for kind, zero in (("gauge read as absolute", -atmosphere), ("absolute read as gauge", atmosphere)):
             words = f"{group} {verb} to be {kind}"
-            yield Candidate(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
+            yield CandidateCause(words, words, partial(_sensed, channels, "zero", 0.0), (zero,), is_of_unit=True)
     has_both = PRESSURE_1 in names and PRESSURE_2 in names
     if has_both:
-        yield Candidate("swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: Change(is_swapped=True))
+        yield CandidateCause(
+            "swap", "pressure_1 and pressure_2 seem to be swapped", lambda _: ModelChange(is_swapped=True)
+        )
     for name in (COMMAND, EXTERNAL_TORQUE):
         if name in names:
             words = f"{name} seems to have the wrong sign"
-            yield Candidate(f"sign of {name}", words, partial(_sensed, [name], "gain", 0.0), (-1.0,))
+            yield CandidateCause(f"sign of {name}", words, partial(_sensed, [name], "gain", 0.0), (-1.0,))
     if has_both:
         # A symmetric device mirrors both by an angle from the other end, and no recording tells these apart.
         words = "command seems to have the wrong sign, and pressure_1 and pressure_2 to be swapped"
-        mirrored = Change({COMMAND: Sensor(gain=-1.0)}, is_swapped=True)
-        yield Candidate("sign of command and swap", words, lambda _: mirrored)
+        mirrored = ModelChange({COMMAND: SensorModel(gain=-1.0)}, is_swapped=True)
+        yield CandidateCause("sign of command and swap", words, lambda _: mirrored)
     if ANGLE in names:
         middle = 0.5 * (device.actuator.angle_min + device.actuator.angle_max)
         words = "the angle seems to be counted from the other end"
-        yield Candidate("end of angle", words, partial(_sensed, [ANGLE], "gain", middle), (-1.0,))
+        yield CandidateCause("end of angle", words, partial(_sensed, [ANGLE], "gain", middle), (-1.0,))
 
 
 def _both_ways(*sizes: float) -> tuple[float, ...]:
@@ -174,11 +178,11 @@ def _readings(device: Device, names: Collection[str]) -> Iterator[_Reading]:
     )
 
 
-def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
+def sizes(device: Device, names: Collection[str]) -> Iterator[CandidateCause]:
     """Yield gain and zero of one sensor, of all pressures, of command and supply; delays and the rate of the clock."""
     for reading in _readings(device, names):
         channels, words, verb = reading.group
-        yield Candidate(
+        yield CandidateCause(
             f"zero of {words}",
             f"the zero of {words} seems to be off by {{:+.3g}} {reading.unit}",
             partial(_sensed, channels, "zero", 0.0),
@@ -186,7 +190,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
             shown=reading.shown,
             usual=reading.usual.zero,
         )
-        yield Candidate(
+        yield CandidateCause(
             f"gain of {words}",
             f"{words} {verb} to be read {{:.4g}} times too large",
             partial(_sensed, channels, "gain", reading.about),
@@ -197,7 +201,7 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
     sensors = tuple(name for name in SENSORS if name in names)
     # Of one sensor alone the delay is the one of all, which is taken out.
     for name in sensors if len(sensors) > 1 else ():
-        yield Candidate(
+        yield CandidateCause(
             f"delay of {name}",
             f"{name} seems to be later than the other channels by {{:.3g}} ms",
             partial(_sensed, (name,), "delay", 0.0),
@@ -205,17 +209,17 @@ def sizes(device: Device, names: Collection[str]) -> Iterator[Candidate]:
             shown=1.0e3,
             usual=usual_errors(name).delay,
         )
-    yield Candidate(
+    yield CandidateCause(
         "delay of all sensors",
         "all sensors seem to be later than the command by {:.3g} ms",
-        lambda delay: Change(delay=delay),
+        lambda delay: ModelChange(delay=delay),
         _LONG_DELAYS,
         shown=1.0e3,
     )
-    yield Candidate(
+    yield CandidateCause(
         "rate of the clock",
         "the clock of the recording seems to run {:.4g} times as fast",
-        lambda rate: Change(clock=rate),
+        lambda rate: ModelChange(clock=rate),
         _RATES,
         is_ratio=True,
     )
@@ -232,63 +236,58 @@ _NOT_TRIED = ("actuator.angle_min", "actuator.angle_max", "actuator.restitution"
 _OF_SUPPLY = {"supply.pressure": SUPPLY, "supply.dorsiflexion_pressure": DORSIFLEXION_SUPPLY}
 
 
-def numbers(measured: Measured, device: Device, settings: ReplaySettings) -> Iterator[Candidate]:
+def numbers(measured: MeasuredRecording, device: Device, settings: ReplaySettings) -> Iterator[CandidateCause]:
     """Yield each number of the set, and another atmosphere under sensors of gauge pressure."""
     request = replay_of(measured, device, settings)
     scenario = replace(replayed_scenario(request), device=request.device)
     followed = _followed_by(measured, request.device)
     declared = declared_numbers(scenario)
-    for path in _tried_paths(declared, request.device, followed):
+    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(request.device, part)}
+    left_out = {*_NOT_TRIED, *other_forms, *followed}
+    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
+    for path in (path for path in by_section if path not in left_out):
         value, quantity = number_at(scenario, path), declared[path]
         factors = tuple(factor for factor in _FACTORS if quantity.minimum <= factor * value <= quantity.maximum)
         if value > 0.0 and len(factors) > 2:
             words = f"{path} seems to be {{:.3g}} times the model's value"
             change = partial(_numbered, path, value)
             usual = math.log1p(SUPPLY_ERROR / value) if path in _OF_SUPPLY else 0.0
-            yield Candidate(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
+            yield CandidateCause(path, words, change, factors, is_ratio=True, usual=usual, unit=quantity.unit or "-")
     pressures = {path: number_at(scenario, path) for path in _OF_SUPPLY if path not in followed}
     yield _other_atmosphere(request.device, pressures)
 
 
-def _followed_by(measured: Measured, device: Device) -> set[str]:
+def _followed_by(measured: MeasuredRecording, device: Device) -> set[str]:
     """Return the paths of supply pressures that a replay follows in the recording, whatever the set has."""
     if measured.has(SUPPLY) and device.supply.has_one_pressure:
         return set(_OF_SUPPLY)
     return {path for path, channel in _OF_SUPPLY.items() if measured.has(channel)}
 
 
-def _tried_paths(declared: Iterable[str], device: Device, followed: Collection[str]) -> list[str]:
-    """Return the paths of the numbers that a recording may tell, section by section, each in one of its forms."""
-    other_forms = {f"{part}.{name}" for part in ("actuator.leak", "valve") for name in other_form(device, part)}
-    left_out = {*_NOT_TRIED, *other_forms, *followed}
-    by_section = [path for section in _SECTIONS for path in declared if path.split(".")[0] == section]
-    return [path for path in by_section if path not in left_out]
-
-
-def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> Candidate:
+def _other_atmosphere(device: Device, pressures: Mapping[str, float]) -> CandidateCause:
     """Return another atmosphere under sensors of gauge pressure and under supply ``pressures`` [Pa], by path."""
     atmosphere = device.supply.atmospheric_pressure
 
-    def change(factor: float) -> Change:
+    def change(factor: float) -> ModelChange:
         higher = (factor - 1.0) * atmosphere
-        sensors = dict.fromkeys((PRESSURE_1, PRESSURE_2, *_OF_SUPPLY.values()), Sensor(zero=-higher))
+        sensors = dict.fromkeys((PRESSURE_1, PRESSURE_2, *_OF_SUPPLY.values()), SensorModel(zero=-higher))
         moved = {path: pressure + higher for path, pressure in pressures.items()}
-        return Change(sensors, {ATMOSPHERE_PATH: atmosphere + higher, **moved})
+        return ModelChange(sensors, {ATMOSPHERE_PATH: atmosphere + higher, **moved})
 
     unit, per_pascal = _unit_of_pressure(device)
     words = f"the atmosphere under gauge pressures seems to be {{:.4g}} {unit}"
-    return Candidate("atmosphere", words, change, _ATMOSPHERES, is_ratio=True, shown=per_pascal * atmosphere)
+    return CandidateCause("atmosphere", words, change, _ATMOSPHERES, is_ratio=True, shown=per_pascal * atmosphere)
 
 
 def _unit_of_pressure(device: Device) -> tuple[str, float]:
     """Return the unit in which a difference of pressures is shown, and how many of it are 1 Pa."""
-    unit = device.shown.get("Pa_d", "kPa_d")
-    return unit.removesuffix("_d"), from_si(1.0, unit, "Pa_d")
+    with shown_in(device.shown):
+        return shown_unit("Pa_d").removesuffix("_d"), shown_value(1.0, "Pa_d")
 
 
-def _numbered(path: str, value: float, factor: float) -> Change:
+def _numbered(path: str, value: float, factor: float) -> ModelChange:
     """Return a number of the set as a multiple of its value [SI]."""
-    return Change(numbers={path: factor * value})
+    return ModelChange(numbers={path: factor * value})
 
 
 class _UnknownEffect(NamedTuple):
@@ -350,14 +349,14 @@ _SIZES_OF_AN_EFFECT = 5
 """Sizes that are tried first, at equal ratios."""
 
 
-def effects(device: Device) -> Iterator[Candidate]:
+def effects(device: Device) -> Iterator[CandidateCause]:
     """Yield the effects that the model of a device has not, each with one size."""
     for effect in _EFFECTS:
         if effect.name not in device.effects:
             tried = tuple(np.geomspace(effect.lowest, effect.highest, _SIZES_OF_AN_EFFECT).tolist())
-            yield Candidate(effect.name, effect.words, partial(_affected, effect), tried, is_ratio=True)
+            yield CandidateCause(effect.name, effect.words, partial(_affected, effect), tried, is_ratio=True)
 
 
-def _affected(effect: _UnknownEffect, size: float) -> Change:
+def _affected(effect: _UnknownEffect, size: float) -> ModelChange:
     """Return an effect of a size."""
-    return Change(effects={effect.name: {**effect.held, **dict.fromkeys(effect.scaled, size)}})
+    return ModelChange(effects={effect.name: {**effect.held, **dict.fromkeys(effect.scaled, size)}})

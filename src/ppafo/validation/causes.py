@@ -21,11 +21,11 @@ from ppafo.simulation.recorded.rest import samples_at_rest
 from ppafo.simulation.recorded.usual_errors import usual_errors
 from ppafo.validation.agreement import RecordingAgreement, ReplaySettings, compare_recording
 from ppafo.validation.candidates import effects, exchanges, numbers, sizes
-from ppafo.validation.change import SENSORS, Candidate, Change
+from ppafo.validation.change import SENSORS, CandidateCause, ModelChange
 from ppafo.validation.compared import ANGLE, EXPLAINED_FRACTION
-from ppafo.validation.measured import Measured
+from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.record import Left, Record, at_rate, record_of
-from ppafo.validation.search import Search, Tried
+from ppafo.validation.search import CauseSearch, SizedCause
 
 _TIMES = {
     "milliseconds read as seconds": (1.0e3, "ms"),
@@ -47,7 +47,7 @@ _STARTS = (-0.05, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.05)
 
 
 @dataclass(frozen=True, slots=True)
-class Cause:
+class ResidualCause:
     """Cause: its name, its description in words, and its gain G [-] in explained error.
 
     ``left`` is the largest error over noise [-] of any channel with it. ``numbers`` are the numbers of the set that it
@@ -63,7 +63,7 @@ class Cause:
     numbers: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     is_usual: bool = False
     is_of_samples: bool = False
-    same: "tuple[Cause, ...]" = ()
+    same: "tuple[ResidualCause, ...]" = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,15 +73,15 @@ class Causes:
     ``is_noise`` says that nothing but noise is left without any.
     """
 
-    found: Cause | None = None
-    nearest: Cause | None = None
+    found: ResidualCause | None = None
+    nearest: ResidualCause | None = None
     tried: int = 0
     is_noise: bool = False
 
 
 @on_one_thread
 def causes_of(
-    read: Sequence[Measured],
+    read: Sequence[MeasuredRecording],
     agreements: Sequence[RecordingAgreement],
     device: Device,
     settings: ReplaySettings,
@@ -97,8 +97,8 @@ def causes_of(
     records = [
         record_of(measured, agreement, device, settings) for measured, agreement in zip(read, agreements, strict=True)
     ]
-    search = Search(device, settings, records, report)
-    none = search.evaluated([Change()])[0]
+    search = CauseSearch(device, settings, records, report)
+    none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
         return Causes(is_noise=none is not None)
     if settings.motion == "measured":
@@ -122,7 +122,7 @@ def causes_of(
         if errors is not None:
             return Causes(errors, None, len(tried) + len(of_bench))
 
-        def stages() -> Iterator[list[Tried]]:
+        def stages() -> Iterator[list[SizedCause]]:
             yield search.compared(list(exchanges(device, names, units)), none)
             yield of_bench + search.compared([candidate for candidate in sized if not candidate.usual], none)
             yield search.compared(list(effects(device)), none)
@@ -141,7 +141,7 @@ def causes_of(
 
 
 def _units_of_moving(
-    read: Sequence[Measured], agreements: Sequence[RecordingAgreement], device: Device
+    read: Sequence[MeasuredRecording], agreements: Sequence[RecordingAgreement], device: Device
 ) -> dict[str, set[str]]:
     """Return the units that files declare of channels, empty for none, by channel.
 
@@ -159,9 +159,9 @@ def _units_of_moving(
     return {name: {one.channels[name].stated for one in recordings if name in one} for name in moving}
 
 
-def _tried_in_turn(stages: Iterable[Sequence[Tried]]) -> tuple[list[Tried], list[Tried]]:
+def _tried_in_turn(stages: Iterable[Sequence[SizedCause]]) -> tuple[list[SizedCause], list[SizedCause]]:
     """Return the candidates that were tried, stage by stage until one explains the recordings, and those that do."""
-    tried: list[Tried] = []
+    tried: list[SizedCause] = []
     for stage in stages:
         tried += stage
         explaining = [each for each in tried if each.explains]
@@ -170,7 +170,7 @@ def _tried_in_turn(stages: Iterable[Sequence[Tried]]) -> tuple[list[Tried], list
     return tried, []
 
 
-def _usual_errors(search: Search, none: Left, of_bench: Sequence[Tried]) -> Cause | None:
+def _usual_errors(search: CauseSearch, none: Left, of_bench: Sequence[SizedCause]) -> ResidualCause | None:
     """Return the error of sensors, as any bench has it, that explains the recordings: one, or else several together.
 
     ``of_bench`` are the errors that a bench may have, one by one.
@@ -189,7 +189,11 @@ def _usual_errors(search: Search, none: Left, of_bench: Sequence[Tried]) -> Caus
 
 
 def _explained(
-    search: Search, none: Left, tried: Sequence[Tried], explaining: Sequence[Tried], sized: Sequence[Candidate]
+    search: CauseSearch,
+    none: Left,
+    tried: Sequence[SizedCause],
+    explaining: Sequence[SizedCause],
+    sized: Sequence[CandidateCause],
 ) -> Causes:
     """Return the best of those that explain the recordings, with what could replace it; none where a second is needed.
 
@@ -208,8 +212,11 @@ def _explained(
 
 
 def _in_other_unit(
-    read: Sequence[Measured], agreements: Sequence[RecordingAgreement], device: Device, settings: ReplaySettings
-) -> Cause | None:
+    read: Sequence[MeasuredRecording],
+    agreements: Sequence[RecordingAgreement],
+    device: Device,
+    settings: ReplaySettings,
+) -> ResidualCause | None:
     """Return that times are milliseconds read as seconds or the reverse, where the model agrees with these only.
 
     It must then explain half of the variance of every signal, which one that stands still does not, with less than half
@@ -241,10 +248,10 @@ def _in_other_unit(
                 gain += 2.0 * len(as_read.measured) * math.log(ratio)
             left = max(left, after.in_noise)
     remedy = f'write time [{unit}] in the header, or unit = "{unit}" for time in a column map'
-    return Cause(name, f"times seem to be {name} ({remedy})", gain, left)
+    return ResidualCause(name, f"times seem to be {name} ({remedy})", gain, left)
 
 
-def _samples(records: Sequence[Record]) -> list[Candidate]:
+def _samples(records: Sequence[Record]) -> list[CandidateCause]:
     """Return the samples that no sensor made, in all channels that have some: the others must agree with the model."""
     faulty = [record for record in records if record.words]
     if not faulty:
@@ -256,11 +263,11 @@ def _samples(records: Sequence[Record]) -> list[Candidate]:
     channels = dict.fromkeys(words.split()[0] for record in faulty for words in record.words)
     has_start = all(_has_start(record) for record in faulty)
     return [
-        Candidate(
+        CandidateCause(
             f"samples of {' and '.join(channels)}",
             # No size is shown, and a file's name may have a brace.
             "; ".join(said).replace("{", "{{").replace("}", "}}"),
-            lambda share: Change(start=share),
+            lambda share: ModelChange(start=share),
             (0.0,) if has_start else _STARTS,
             is_usual=all(record.has_few for record in faulty),
             is_of_samples=True,
@@ -274,7 +281,7 @@ def _has_start(record: Record) -> bool:
     return bool(at_start.any(axis=1).all())
 
 
-def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candidate]:
+def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[CandidateCause]:
     """Return a vane that is locked, where the model moves it and the recorded angle rests; nothing elsewhere."""
     if settings.motion not in ("free", "leg"):
         return []
@@ -282,10 +289,10 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
     if not angles or any(float(np.std(angle)) >= _AT_REST for angle in angles):
         return []
     words = "the vane seems to be locked, for its recorded angle rests (--motion locked)"
-    return [Candidate("motion", words, lambda _: Change(motion="locked"))]
+    return [CandidateCause("motion", words, lambda _: ModelChange(motion="locked"))]
 
 
-def _cause_of(named: Sequence[Tried], penalty: float, others: Sequence[Tried] = ()) -> Cause:
+def _cause_of(named: Sequence[SizedCause], penalty: float, others: Sequence[SizedCause] = ()) -> ResidualCause:
     """Return the best of those that explain recordings, with all that the recordings cannot tell from it.
 
     ``others`` explain them beside what any bench has, and come after those that do alone.
@@ -300,10 +307,10 @@ def _cause_of(named: Sequence[Tried], penalty: float, others: Sequence[Tried] = 
     return replace(first, same=tuple(rest))
 
 
-def _as_cause(tried: Tried) -> Cause:
+def _as_cause(tried: SizedCause) -> ResidualCause:
     """Return a candidate at its size as a cause."""
     candidate = tried.candidate
-    return Cause(
+    return ResidualCause(
         name=candidate.name,
         in_words=candidate.in_words(tried.size),
         gain=tried.gain,

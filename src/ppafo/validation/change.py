@@ -15,7 +15,7 @@ SWAPPED = {PRESSURE_1: PRESSURE_2, PRESSURE_2: PRESSURE_1}
 
 
 @dataclass(frozen=True, slots=True)
-class Sensor:
+class SensorModel:
     """Sensor model: gain [-] about a value, zero offset in the channel's unit, delay [s]."""
 
     gain: float = 1.0
@@ -33,7 +33,7 @@ class Sensor:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ModelChange:
     """Difference between a recording with its device and the set; none by default.
 
     ``sensors`` are by channel, ``numbers`` of the set by path [SI], ``effects`` are settings by the name of an effect.
@@ -43,7 +43,7 @@ class Change:
     [-] of its range.
     """
 
-    sensors: Mapping[str, Sensor] = field(default_factory=dict)
+    sensors: Mapping[str, SensorModel] = field(default_factory=dict)
     numbers: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     is_swapped: bool = False
@@ -58,12 +58,12 @@ class Change:
         return self.delay != 0.0 or any(path.endswith("delay") for path in self.numbers)
 
 
-def joined(first: Change, second: Change) -> Change:
+def joined(first: ModelChange, second: ModelChange) -> ModelChange:
     """Return two changes at once; of numbers and settings that both have, the first's."""
     sensors = dict(first.sensors)
     for name, other in second.sensors.items():
-        sensor = sensors.get(name, Sensor())
-        sensors[name] = Sensor(
+        sensor = sensors.get(name, SensorModel())
+        sensors[name] = SensorModel(
             gain=sensor.gain * other.gain,
             zero=sensor.zero + other.zero,
             # A zero and a delay turn about nothing, so that the gain's point stays.
@@ -76,7 +76,7 @@ def joined(first: Change, second: Change) -> Change:
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class CandidateCause:
     """A cause before its size is known: what a size changes, its words with the place of ``shown`` times the size.
 
     ``sizes`` are tried first; a cause with one has nothing to fit. A size that ``is_ratio`` is sought as a logarithm.
@@ -87,7 +87,7 @@ class Candidate:
 
     name: str
     words: str
-    change: Callable[[float], Change]
+    change: Callable[[float], ModelChange]
     sizes: tuple[float, ...] = (0.0,)
     is_ratio: bool = False
     shown: float = 1.0
@@ -112,7 +112,7 @@ class Candidate:
         """Sizes that are tried first, as they are sought: logarithms of a ratio."""
         return [math.log(size) if self.is_ratio else size for size in self.sizes]
 
-    def at(self, size: float) -> Change:
+    def at(self, size: float) -> ModelChange:
         """Return the change of a size that was sought."""
         return self.change(math.exp(size) if self.is_ratio else size)
 

@@ -13,7 +13,7 @@ PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class ComparedChannel:
     """A channel that is compared: the SI unit and the kind of quantity of an error in it, its title, its full range.
 
     ``Pa_d`` is a difference of pressures. ``full_range(device, gauge)`` is in the SI unit, of a device whose supply
@@ -31,14 +31,16 @@ class Compared:
         return ANGLE_ERRORS.zero if self.quantity == "angle" else self.full_range(device, PRESSURE_ERRORS.zero)
 
 
-COMPARED: dict[str, Compared] = {
-    ANGLE: Compared(
+COMPARED: dict[str, ComparedChannel] = {
+    ANGLE: ComparedChannel(
         "rad", "angle", "Vane angle", lambda device, _: device.actuator.angle_max - device.actuator.angle_min
     ),
-    PRESSURE_1: Compared("Pa_d", "pressure change", "Pressure in chamber 1", lambda _, gauge: gauge),
-    PRESSURE_2: Compared("Pa_d", "pressure change", "Pressure in chamber 2", lambda _, gauge: gauge),
-    PRESSURE_DIFFERENCE: Compared("Pa_d", "pressure change", "Pressure difference", lambda _, gauge: 2.0 * gauge),
-    TORQUE: Compared(
+    PRESSURE_1: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 1", lambda _, gauge: gauge),
+    PRESSURE_2: ComparedChannel("Pa_d", "pressure change", "Pressure in chamber 2", lambda _, gauge: gauge),
+    PRESSURE_DIFFERENCE: ComparedChannel(
+        "Pa_d", "pressure change", "Pressure difference", lambda _, gauge: 2.0 * gauge
+    ),
+    TORQUE: ComparedChannel(
         "N m", "torque", "Actuator torque", lambda device, gauge: 2.0 * gauge * device.actuator.torque_constant
     ),
 }
@@ -61,7 +63,7 @@ _EXAMPLES = "a threshold is written 'angle=10%', 'pressure_1=3.7 psi_d' or '5%' 
 
 
 @dataclass(frozen=True, slots=True)
-class Limit:
+class ErrorLimit:
     """Largest RMS error: a fraction of the full range [-], or an error in the SI unit of the channel."""
 
     value: float
@@ -76,10 +78,10 @@ class Limit:
 class Thresholds:
     """The limit of every channel that has one of its own, and the others' limit; None where none was given."""
 
-    others: Limit | None
-    channels: Mapping[str, Limit]
+    others: ErrorLimit | None
+    channels: Mapping[str, ErrorLimit]
 
-    def limit(self, channel: str) -> Limit | None:
+    def limit(self, channel: str) -> ErrorLimit | None:
         """The limit that was given for a channel; None for one that is judged by what its signal goes through."""
         return self.channels.get(channel, self.others)
 
@@ -90,7 +92,7 @@ def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
     DataError where a text names no channel that is compared, or no limit above 0.
     """
     others = None
-    channels: dict[str, Limit] = {}
+    channels: dict[str, ErrorLimit] = {}
     for text in texts:
         name, separator, value = text.rpartition("=")
         if separator:
@@ -106,7 +108,7 @@ def parse_thresholds(texts: Iterable[str] = ()) -> Thresholds:
     return Thresholds(others, channels)
 
 
-def _limit(value: str, text: str, unit: str) -> Limit:
+def _limit(value: str, text: str, unit: str) -> ErrorLimit:
     """The limit that a value states, in an SI unit or in percent; messages show the whole ``text`` of the threshold."""
     try:
         is_fraction = split_quantity(value)[1] in _FRACTION_UNITS
@@ -117,4 +119,4 @@ def _limit(value: str, text: str, unit: str) -> Limit:
         raise DataError(f"threshold '{one_line(text)}': a limit for all channels is a percentage of the full range")
     if number <= 0.0:
         raise DataError(f"threshold '{one_line(text)}': must be above 0; {_EXAMPLES}")
-    return Limit(number, is_fraction)
+    return ErrorLimit(number, is_fraction)

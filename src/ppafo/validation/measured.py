@@ -27,7 +27,7 @@ from ppafo.storage.column_map import ColumnMap
 from ppafo.storage.files import read_bytes
 from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
-from ppafo.units import from_si
+from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
 
 MINIMUM_SAMPLES = 10
@@ -54,7 +54,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class MeasuredRecording:
     """A recording with the name and the checksum of its file, and what is to be said of it."""
 
     file: str
@@ -72,7 +72,7 @@ def read_measured(
     device: Device,
     columns: ColumnMap | None = None,
     map_name: str = "",
-) -> Measured:
+) -> MeasuredRecording:
     """Return a recording, or the one of a file or result folder; DataError where it cannot be compared with a model.
 
     A file with columns of its own is read through a column map, which messages call ``map_name``.
@@ -95,7 +95,8 @@ def read_measured(
     return check_recording(recording, device, str(source), hashlib.sha256(content).hexdigest())
 
 
-def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> Measured:
+@in_units(lambda _recording, device, *_: device.shown)
+def check_recording(recording: Recording, device: Device, file: str, sha256: str = "") -> MeasuredRecording:
     """Return a recording as evidence with its remarks, or refuse it in one line that begins with ``file``."""
     count = len(recording)
     if count < MINIMUM_SAMPLES:
@@ -111,7 +112,7 @@ def check_recording(recording: Recording, device: Device, file: str, sha256: str
     if wide.size:
         noun, first = "gap" if wide.size == 1 else "gaps", float(recording.time[wide[0]])
         remarks += (f"{wide.size} {noun} in time, the first after {first:.6g} s; inputs were kept across",)
-    return Measured(file, sha256, recording, remarks)
+    return MeasuredRecording(file, sha256, recording, remarks)
 
 
 def _check_names(recording: Recording, file: str) -> tuple[str, ...]:
@@ -144,7 +145,7 @@ def _check_size(recording: Recording, device: Device, file: str) -> None:
         if abs(recording[name][worst]) > _MAXIMUM_RANGES * full_range:
             where = f"{recording.time[worst]:.6g} s (sample {worst + 1})"
             raise DataError(
-                f"{file}: '{name}' is {recording[name][worst]:.6g} {recording.unit(name)} at {where}, more than "
+                f"{file}: '{name}' is {shown_text(recording[name][worst], recording.unit(name))} at {where}, more than "
                 f"{_MAXIMUM_RANGES:g} times what {device.name} can reach"
             )
 
@@ -162,8 +163,7 @@ def _check_pressures(recording: Recording, device: Device, file: str) -> None:
         level = max(float(recording[name][0]), float(np.median(recording[name])))
         if level > allowed * (1.0 + _ROUNDING):
             atmosphere, is_recorded = supply.atmospheric_pressure, SUPPLY in recording
-            unit = device.shown.get("Pa_a", "psi_g")
-            shown = [f"{from_si(pressure, unit, 'Pa_a', atmosphere):.4g} {unit}" for pressure in (level, highest)]
+            shown = [shown_text(pressure, "Pa_a", ".4g", atmosphere) for pressure in (level, highest)]
             owner = f"the recorded '{SUPPLY}'" if is_recorded else f"the supply of {device.name}"
             remedy = "check both sensors" if is_recorded else f'record it, or give --set "supply.pressure={shown[0]}"'
             top = float(recording[name].max()) - atmosphere

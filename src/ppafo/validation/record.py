@@ -24,9 +24,9 @@ from ppafo.validation.agreement import (
     noise_in,
     replay_of,
 )
-from ppafo.validation.change import SENSORS, SWAPPED, Change, Sensor
+from ppafo.validation.change import SENSORS, SWAPPED, ModelChange, SensorModel
 from ppafo.validation.compared import ANGLE
-from ppafo.validation.measured import Measured
+from ppafo.validation.measured import MeasuredRecording
 from ppafo.validation.replay import Replay, Replayed, replay_together
 
 Flags = NDArray[np.bool_]
@@ -50,7 +50,7 @@ class Record(NamedTuple):
     each start that was read.
     """
 
-    measured: Measured
+    measured: MeasuredRecording
     channels: tuple[str, ...]
     values: Floats
     noise: Floats
@@ -74,7 +74,9 @@ class Left(NamedTuple):
         return float(self.squares.max()) < ONLY_NOISE
 
 
-def record_of(measured: Measured, agreement: RecordingAgreement, device: Device, settings: ReplaySettings) -> Record:
+def record_of(
+    measured: MeasuredRecording, agreement: RecordingAgreement, device: Device, settings: ReplaySettings
+) -> Record:
     """Return a recording with its samples that no sensor made, and how readings change with each start."""
     compared = [channel for channel in agreement.channels if channel.channel in SENSORS]
     channels = [_channel_of(channel, agreement) for channel in compared or agreement.channels[:1]]
@@ -92,7 +94,21 @@ def record_of(measured: Measured, agreement: RecordingAgreement, device: Device,
         has_few=all(channel.has_few for channel in wrong),
         delay=agreement.delay.correction,
     )
-    return record._replace(starts=_changes_with_start(record, device, settings))
+    request = replay_of(record.measured, device, settings)
+    count = samples_at_rest(record.measured.recording)
+    moved = [
+        _with_moved_start(request, name, noise / math.sqrt(count), device)
+        for name, noise in zip(record.channels, record.noise.tolist(), strict=True)
+        if name in SENSORS and name not in settings.initial
+    ]
+    unmoved, *others = replay_together([request, *moved])
+    return record._replace(
+        starts=tuple(
+            readings_of(record, other, ModelChange(), 0.0) - readings_of(record, unmoved, ModelChange(), 0.0)
+            for other in others
+            if isinstance(unmoved, Replayed) and isinstance(other, Replayed)
+        )
+    )
 
 
 class _Channel(NamedTuple):
@@ -190,23 +206,6 @@ def _clipped_samples(values: Floats) -> _Wrong | None:
     return _Wrong(f"is clipped: {said}", np.isin(values, [limit for limit, _ in limits]))
 
 
-def _changes_with_start(record: Record, device: Device, settings: ReplaySettings) -> tuple[Floats, ...]:
-    """Return how readings (channels, samples) change where a start, read from samples, is off by its standard error."""
-    request = replay_of(record.measured, device, settings)
-    count = samples_at_rest(record.measured.recording)
-    moved = [
-        _with_moved_start(request, name, noise / math.sqrt(count), device)
-        for name, noise in zip(record.channels, record.noise.tolist(), strict=True)
-        if name in SENSORS and name not in settings.initial
-    ]
-    unmoved, *others = replay_together([request, *moved])
-    return tuple(
-        readings_of(record, other, Change(), 0.0) - readings_of(record, unmoved, Change(), 0.0)
-        for other in others
-        if isinstance(unmoved, Replayed) and isinstance(other, Replayed)
-    )
-
-
 def _with_moved_start(request: Replay, name: str, error: float, device: Device) -> Replay:
     """Return a replay that starts higher by an error in one channel; a vane at its upper stop can only move down."""
     start = request.start
@@ -235,20 +234,20 @@ def at_rate(recording: Recording, rate: float) -> Recording:
     return replace(recording, time=first + (recording.time - first) / rate)
 
 
-def readings_of(record: Record, replayed: Replayed, change: Change, offset: float) -> Floats:
+def readings_of(record: Record, replayed: Replayed, change: ModelChange, offset: float) -> Floats:
     """Return what sensors with a change make of the model (channels, samples), over the noise, ``offset`` [s] later."""
     time, model = record.measured.recording.time, replayed.recording
     true_time = time[0] + (time - time[0]) / change.clock
     rows = []
     for name in record.channels:
-        sensor = change.sensors.get(name, Sensor())
+        sensor = change.sensors.get(name, SensorModel())
         source = model[SWAPPED.get(name, name) if change.is_swapped else name]
         delay = offset + change.delay + sensor.delay
         rows.append(sensor.of(np.interp(true_time - delay, model.time, source)))
     return np.asarray(np.stack(rows) / record.noise[:, None])
 
 
-def left_of(record: Record, replayed: Replayed, change: Change, longest_delay: float) -> Left:
+def left_of(record: Record, replayed: Replayed, change: ModelChange, longest_delay: float) -> Left:
     """Return what is left of a recording without a common delay, at most ``longest_delay`` [s], and error of the start.
 
     The delay that was found may be what a wrong model makes: it is sought from there and from none.
@@ -264,7 +263,7 @@ def left_of(record: Record, replayed: Replayed, change: Change, longest_delay: f
 
 
 def _errors_from(
-    record: Record, replayed: Replayed, change: Change, good: Floats, first_delay: float, longest_delay: float
+    record: Record, replayed: Replayed, change: ModelChange, good: Floats, first_delay: float, longest_delay: float
 ) -> Floats:
     """Return the errors over the noise (channels * samples,) that are left after Gauss-Newton steps from a delay [s].
 

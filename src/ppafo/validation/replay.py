@@ -20,10 +20,10 @@ from ppafo.simulation.recorded.channels import COMMAND, DORSIFLEXION_SUPPLY, EXT
 from ppafo.simulation.recorded.clock import sample_period
 from ppafo.simulation.recorded.inputs import RecordedInputs, step_inputs, with_highest_supply, with_prescribed_angle
 from ppafo.simulation.recorded.replay import locked_vane, replay_scenario
-from ppafo.simulation.recorded.rest import Start
+from ppafo.simulation.recorded.rest import ReplayStart
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, Scenario, vane_motion
 from ppafo.validation.compared import ANGLE
-from ppafo.validation.measured import Measured
+from ppafo.validation.measured import MeasuredRecording
 
 Motion = Literal["free", "measured", "locked", "leg"]
 """Motion of the vane in a replay: free by the model, as recorded, locked, or with a foot."""
@@ -53,9 +53,9 @@ class Replay:
     The motion ``leg`` is that with ``leg``, or on the fixture of figure 7.
     """
 
-    measured: Measured
+    measured: MeasuredRecording
     device: Device
-    start: Start
+    start: ReplayStart
     motion: Motion
     extra: float
     leg: Leg | None = None
@@ -79,7 +79,11 @@ def replay_together(requests: Sequence[Replay]) -> list[Replayed | PpafoError]:
     alike: dict[Hashable, list[int]] = {}
     for number, request in enumerate(requests):
         try:
-            planned[number] = _planned(request)
+            recording = request.measured.recording
+            followed = followed_channels(request.measured, request.motion)
+            run = _plan(request)
+            inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
+            planned[number] = _Planned(request, run, inputs, batch_of(run))
         except PpafoError as error:
             ended[number] = error
             continue
@@ -103,15 +107,6 @@ class _Planned:
         command = None if self.inputs.command is None else self.inputs.command.tobytes()
         parameters = tuple((path, series.tobytes()) for path, series in self.inputs.parameters.items())
         return self.batch.program, self.batch.clock, command, parameters
-
-
-def _planned(request: Replay) -> _Planned:
-    """Return the plan of a replay; PpafoError where the recording or the device does not allow one."""
-    recording = request.measured.recording
-    followed = followed_channels(request.measured, request.motion)
-    run = _plan(request)
-    inputs = step_inputs(RecordedInputs(recording, followed, float(recording.time[0])), request.device, run)
-    return _Planned(request, run, inputs, batch_of(run))
 
 
 def _run_together(together: Sequence[_Planned]) -> list[Replayed | SimulationError]:
@@ -146,7 +141,7 @@ def _replayed(planned: _Planned, rows: Mapping[str, int], record: Floats, ends: 
     return Replayed(_recording(request.measured, run, rows, record), run.step, followed)
 
 
-def followed_channels(measured: Measured, motion: Motion) -> tuple[str, ...]:
+def followed_channels(measured: MeasuredRecording, motion: Motion) -> tuple[str, ...]:
     """Return the channels that a replay follows; the torque on a prescribed vane is what moves it, not an input."""
     followed = [name for name in (SUPPLY, DORSIFLEXION_SUPPLY) if measured.has(name)]
     followed += [EXTERNAL_TORQUE] if measured.has(EXTERNAL_TORQUE) and motion == "free" else []
@@ -191,7 +186,7 @@ def _plan(request: Replay) -> Run:
     return with_prescribed_angle(run, request.start.angle) if request.motion == "measured" else run
 
 
-def _recording(measured: Measured, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
+def _recording(measured: MeasuredRecording, run: Run, rows: Mapping[str, int], record: Floats) -> Recording:
     """Return a record of states as channels, on the clock of the recording that was replayed."""
     angle = record[:, rows["state.angle"]]
     mass_1, mass_2 = record[:, rows["state.mass_1"]], record[:, rows["state.mass_2"]]

@@ -22,7 +22,7 @@ from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.recorded.channels import COMMAND
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.validation.agreement import ReplaySettings, replay_of
-from ppafo.validation.change import SWAPPED, Candidate, Change, joined
+from ppafo.validation.change import SWAPPED, CandidateCause, ModelChange, joined
 from ppafo.validation.record import ONLY_NOISE, STEPS, Left, Record, at_rate, left_of, starts_without_wrong
 from ppafo.validation.replay import Replay, Replayed, replay_together, replayed_scenario
 
@@ -40,16 +40,16 @@ _SMALLEST = 1.0e-300
 """Lower bound of a sum of squares used as a divisor."""
 
 
-class Tried(NamedTuple):
+class SizedCause(NamedTuple):
     """A candidate at the size that leaves least, as it was sought, and by how much G [-] it explains more than none."""
 
-    candidate: Candidate
+    candidate: CandidateCause
     size: float
     left: Left
     gain: float
 
     @property
-    def change(self) -> Change:
+    def change(self) -> ModelChange:
         """The change of this size."""
         return self.candidate.at(self.size)
 
@@ -72,25 +72,25 @@ class Tried(NamedTuple):
 class Slope(NamedTuple):
     """Derivative of the errors over noise (all samples,) by the size of a candidate."""
 
-    candidate: Candidate
+    candidate: CandidateCause
     errors: Floats
 
 
 class _Sized(NamedTuple):
     """A candidate with a size, as it is sought, and the errors (all samples,) that this size adds for each of 1."""
 
-    candidate: Candidate
+    candidate: CandidateCause
     size: float
     slope: Floats
 
     @property
-    def change(self) -> Change:
+    def change(self) -> ModelChange:
         """The change of this size."""
         return self.candidate.at(self.size)
 
 
 @dataclass(frozen=True, slots=True)
-class Search:
+class CauseSearch:
     """Recordings of one device on which changes are tried; ``report`` hears how far a long trial is."""
 
     device: Device
@@ -103,7 +103,7 @@ class Search:
         """The logarithm of the number of samples: what a size must explain more, and what two causes may differ by."""
         return math.log(sum(record.values.size for record in self.records))
 
-    def evaluated(self, changes: Sequence[Change]) -> list[Left | None]:
+    def evaluated(self, changes: Sequence[ModelChange]) -> list[Left | None]:
         """Return what each change leaves; None for one of a device that cannot have made such a recording."""
         left: list[Left | None] = []
         for first in range(0, len(changes), _TOGETHER):
@@ -111,7 +111,7 @@ class Search:
             left += self._evaluated_together(changes[first : first + _TOGETHER])
         return left
 
-    def _evaluated_together(self, changes: Sequence[Change]) -> list[Left | None]:
+    def _evaluated_together(self, changes: Sequence[ModelChange]) -> list[Left | None]:
         """Return what each of some changes leaves, all replayed at once."""
         requests = [[self._request(record, change) for record in self.records] for change in changes]
         possible = [request for of_change in requests for request in of_change if request is not None]
@@ -131,7 +131,7 @@ class Search:
             left.append(Left(squares, np.concatenate([part.errors for part in parts])))
         return left
 
-    def _request(self, record: Record, change: Change) -> Replay | None:
+    def _request(self, record: Record, change: ModelChange) -> Replay | None:
         """Return the replay of what the sensors saw, on the device with the numbers of a change; None for no device."""
         recording, settings = record.measured.recording, self.settings
         for name, sensor in change.sensors.items():
@@ -159,19 +159,22 @@ class Search:
             return None
         return replace(request, device=device)
 
-    def compared(self, candidates: Sequence[Candidate], none: Left) -> list[Tried]:
+    def compared(self, candidates: Sequence[CandidateCause], none: Left) -> list[SizedCause]:
         """Return the candidates at the sizes that leave least: the best of a grid, then two Gauss-Newton steps.
 
         ``none`` is what is left without any. A size at an end of its grid is refused.
         """
-        best: dict[str, Tried] = {}
+        best: dict[str, SizedCause] = {}
         trials = [(candidate, size) for candidate in candidates for size in candidate.grid]
         for step in range(STEPS + 1):
             changes = [candidate.at(size) for candidate, size in trials]
             for (candidate, size), left in zip(trials, self.evaluated(changes), strict=True):
                 if left is not None:
                     gain = self._gain(left, none) - self.penalty * candidate.has_size
-                    now, before = Tried(candidate=candidate, size=size, left=left, gain=gain), best.get(candidate.name)
+                    now, before = (
+                        SizedCause(candidate=candidate, size=size, left=left, gain=gain),
+                        best.get(candidate.name),
+                    )
                     # Sizes that leave nothing but noise are equal: one inside the grid is known better than its ends.
                     if before is None or (gain, now.is_inside) > (before.gain, before.is_inside):
                         best[candidate.name] = now
@@ -184,7 +187,7 @@ class Search:
         counts = np.concatenate([np.full(len(record.channels), record.values.shape[1]) for record in self.records])
         return float(counts @ (np.log(np.maximum(none.squares, 1.0)) - np.log(np.maximum(left.squares, 1.0))))
 
-    def _improved(self, tried: Sequence[Tried]) -> list[tuple[Candidate, float]]:
+    def _improved(self, tried: Sequence[SizedCause]) -> list[tuple[CandidateCause, float]]:
         """Return the size of each candidate after a Gauss-Newton step, no further than its neighbours in the grid."""
         ends = [_neighbours(each) for each in tried]
         lengths = [_DIFFERENCE * (high - low) for low, high in ends]
@@ -197,7 +200,7 @@ class Search:
                 improved.append((each.candidate, min(max(size, low), high)))
         return improved
 
-    def slopes(self, change: Change, left: Left, candidates: Sequence[Candidate]) -> list[Slope]:
+    def slopes(self, change: ModelChange, left: Left, candidates: Sequence[CandidateCause]) -> list[Slope]:
         """Return how the errors that a change leaves grow with the size of each of some candidates beside it."""
         # A delay of all sensors is free already, unless the change has one itself.
         is_free = self.settings.longest_delay > 0.0 and not change.has_delay
@@ -210,14 +213,14 @@ class Search:
             if moved is not None
         ]
 
-    def together(self, usual: Sequence[Candidate], none: Left) -> list[Candidate]:
+    def together(self, usual: Sequence[CandidateCause], none: Left) -> list[CandidateCause]:
         """Return the likeliest usual errors of all sensors as one change; none where together they are unusual.
 
         Each error is one of one sensor, for what groups have together would add to it beyond its limit. In each channel
         the sum of what they explain is one number, whose square over its variance is chi-square: as many errors at
         their limits at once, all one way, are one that is beyond its own.
         """
-        slopes = self.slopes(Change(), none, [candidate for candidate in usual if candidate.is_of_bench])
+        slopes = self.slopes(ModelChange(), none, [candidate for candidate in usual if candidate.is_of_bench])
         if not slopes:
             return []
         sized = _bounded(slopes, none.errors)
@@ -230,15 +233,15 @@ class Search:
             return []
         change = reduce(joined, [each.change for each in sized])
         words = "zeros, gains and delays of several sensors seem to be off"
-        return [Candidate("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
+        return [CandidateCause("several sensors", words, lambda _: change, (1.0,), usual=1.0)]
 
-    def beside_usual(self, slopes: Sequence[Slope], none: Left, known: Collection[str]) -> list[Tried]:
+    def beside_usual(self, slopes: Sequence[Slope], none: Left, known: Collection[str]) -> list[SizedCause]:
         """Return the changes larger than on any bench that explain recordings beside what any bench has, at no cost.
 
         Their sizes are those of straight lines; a run says whether they explain. Names in ``known`` are left out.
         """
         usual = [slope for slope in slopes if slope.candidate.is_of_bench]
-        sized, changes = list[_Sized](), list[Change]()
+        sized, changes = list[_Sized](), list[ModelChange]()
         for slope in slopes:
             candidate = slope.candidate
             if candidate.name in known:
@@ -255,13 +258,13 @@ class Search:
                 sized.append(_Sized(candidate, size, slope.errors))
                 changes.append(reduce(joined, [each.change for each in fitted[1:]], candidate.at(size)))
         tried = [
-            Tried(candidate=candidate, size=size, left=left, gain=self._gain(left, none) - self.penalty)
+            SizedCause(candidate=candidate, size=size, left=left, gain=self._gain(left, none) - self.penalty)
             for (candidate, size, _), left in zip(sized, self.evaluated(changes), strict=True)
             if left is not None
         ]
         return [each for each in tried if each.explains and each.is_inside]
 
-    def needs_another(self, first: Tried, slopes: Sequence[Slope]) -> bool:
+    def needs_another(self, first: SizedCause, slopes: Sequence[Slope]) -> bool:
         """Return whether a second change, larger than on any bench, explains what a first leaves.
 
         To first order in both sizes. As two causes are told apart, its G must be larger by ln N; its size costs as much
@@ -293,7 +296,7 @@ class Search:
         return False
 
 
-def _neighbours(tried: Tried) -> tuple[float, float]:
+def _neighbours(tried: SizedCause) -> tuple[float, float]:
     """Return the sizes of the grid below and above the one that is nearest; its own ends at an end."""
     grid = sorted(tried.candidate.grid)
     nearest = int(np.argmin(np.abs(np.array(grid) - tried.size)))

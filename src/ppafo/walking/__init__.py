@@ -3,12 +3,12 @@
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.loading import list_walks, load_walk
 from ppafo.walking.result import WalkResult
-from ppafo.walking.walk import Comparison, Population, compare_walks, walk, walk_population
+from ppafo.walking.walk import Population, WalkComparison, compare_walks, walk, walk_population
 
 __all__ = [
-    "Comparison",
     "Population",
     "Scenario",
+    "WalkComparison",
     "WalkResult",
     "compare_walks",
     "list_walks",

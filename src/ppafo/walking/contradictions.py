@@ -16,8 +16,9 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings, venting_valve
-from ppafo.simulation.declaration import Reading, short_quantity_text, value_at
+from ppafo.simulation.declaration import DocumentReader, value_at
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import shown_text
 from ppafo.walking.declaration import OF_A_WALK
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import law_of
@@ -25,6 +26,9 @@ from ppafo.walking.wearer import Wearer
 
 COMPRESSION = 1.6
 """Highest pressure in a chamber over the supply pressure, with room: up to 1.38 in the shipped walks."""
+
+_IN_FILES = {"m": "m"}
+"""Units in which files of walks have segments of a leg, which everything else has in millimetres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +84,7 @@ class Contradiction(NamedTuple):
         return f"{self.path}: {self.reason(run)}"
 
 
-def check_walk(scenario: Scenario, reading: Reading) -> None:
+def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
     """Raise ScenarioError with the first contradiction; ``reading`` says how a value was given."""
     for path, is_bad, reason in _contradictions(scenario):
         if is_bad:
@@ -92,7 +96,12 @@ def check_walk(scenario: Scenario, reading: Reading) -> None:
             section, _, name = path.partition(".")
             number = getattr(walk_of(scenario).wearer if section == "wearer" else scenario.controller, name)
             # In six digits, as the number that it contradicts.
-            default = short_quantity_text(number, quantity.unit, scenario.device.supply.atmospheric_pressure)
+            default = shown_text(
+                number,
+                quantity.unit,
+                atmosphere=scenario.device.supply.atmospheric_pressure,
+                unit=_IN_FILES.get(quantity.unit, ""),
+            )
             raise ScenarioError(
                 f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
                 f"give it in the file or with --set {path}=..."
@@ -119,7 +128,13 @@ def check_no_bottle(scenario: Scenario) -> None:
 def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     """Yield every pair of numbers that could contradict each other, with whether they do."""
     yield from _of_stops(scenario)
-    yield from _of_pairs(scenario)
+    wearer = walk_of(scenario).wearer
+    numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
+    numbers |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
+    for pair in PAIRS:
+        if pair.path in numbers and pair.other in numbers:
+            number, other = numbers[pair.path], numbers[pair.other]
+            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return
@@ -164,17 +179,6 @@ def _of_stops(scenario: Scenario) -> Iterator[Contradiction]:
         actuator.angle_min > low + _BEYOND_STOP,
         lambda run: f"{needed}, this joint begins at {_text(actuator.angle_min, run, 'rad')}",
     )
-
-
-def _of_pairs(scenario: Scenario) -> Iterator[Contradiction]:
-    """Yield the contradictions of ``PAIRS`` of which a walk has both numbers."""
-    wearer = walk_of(scenario).wearer
-    numbers = {f"controller.{name}": number for name, number in scenario.controller.settings.items()}
-    numbers |= {f"wearer.{name}": getattr(wearer, name) for name in Wearer.__dataclass_fields__}
-    for pair in PAIRS:
-        if pair.path in numbers and pair.other in numbers:
-            number, other = numbers[pair.path], numbers[pair.other]
-            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
 
 
 def _reason(pair: Pair, other: Any, run: int) -> str:
@@ -261,4 +265,4 @@ def _of_pressures(scenario: Scenario) -> Iterator[Contradiction]:
 
 def _text(number: Any, run: int, unit: str) -> str:
     """Return the number of a run, one for all or (runs,), with its SI unit as a message shows it."""
-    return short_quantity_text(at(number, run), unit) if unit else f"{at(number, run):g}"
+    return shown_text(at(number, run), unit, unit=_IN_FILES.get(unit, "")) if unit else f"{at(number, run):g}"

@@ -17,9 +17,8 @@ from ppafo.model import contact as ground
 from ppafo.model.helping import HELPS, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
 from ppafo.model.shut_off import NEVER
 from ppafo.signals import Recording
-from ppafo.simulation.declaration import written_unit
 from ppafo.simulation.scenario import Scenario
-from ppafo.units import from_si, without_exponent
+from ppafo.units.shown import shown_text
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import gait_sensors_of, law_of
 
@@ -63,8 +62,6 @@ REQUEST_ROW = "controller_state.request.torque"
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
-_NOTHING = 1.0e-12
-"""Readings and settings below this in SI units are nothing: a filtered force never quite comes to rest."""
 _UNITS = {"heel_force": "N", "toe_force": "N", "angle": "rad", "pressure_1": "Pa_a", "pressure_2": "Pa_a"}
 SHOWN = 5
 """Events that are listed one by one; of more the first ones are, and all are in the file."""
@@ -191,8 +188,10 @@ class SafetyEvent:
         head = f"{_WORDS[self.level]} {self.time:.2f} s"
         zero = self.atmosphere
         words = {name: name.replace("_force", "").replace("_", " ") for name in self.readings}
-        shown = [f"{words[name]} {_text(value, _UNITS[name], zero)}" for name, value in self.readings.items()]
-        limits = [f"{name} {_text(value, self.units[name], zero)}" for name, value in self.settings.items()]
+        shown = [
+            f"{words[name]} {shown_text(value, _UNITS[name], '.3g', zero)}" for name, value in self.readings.items()
+        ]
+        limits = [f"{name} {shown_text(value, self.units[name], '.3g', zero)}" for name, value in self.settings.items()]
         return f"{head}: {self.fault_flag.summary}; {'; '.join(', '.join(part) for part in (shown, limits) if part)}"
 
     def to_dict(self) -> dict[str, Any]:
@@ -237,13 +236,6 @@ def safety_events(configuration: Scenario, time: Floats, record: Mapping[str, Fl
         events.append(event)
     # A watchdog that has acted stays, whatever the controller does when it comes back.
     return (*(event for event in events if not watchdog or event.time < watchdog[0].time), *watchdog)
-
-
-def _text(value: float, si_unit: str, atmosphere: float) -> str:
-    """Return a value in SI as people write it, with three digits; gauge counts from ``atmosphere`` [Pa absolute]."""
-    unit = written_unit(si_unit)
-    value = value if abs(value) > _NOTHING else 0.0
-    return f"{without_exponent(from_si(value, unit, si_unit, atmosphere), '.3g')} {unit}".rstrip()
 
 
 def event_lines(events: Sequence[SafetyEvent]) -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.gait import Gait, series_of
-from ppafo.gait.gait import Curve
+from ppafo.gait.gait import GaitCurve
 from ppafo.model.columns import over_runs
 from ppafo.model.contact import NEARLY_FLAT
 from ppafo.model.gait import HARMONICS, GaitSeries, GaitTiming
@@ -69,7 +69,7 @@ def gait_series(gait: Gait) -> GaitSeries:
     )
 
 
-def truncate(curve: Curve) -> Curve:
+def truncate(curve: GaitCurve) -> GaitCurve:
     """The curve with its first eight harmonics, as the engine has it."""
     return replace(curve, cosines=curve.cosines[:HARMONICS], sines=curve.sines[:HARMONICS])
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ppafo.control.kind import ControllerKind
-from ppafo.simulation.motion_kind import WALK, Seen
+from ppafo.simulation.motion_kind import WALK, LawSignals
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import IN_WALK
 from ppafo.walking import contradictions, motion, planning, result
@@ -33,7 +33,7 @@ class WalkKind:
     lacks = staticmethod(result.lacks)
     measured = staticmethod(result.measured)
 
-    def sees(self, _scenario: Scenario) -> Seen:
+    def sees(self, _scenario: Scenario) -> LawSignals:
         """Return how the controller sees the torque."""
         return IN_WALK
 

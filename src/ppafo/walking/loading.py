@@ -21,12 +21,12 @@ from ppafo.model.regulator import SupplyLines
 from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device, Valve
-from ppafo.parameters.graph import Graph, Term
+from ppafo.parameters.graph import Graph, LinkFunction
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
 from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
-from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, Reading, kind_at, value_at
+from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, DocumentReader, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
 from ppafo.simulation.loading import (
     Layout,
@@ -188,7 +188,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     document = changed.document
     if BOTTLE_NAME in request.instead:
         document.setdefault(BOTTLE, {})["name"] = request.instead[BOTTLE_NAME]
-    reading = Reading(request.file, document, changed.paths)
+    reading = DocumentReader(request.file, document, changed.paths)
     hardware = read_hardware(reading, request, changed.device)
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
@@ -206,6 +206,10 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     atmosphere = device.supply.atmospheric_pressure
+    # The path of a file in full means the same from any folder.
+    full = {
+        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
+    }
     scenario = Scenario(
         name=document["name"],
         description=document.get("description", ""),
@@ -220,7 +224,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
             seed=int(reading.number("sensors.seed", SEED)),
         ),
         assumptions=_assumed(reading, bottle),
-        origin=origin_of(request, document, hardware.valve, _named_beside(request)),
+        origin=origin_of(request, document, hardware.valve, tuple(f"{path}={name}" for path, name in full.items())),
         gas_model=read_gas_model(reading),
         supply_line=line,
         links={**links, **links_of_stature(reading.document)},
@@ -238,7 +242,7 @@ class _Led(NamedTuple):
     task_sequence: TaskSequence | None
 
 
-def _led_by(reading: Reading, request: ScenarioRequest) -> _Led:
+def _led_by(reading: DocumentReader, request: ScenarioRequest) -> _Led:
     """Return the gait and the task sequence of a walk, from the files that it names."""
     sequence_file = _named_file("task_sequence", request, reading.document)
     with _named_by("task_sequence", reading, request, ScenarioError):
@@ -249,7 +253,7 @@ def _led_by(reading: Reading, request: ScenarioRequest) -> _Led:
 
 
 def _motion(
-    reading: Reading,
+    reading: DocumentReader,
     led: _Led,
     line: SupplyLine | None,
     bottle: BottleSupply | None,
@@ -276,15 +280,6 @@ def _motion(
     )
 
 
-def _named_beside(request: ScenarioRequest) -> tuple[str, ...]:
-    """Return the files that were named beside a walk's own as overrides."""
-    # The path of a file in full means the same from any folder.
-    full = {
-        path: Path(name).absolute() if Path(name).suffix == ".toml" else name for path, name in request.instead.items()
-    }
-    return tuple(f"{path}={name}" for path, name in full.items())
-
-
 def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]) -> str | None:
     """Return the name or file of a gait or a task sequence; a path in the document begins in its folder."""
     if path in request.instead:
@@ -296,7 +291,7 @@ def _named_file(path: str, request: ScenarioRequest, document: Mapping[str, Any]
 
 
 def _named_by(
-    path: str, reading: Reading, request: ScenarioRequest, kind: type[PpafoError]
+    path: str, reading: DocumentReader, request: ScenarioRequest, kind: type[PpafoError]
 ) -> AbstractContextManager[None]:
     """Return what puts the key at ``path`` before errors about the file that the walk names there.
 
@@ -307,7 +302,7 @@ def _named_by(
 
 
 def _control(
-    reading: Reading, device: Device, lines: SupplyLines | None, sensors: Mapping[str, float]
+    reading: DocumentReader, device: Device, lines: SupplyLines | None, sensors: Mapping[str, float]
 ) -> tuple[Control, Graph]:
     """Return the controller with its settings and its estimator's [SI], and which of them follow other numbers.
 
@@ -332,13 +327,13 @@ def _control(
     return Control(kind if ":" in kind else law.name, settings, seconds), links
 
 
-def _fault(reading: Reading, part: str) -> FaultSettings:
+def _fault(reading: DocumentReader, part: str) -> FaultSettings:
     """Return the fault of a sensor or a part of the plant; without a kind where it is sound."""
     kind = kind_at(reading.document, f"faults.{part}")
     return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
 
 
-def _broken(reading: Reading, line: SupplyLine | None) -> dict[str, FaultSettings]:
+def _broken(reading: DocumentReader, line: SupplyLine | None) -> dict[str, FaultSettings]:
     """Return the parts of the plant that fail; ScenarioError for one that a walk with supply lines does not have."""
     faults = {}
     for part in PLANT_FAULTS:
@@ -353,7 +348,7 @@ def _broken(reading: Reading, line: SupplyLine | None) -> dict[str, FaultSetting
     return faults
 
 
-def _shut_off(reading: Reading) -> dict[str, float]:
+def _shut_off(reading: DocumentReader) -> dict[str, float]:
     """Return the settings of the shut-off valve [SI], {} where none is fitted."""
     if "shut_off" not in reading.document:
         return {}
@@ -363,7 +358,7 @@ def _shut_off(reading: Reading) -> dict[str, float]:
     return numbers
 
 
-def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
+def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
     """Return what a walk assumes: its file says it, its lines and its bottle."""
     own = reading.document.get("assumed", {}) | ({} if bottle is None else bottle.assumed)
     values = ((path, value_at(reading.document, path), note) for path, note in own.items())
@@ -375,7 +370,7 @@ def _assumed(reading: Reading, bottle: BottleSupply | None) -> tuple[Assumption,
     return tuple({**assumed, **lines}.values())
 
 
-def _duration(reading: Reading, scenario: Scenario) -> float:
+def _duration(reading: DocumentReader, scenario: Scenario) -> float:
     """Return the length of a walk [s]: its file's, else its task sequence's, else a minute, or ten on a bottle."""
     motion = walk_of(scenario)
     if value_at(reading.document, "run.duration") is not None:
@@ -399,14 +394,14 @@ def lag_of_bandwidth(bandwidth: float) -> float:
     return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0
 
 
-def _terms(valve: Valve) -> dict[str, Term]:
+def _terms(valve: Valve) -> dict[str, LinkFunction]:
     """Return how lags and delays [s] of valve and sensors, which a controller may follow, come from their settings."""
     kind = VALVES[valve.kind]
     names = tuple(quantity.name for quantity in kind.quantities)
     paths, delay = tuple(f"valve.{name}" for name in names), venting_valve(valve).command_delay
     return {
-        VALVE_LAG: Term(paths, kind.lag or delay, (kind.settings,)),
-        VALVE_DELAY: Term(paths, delay, (kind.settings,)),
-        PRESSURE_LAG: Term(("sensors.pressure_bandwidth",), lag_of_bandwidth),
-        FORCE_LAG: Term(("sensors.force_bandwidth",), lag_of_bandwidth),
+        VALVE_LAG: LinkFunction(paths, kind.lag or delay, (kind.settings,)),
+        VALVE_DELAY: LinkFunction(paths, delay, (kind.settings,)),
+        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_bandwidth),
+        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_bandwidth),
     }

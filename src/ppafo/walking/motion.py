@@ -16,7 +16,7 @@ from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.model.shut_off import SHUT_OFF
 from ppafo.simulation.declaration import THERMAL, line_paths
-from ppafo.simulation.motion_kind import Clock, MotionKind
+from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.bottle.supply import BottleSupply
 from ppafo.walking.declaration import (
@@ -160,7 +160,7 @@ def duration_problems(scenario: Scenario, seconds: Any) -> tuple[Problem, ...]:
     return ((np.logical_not(fits), line),)
 
 
-def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
+def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
     """The clock of a walk with other times [s] by path, which may be arrays (runs,), and what is wrong with it."""
     duration = times.get("run.duration", scenario.run.duration)
     period = times.get("controller.period", scenario.controller.period)
@@ -169,4 +169,4 @@ def clock_with(scenario: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tup
         period = 1.0 / times["controller.rate"]
     output = over_runs(record_interval, duration) if "run.duration" in times else scenario.run.output_interval
     problems = duration_problems(scenario, duration) if "run.duration" in times else ()
-    return Clock(duration, times.get("run.step", scenario.run.step), output, period), problems
+    return RunTimes(duration, times.get("run.step", scenario.run.step), output, period), problems

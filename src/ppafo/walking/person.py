@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.engine.rows import leaves, rebuilt
 from ppafo.gait import Gait
-from ppafo.gait.gait import KNEE, Curve
+from ppafo.gait.gait import KNEE, GaitCurve
 from ppafo.model.columns import larger, over_runs, smaller
 from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import HARMONICS, GaitSeries, GaitTiming, Harmonic, Series
@@ -86,7 +86,7 @@ def draw_gaits(gait: Gait, stature: Floats, generator: np.random.Generator) -> V
     return VariedGaits(series, timing, time)
 
 
-def _draw_series(curve: Curve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
+def _draw_series(curve: GaitCurve | None, count: int, generator: np.random.Generator) -> SeriesOfMany:
     if curve is None:
         return SeriesOfMany(np.zeros(count), np.zeros((count, HARMONICS)), np.zeros((count, HARMONICS)))
     missing = (0.0,) * HARMONICS

@@ -31,7 +31,7 @@ from ppafo.model.sensors import GaitSensors
 from ppafo.model.shut_off import NOT_FITTED, ShutOff
 from ppafo.parameters.device import Device
 from ppafo.parameters.plant import plant_parameters, venting_valve
-from ppafo.simulation.plan import Components, Steps, compose_run, sensor_parameters, too_many_steps
+from ppafo.simulation.plan import Components, TimeGrid, compose_run, sensor_parameters, too_many_steps
 from ppafo.simulation.scenario import ProfileChoice, Scenario
 from ppafo.walking.declaration import FORCES, WALK_SENSORS
 from ppafo.walking.gait_series import heel_rocker
@@ -147,7 +147,7 @@ def unrecorded(run: Run, runs: int) -> Batch:
     return replace(batch, clock=replace(batch.clock, record_every=0))
 
 
-def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
+def walk_steps(scenario: Scenario, plant: PlantParameters) -> TimeGrid:
     """The steps of a walk: whole ones that follow the gas, as many to a sample of the controller as that asks for."""
     lowest, highest = (vented_chambers(scenario.device, plant, angle) for angle in (LOWEST_ANGLE, HIGHEST_ANGLE))
     lines, volume = scenario.supply_lines, smallest_chamber(lowest, highest)
@@ -155,7 +155,7 @@ def walk_steps(scenario: Scenario, plant: PlantParameters) -> Steps:
     volume = volume if lines is None else smaller(volume, smaller(lines.volume_1, lines.volume_2))
     times = scenario.run.duration, scenario.run.step, scenario.run.output_interval, scenario.controller.period
     counts = walk_step_counts(*times, plant, volume, scenario.stiffness)
-    return Steps(
+    return TimeGrid(
         step=counts.step,
         step_count=whole(counts.step_count),
         steps_per_sample=whole(counts.steps_per_sample),
@@ -184,14 +184,18 @@ def stiff_loads(run: Run) -> tuple[Problem, ...]:
         return damping, (at_angles[1] - at_angles[0]) / (2.0 * SMALL_TURN)
 
     damping, stiffness = of_each(growths, *run.effects, *states_at_start(run))
-    longest = smaller(2.0 * inertia / larger(damping, TINY), over_runs(math.sqrt, inertia / larger(stiffness, TINY)))
+    dragged, sprung = 2.0 * inertia / larger(damping, TINY), over_runs(math.sqrt, inertia / larger(stiffness, TINY))
+    longest = smaller(dragged, sprung)
     names = ", ".join(f"effects.{effect.name}" for effect in program.effects if load_torque in effect.laws)
 
     def line(number: int) -> str:
         step, most = at(run.step, number), at(longest, number)
+        cause = f"stiffness of {at(stiffness, number):.3g} N m/rad"
+        if at(dragged, number) < at(sprung, number):
+            cause = f"drag of {at(damping, number):.3g} N m s/rad at {FASTEST_FOOT:g} rad/s"
         return (
-            f"{names}: the load changes too much in a step of {step:.3g} s, of which a walk has equal ones: give "
-            f"run.step = {0.5e3 * most:.2g} ms or less, or a smaller load"
+            f"{names}: a {cause} needs steps of at most {1.0e3 * most:.2g} ms, and a walk has fixed steps of "
+            f"{1.0e3 * step:.3g} ms: set run.step = {0.5e3 * most:.2g} ms, or reduce the load"
         )
 
     return ((run.step > longest, line),)

@@ -105,7 +105,14 @@ def walk_metrics(
     all are for means. ``averages`` are over the counted strides with help.
     """
     chosen = helped & counted
-    metrics = stride_metrics(configuration, strides, averages, chosen) | counts_of_strides(recording, helped)
+    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
+    less = "whole strides with less help (lifted only, paused or stopped) in at least a part of them"
+    metrics = stride_metrics(configuration, strides, averages, chosen) | {
+        "strides": Metric(float(helped.size), "-", "whole strides of the walk"),
+        "helped_strides": Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
+        "vented_strides": Metric(float((~helped).sum()), "-", less),
+        "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
+    }
     # A controller that requests a torque is judged by how well it gets it in push-off.
     if "reference" in recording and chosen.any():
         pushes = samples_of(chosen, starts, recording.time.size) & (recording["controller_phase"] == PUSH_OFF)
@@ -129,18 +136,6 @@ def torque_metrics(recording: Recording) -> dict[str, Metric]:
         name: Metric(value, METRICS[name].unit, METRICS[name].summary)
         for name, value in metrics.items()
         if value is not None
-    }
-
-
-def counts_of_strides(recording: Recording, helped: NDArray[np.bool_]) -> dict[str, Metric]:
-    """Number of whole strides, and the gas of the whole walk; ``helped`` is (strides,)."""
-    gas = float(np.ptp(recording["supplied_mass"][[0, -1]]))
-    less = "whole strides with less help (lifted only, paused or stopped) in at least a part of them"
-    return {
-        "strides": Metric(float(helped.size), "-", "whole strides of the walk"),
-        "helped_strides": Metric(float(helped.sum()), "-", "whole strides with help from strike to strike"),
-        "vented_strides": Metric(float((~helped).sum()), "-", less),
-        "total_gas": Metric(gas, "kg", "gas taken from the supply in the whole walk"),
     }
 
 

@@ -21,7 +21,7 @@ from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import NEVER, PARTS, STANDS_AT, GaitNow, GaitTiming, SequencePart, TimedSequence
 from ppafo.model.leg import LegParameters
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import Reading
+from ppafo.simulation.declaration import DocumentReader
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
 
@@ -81,7 +81,7 @@ the forefoot is on the stair all the same."""
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class TaskSegment:
     """Segment of a task sequence; ``values`` in SI units by name, without those that were not given."""
 
     kind: str
@@ -94,7 +94,7 @@ class TaskSequence:
 
     name: str
     description: str
-    segments: tuple[Segment, ...]
+    segments: tuple[TaskSegment, ...]
     file: str
 
     def refusal(self, number: int, reason: str) -> ScenarioError:
@@ -119,20 +119,20 @@ def load_task_sequence(name_or_path: str | Path) -> TaskSequence:
             raise ScenarioError(f"{file}: segment {number}: kind = {quote(kind)} is not known{hint}; {allowed}")
         where = f"{file}: segment {number} ({kind})"
         validate(_segment_table(kind), segment, where, ScenarioError)
-        reading = Reading(where, segment)
+        reading = DocumentReader(where, segment)
         present = [quantity for quantity in KINDS[kind][1] if quantity not in _OPTIONAL or quantity.name in segment]
         values = {quantity.name: reading.number(quantity.name, quantity) for quantity in present}
         strides = values.get("strides")
         if strides is not None and strides != int(strides):
             raise reading.refusal("strides", "must be a whole number")
-        segments.append(Segment(kind, values))
+        segments.append(TaskSegment(kind, values))
     sequence = TaskSequence(document["name"], document.get("description", ""), tuple(segments), file)
     for index, reason in _contradictions(sequence.segments):
         raise sequence.refusal(index, reason)
     return sequence
 
 
-def _contradictions(segments: Iterable[Segment]) -> Iterator[tuple[int, str]]:
+def _contradictions(segments: Iterable[TaskSegment]) -> Iterator[tuple[int, str]]:
     """Segments, counted from 0, that cannot be as they are where they are, with the reason."""
     walks = False
     for index, segment in enumerate(segments):
@@ -309,7 +309,7 @@ def plan_task_sequence(
 
 
 def _strides(
-    planner: _Planner, segment: Segment, ratio: float, strike_angle: Numbers
+    planner: _Planner, segment: TaskSegment, ratio: float, strike_angle: Numbers
 ) -> Iterator[tuple[Numbers, Numbers]]:
     """Plan a segment; where it walks on evenly and on level ground, that time [s] is given."""
     kind, values = segment.kind, segment.values
@@ -396,7 +396,7 @@ def _ratio(sequence: TaskSequence, index: int, gait: Gait) -> float:
     return ratio
 
 
-def _title(segment: Segment) -> str:
+def _title(segment: TaskSegment) -> str:
     """Name of a segment with its speed or cadence, for tables."""
     values = segment.values
     if "speed" in values:

@@ -161,7 +161,7 @@ def lasting(scenario: Scenario, minutes: float | None) -> Scenario:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+class WalkComparison:
     """A walk with the device, the same without it, and numbers of the healthy gait by name."""
 
     with_device: WalkResult
@@ -177,7 +177,7 @@ class Comparison:
 @checked
 def compare_walks(
     scenario: Scenario | str | Path, *, minutes: Minutes | None = None, progress: Progress = silent
-) -> Comparison:
+) -> WalkComparison:
     """Walk ``minutes`` [min], or a whole task sequence, with the device and without.
 
     ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
@@ -201,7 +201,7 @@ def compare_walks(
     # As long as the bottle lasted, where one ended the walk.
     as_long = minutes if ending is None else float(worn.recording.time[-1]) / 60.0
     bare = walk(without_device(configuration), minutes=as_long, progress=progress)
-    return Comparison(worn, bare, healthy_metrics(configuration))
+    return WalkComparison(worn, bare, healthy_metrics(configuration))
 
 
 def with_device_off(configuration: Scenario) -> Scenario:
@@ -284,22 +284,22 @@ SHOWN = {
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class WearerQuantity:
     """A quantity of every wearer: unit and meaning."""
 
     unit: str
     summary: str
 
 
-OUTCOMES: dict[str, Number] = {
-    name: Number(quantity.unit, f"{quantity.summary}, mean over all strides of a wearer")
+OUTCOMES: dict[str, WearerQuantity] = {
+    name: WearerQuantity(quantity.unit, f"{quantity.summary}, mean over all strides of a wearer")
     for name, quantity in PER_STRIDE.items()
 }
-TRAITS: dict[str, Number] = {
-    "body_mass": Number("kg", "mass of the body"),
-    "shank_length": Number("m", "knee to ankle"),
-    "stride_time": Number("s", "from one heel strike to the next"),
-    "stance_share": Number("-", "fraction of the stride until toe-off"),
+TRAITS: dict[str, WearerQuantity] = {
+    "body_mass": WearerQuantity("kg", "mass of the body"),
+    "shank_length": WearerQuantity("m", "knee to ankle"),
+    "stride_time": WearerQuantity("s", "from one heel strike to the next"),
+    "stance_share": WearerQuantity("-", "fraction of the stride until toe-off"),
 }
 
 

@@ -19,9 +19,9 @@ from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.leg import LegParameters
-from ppafo.parameters.graph import Follows, Graph, Term
+from ppafo.parameters.graph import Follows, Graph, LinkFunction
 from ppafo.signals.recording import Floats
-from ppafo.simulation.declaration import FOOT, Reading, value_at
+from ppafo.simulation.declaration import FOOT, DocumentReader, value_at
 
 SHANK_SHARE = 0.246
 """Knee to ankle as a share of the stature: figure 4.1 of Winter, Biomechanics and Motor Control of Human Movement, 4th
@@ -257,11 +257,11 @@ def links_of_stature(document: Mapping[str, Any]) -> Graph:
         # A link waits until its first source is given, so the stature comes first for masses too.
         sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
         if value_at(document, f"wearer.{name}") is None:
-            links[f"wearer.{name}"] = (Follows((Term(sources, function),), when_set=later),)
+            links[f"wearer.{name}"] = (Follows((LinkFunction(sources, function),), when_set=later),)
     return links
 
 
-def read_wearer(reading: Reading, gait: Gait, is_named: bool) -> Wearer:
+def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
     """Return the wearer of a walk file; what it leaves out is of the gait's subject, or of the paper's by default.
 
     Where it gives the stature, segments follow that and the body mass.
@@ -316,7 +316,7 @@ walk otherwise, and not only with less mass.
 """
 
 
-def wearer_origin(reading: Reading, gait: Gait, is_named: bool) -> str:
+def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
     """Return where the body mass of the wearer comes from, in words."""
     if value_at(reading.document, "wearer.body_mass") is not None:
         return "as wearer.body_mass states"

@@ -10,7 +10,7 @@ from ppafo.analyses.reproduce.bench import SyntheticEvidence
 from ppafo.analyses.reproduce.claim import (
     NOT_PUBLISHED,
     Claim,
-    Reported,
+    ReportedSet,
     arithmetic_claims,
     count_sentence,
     load_reported,
@@ -25,7 +25,7 @@ from ppafo.parameters.audit.evidence import Evidence
 from ppafo.simulation.simulate import Measuring, Result, Status, simulate
 
 
-def printed_with(**values: float) -> Reported:
+def printed_with(**values: float) -> ReportedSet:
     """The printed set with some numbers exchanged, each in its printed unit; ``__`` stands for a dot."""
     printed = load_reported()
     numbers = dict(printed.parameter_set.numbers)
@@ -33,7 +33,7 @@ def printed_with(**values: float) -> Reported:
         path = name.replace("__", ".")
         numbers[path] = numbers[path].model_copy(update={"value": value})
     changed = dataclasses.replace(printed.parameter_set, numbers=numbers)
-    return Reported(changed, Evidence(changed, changed.declarations()))
+    return ReportedSet(changed, Evidence(changed, changed.declarations()))
 
 
 def arithmetic(**values: float) -> dict[str, Claim]:

@@ -19,13 +19,13 @@ from ppafo.analyses.reproduce.answer import (
 )
 from ppafo.analyses.reproduce.bench import NoEvidence, SyntheticEvidence
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
-from ppafo.analyses.reproduce.step_response import Levels
+from ppafo.analyses.reproduce.step_response import SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.page.html import bundled, digest
 from ppafo.report.finding import text_of
 from ppafo.report.writing import typeset
 
-LEVELS = Levels(480536.0, 101325.0)
+LEVELS = SupplyLevels(480536.0, 101325.0)
 
 
 DRAWN = {DEVICE_FIGURE: b"<svg>device</svg>", STEP_FIGURE: b"<svg>seven</svg>", TORQUE_FIGURE: b"<svg>eight</svg>"}

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from ppafo.analyses.reproduce.step_response import PASCALS_PER_PSI, Levels, step_events, step_observations
+from ppafo.analyses.reproduce.step_response import PASCALS_PER_PSI, SupplyLevels, step_events, step_observations
 from ppafo.signals import Channel, Recording
 
 ATMOSPHERE = 101325.0
-LEVELS = Levels(ATMOSPHERE + 55.0 * PASCALS_PER_PSI, ATMOSPHERE)
+LEVELS = SupplyLevels(ATMOSPHERE + 55.0 * PASCALS_PER_PSI, ATMOSPHERE)
 TIME = np.linspace(0.0, 0.4, 401)
 BREAKAWAY, STOP = 0.05, 0.25
 

@@ -128,7 +128,7 @@ def test_a_foreign_part_of_a_scenario_is_refused_by_its_name(name: str, part: An
 @pytest.mark.parametrize("number", [math.nan, math.inf, 0, -1.0, "1 s", None, True, np.ma.masked, np.timedelta64(3)])
 def test_a_number_of_a_changed_scenario_is_checked_as_one_of_a_file(number: Any) -> None:
     scenario = ppafo.load_scenario(TASK)
-    with pytest.raises(ScenarioError, match=r"run\.duration = .*: must be more than 0 and at most 1e\+06 s"):
+    with pytest.raises(ScenarioError, match=r"run\.duration = .*: must be more than 0 s and at most 1e\+06 s"):
         ppafo.simulate(replace(scenario, run=replace(scenario.run, duration=number)))
     walk = ppafo.load_walk("solenoid")
     with pytest.raises(ScenarioError, match=r"supply\.pressure = .*: must be at least 1000"):

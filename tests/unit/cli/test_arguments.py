@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from ppafo.arguments import whole_number
-from ppafo.cli.command_line import Group, parameters_of
+from ppafo.cli.command_line import CommandGroup, parameters_of
 from ppafo.cli.commands import COMMANDS
 from ppafo.cli.main import main
 from ppafo.parameters.bottles.bottle import list_bottles
@@ -21,7 +21,7 @@ SHIPPED = {"SCENARIO", "STUDY", "SET", "GAIT", "WALK", "TUNING", "DESIGN", "BOTT
 
 
 def test_every_command_that_begins_with_a_shipped_name_has_list() -> None:
-    every = {name: one.actions if isinstance(one, Group) else {"": one} for name, one in COMMANDS.items()}
+    every = {name: one.actions if isinstance(one, CommandGroup) else {"": one} for name, one in COMMANDS.items()}
     lacking = [
         f"{name} {action}".strip()
         for name, actions in every.items()

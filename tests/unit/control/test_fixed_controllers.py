@@ -17,8 +17,8 @@ from ppafo.processor.fixed_point import (
     LARGEST_FRACTION,
     SETTINGS,
     WIDEST,
-    Limits,
-    Readings,
+    ConverterCounts,
+    ConverterLimits,
     converter_of,
     count_of,
     fraction_of,
@@ -82,7 +82,7 @@ def test_limits_hold_to_both_sides() -> None:
 def test_the_converter_rounds_and_stays_in_its_range() -> None:
     assert [count_of(value, 2.0, 255.0) for value in (-1.0, 0.9, 1.0, 300.0, 1.0e9)] == [0, 0, 1, 150, 255]
     shown = read(CONVERTER, 0.0, Measurement(0.0, RANGE, 0.0, 0.0))
-    assert shown == Readings(reference=2048, pressure_1=4095, pressure_2=0)
+    assert shown == ConverterCounts(reference=2048, pressure_1=4095, pressure_2=0)
 
 
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
@@ -145,13 +145,19 @@ def test_a_dead_zone_has_hysteresis_and_an_opening() -> None:
 
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
 @pytest.mark.parametrize(
-    "broken", [Readings(2500, 0, 700), Readings(2500, 4095, 700), Readings(0, 900, 700), Readings(2500, 900, 4095)]
+    "broken",
+    [
+        ConverterCounts(2500, 0, 700),
+        ConverterCounts(2500, 4095, 700),
+        ConverterCounts(0, 900, 700),
+        ConverterCounts(2500, 900, 4095),
+    ],
 )
-def test_a_reading_at_an_end_of_its_range_commands_nothing_for_good(law: FixedLaw, broken: Readings) -> None:
+def test_a_reading_at_an_end_of_its_range_commands_nothing_for_good(law: FixedLaw, broken: ConverterCounts) -> None:
     whole = [int(number) for number in leaves(parameters(law))[2:]]
-    own = law.numbers(Limits(*whole[:2]), *whole[2:])
+    own = law.numbers(ConverterLimits(*whole[:2]), *whole[2:])
     state: Any = SimpleNamespace(**{name: int(value) for name, value in law.kind.initial._asdict().items()})
-    sound = Readings(3500, 900, 700)
+    sound = ConverterCounts(3500, 900, 700)
     before, state = law.sample(own, state, sound)
     assert before != 0
     for readings in (broken, sound, sound):

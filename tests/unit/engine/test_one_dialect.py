@@ -55,6 +55,17 @@ def counts_on(parts: Program, lane: Lane) -> None:
     lane.before = before
 
 
+def sets_on_one_side(parts: Program, lane: Lane) -> None:
+    """Set a group of the step on one side of a decision alone."""
+    if lane.timing.step > 1.0:
+        lane.before = 0.0
+
+
+def misspells(parts: Program, lane: Lane) -> None:
+    """Ask for a field that the group has not."""
+    lane.before = 0.0 * lane.timing.stepp  # type: ignore[attr-defined]
+
+
 @pytest.mark.parametrize("backend", ["", "python"])
 @pytest.mark.parametrize(
     ("changed", "message"),
@@ -62,6 +73,11 @@ def counts_on(parts: Program, lane: Lane) -> None:
         ({"begin_step": makes_a_list}, r"test_one_dialect\.py:\d+: a list cannot be compiled"),
         ({"begin_step": squares}, r"test_one_dialect\.py:\d+: 'before \*\* 2' cannot .*; write 'before \* before'"),
         ({"begin_step": prints}, r"test_one_dialect\.py:\d+: 'print\(lane.before\)' throws away"),
+        (
+            {"begin_step": sets_on_one_side},
+            r"test_one_dialect\.py:\d+: 'lane.before' may have no value here: .*; set it before, on every path",
+        ),
+        ({"begin_step": misspells}, r"test_one_dialect\.py:\d+: timing has no 'stepp', did you mean 'step'\?"),
         (
             {"begin_step": keeps_unkept, "open_valve": asks_unkept},
             r"test_one_dialect\.py:\d+: 'lane.extra', which \S+test_one_dialect\.py:\d+ sets, .*'extra': handed",

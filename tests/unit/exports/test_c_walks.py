@@ -21,7 +21,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.exports.c_library import c_library, walk_library
-from ppafo.exports.c_library.files import Setting, c_identifier
+from ppafo.exports.c_library.files import ExportParameter, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
 from ppafo.simulation.motion_kind import VANE, WALK
@@ -104,7 +104,7 @@ def handed(values: Any) -> Any:
     return values.ctypes.data_as(ctypes.POINTER(ctypes.c_double))
 
 
-def drawn(settings: tuple[Setting, ...], draw: np.random.Generator) -> Values:
+def drawn(settings: tuple[ExportParameter, ...], draw: np.random.Generator) -> Values:
     """Settings of one draw, by path."""
     values = {
         item.path: float(np.clip(item.value * draw.uniform(*SPREAD), item.quantity.minimum, item.quantity.maximum))
@@ -118,7 +118,7 @@ def drawn(settings: tuple[Setting, ...], draw: np.random.Generator) -> Values:
     return values
 
 
-def as_overrides(settings: tuple[Setting, ...], values: Values) -> list[str]:
+def as_overrides(settings: tuple[ExportParameter, ...], values: Values) -> list[str]:
     """The same as overrides of a walk file; what a walk file has no word for is left out."""
     unwritten = {"run.duration", "run.output_interval"}
     given = {item.path: (item.quantity.unit, values[item.path]) for item in settings if item.path not in unwritten}
@@ -136,7 +136,9 @@ def numbers_in_c(library: ctypes.CDLL, values: Values, rows: tuple[int, int]) ->
     return parameters, states, counts
 
 
-def batches(name: str, overrides: tuple[str, ...], settings: tuple[Setting, ...]) -> Iterator[tuple[Values, Batch]]:
+def batches(
+    name: str, overrides: tuple[str, ...], settings: tuple[ExportParameter, ...]
+) -> Iterator[tuple[Values, Batch]]:
     """Settings as they are, then drawn ones, each with what Python plans of them."""
     draw = np.random.default_rng(15)
     kinds = [text for text in overrides if "kind=" in text or text.startswith(("task_sequence", "device.set"))]

@@ -13,7 +13,7 @@ import ppafo.cli
 from ppafo.errors import ProgramError, ScenarioError
 from ppafo.processor.catalog import CATALOG
 from ppafo.processor.firmware import firmware, fixed_point_controller, proof
-from ppafo.processor.fixed_point import Readings
+from ppafo.processor.fixed_point import ConverterCounts
 from ppafo.processor.images import Target, make_firmware, missing_tools, processor_simulator, read_image, sizes
 from ppafo.processor.lock_step import PythonProcessor, compare_drawn, drawn_readings, run_on_processor
 from ppafo.processor.qemu import QemuSimulator
@@ -22,7 +22,7 @@ from ppafo.processor.torque_laws.law import FixedLaw
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import add_files
-from ppafo.translation.widths import Interval
+from ppafo.translation.widths import IntegerRange
 
 SCENARIOS = {
     "pid": ("torque-task-proportional", "controller.kind=pid_fixed_point"),
@@ -64,7 +64,7 @@ def scenario_of(law: str, *overrides: str) -> Scenario:
 @pytest.mark.parametrize("law", FIXED_LAWS.values(), ids=list(FIXED_LAWS))
 def test_no_number_of_a_law_can_overflow_and_no_state_leaves_its_range(law: FixedLaw) -> None:
     command, after = proof(law).returned
-    assert command == Interval(-1000, 1000)
+    assert command == IntegerRange(-1000, 1000)
     assert after
 
 
@@ -150,7 +150,7 @@ def test_the_torque_task_with_the_processor_in_charge_has_the_bits_of_the_lanes(
 @on_cortex
 def test_instructions_are_as_many_as_single_steps(target: Target) -> None:
     scenario = scenario_of("pid")
-    readings = Readings(2000, 1500, 1502)
+    readings = ConverterCounts(2000, 1500, 1502)
     with processor_simulator(firmware(scenario, target.name), target) as (simulator, image):
         assert isinstance(simulator, QemuSimulator)
         counted = simulator.samples([readings, readings])[1].work

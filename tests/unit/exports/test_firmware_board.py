@@ -10,7 +10,7 @@ import pytest
 
 from ppafo.processor.catalog import CORTEX_M0
 from ppafo.processor.firmware import firmware, fixed_point_controller
-from ppafo.processor.fixed_point import Readings
+from ppafo.processor.fixed_point import ConverterCounts
 from ppafo.processor.images import make_firmware, missing_tools, read_image
 from ppafo.processor.lock_step import PythonProcessor
 from ppafo.processor.qemu import Debugger
@@ -65,7 +65,7 @@ class Board:
     def place(self) -> int:
         return int.from_bytes(bytes.fromhex(self.debugger.packet("g")[120:128]), "little")
 
-    def sample(self, readings: Readings) -> int:
+    def sample(self, readings: ConverterCounts) -> int:
         """The pins that are high once the readings of a sample have led to a command."""
         self.debugger.write(
             self.symbols["simulated_readings"], b"".join(number.to_bytes(2, "little") for number in readings)
@@ -88,7 +88,11 @@ def board(tmp_path: Path) -> Iterator[Board]:
 def test_pins_and_pulse_follow_the_command_until_a_reading_cannot_be_true(board: Board) -> None:
     fixed = PythonProcessor(fixed_point_controller(scenario_of("pid")))
     seen = set()
-    for readings in (Readings(2060, 1500, 1500), Readings(3000, 1500, 1500), Readings(1000, 1500, 1500)):
+    for readings in (
+        ConverterCounts(2060, 1500, 1500),
+        ConverterCounts(3000, 1500, 1500),
+        ConverterCounts(1000, 1500, 1500),
+    ):
         command, is_sound = fixed.sample(readings)
         pins = board.sample(readings)
         assert is_sound == 1
@@ -96,8 +100,8 @@ def test_pins_and_pulse_follow_the_command_until_a_reading_cannot_be_true(board:
         assert board.pulse() == 1000 + command
         seen.add(command > 0)
     assert seen == {True, False}
-    assert board.sample(Readings(1000, 4095, 1500)) & (VALVE_A | VALVE_B | ENABLE) == 0
-    assert board.sample(Readings(1000, 1500, 1500)) & (VALVE_A | VALVE_B | ENABLE) == 0
+    assert board.sample(ConverterCounts(1000, 4095, 1500)) & (VALVE_A | VALVE_B | ENABLE) == 0
+    assert board.sample(ConverterCounts(1000, 1500, 1500)) & (VALVE_A | VALVE_B | ENABLE) == 0
     assert board.pulse() == 1000
 
 

@@ -11,14 +11,14 @@ from pathlib import Path
 import pytest
 
 from ppafo.cli.main import main
-from ppafo.exports.hil.wire import Sample, sample_bytes
+from ppafo.exports.hil.wire import WireSample, sample_bytes
 from ppafo.processor.link import example_controller
 from ppafo.simulation.loading import load_scenario
 from tests.example_board import COMPILER, SENT, WHOLE, built, plug, running
 from tests.virtual_wire import free_port
 
 TASK = "torque-task-proportional"
-SECOND = Sample(0, 7, 1, 1000, dict.fromkeys(SENT, 150_000))
+SECOND = WireSample(0, 7, 1, 1000, dict.fromkeys(SENT, 150_000))
 """Sample 1 of the run that is under way."""
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no compiler of C is here")
 

@@ -20,10 +20,10 @@ import pytest
 
 from ppafo.errors import ScenarioError
 from ppafo.exports.hil.loop import BROKEN, SILENT, RealTime
-from ppafo.exports.hil.plant import Plant, plant_of
+from ppafo.exports.hil.plant import CompiledPlant, plant_of
 from ppafo.exports.hil.result import HardwareRun
 from ppafo.exports.hil.run import run_plant
-from ppafo.exports.hil.wire import Reader, Sample, open_port, sample_bytes
+from ppafo.exports.hil.wire import Reader, WireSample, open_port, sample_bytes
 from ppafo.model.valves.kind import VENT
 from ppafo.simulation.loading import load_scenario
 from tests.virtual_wire import Fault, ProportionalPartner, faults, undisturbed
@@ -35,7 +35,7 @@ WIRES = ("udp", pytest.param("serial", marks=with_terminals))
 
 
 @cache
-def plant(duration: str = "0.15 s") -> Plant:
+def plant(duration: str = "0.15 s") -> CompiledPlant:
     return plant_of(load_scenario("torque-task-proportional", (f"run.duration={duration}", *PRESSED)))
 
 
@@ -113,7 +113,7 @@ def serving(kind: str, partner: ProportionalPartner, act: Act) -> Iterator[str]:
         # A terminal that its other side has closed gives no more bytes.
         with contextlib.closing(end), contextlib.suppress(OSError):
             while not stop.is_set():
-                samples = [packet for packet in reader.take(end.receive()) if isinstance(packet, Sample)]
+                samples = [packet for packet in reader.take(end.receive()) if isinstance(packet, WireSample)]
                 answers = [answer for sample in samples for answer in partner.answers(sample_bytes(sample))]
                 if not act(end, answers):
                     return
@@ -144,7 +144,7 @@ def disturbed(partner: ProportionalPartner, fault: Fault, seed: int) -> Act:
     return act
 
 
-def run_at(address: str, made: Plant, patience: float = 10.0) -> HardwareRun:
+def run_at(address: str, made: CompiledPlant, patience: float = 10.0) -> HardwareRun:
     port = open_port(address)
     try:
         return run_plant(made, port, RealTime, patience)

@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, RealTime, Row
-from ppafo.exports.hil.plant import Plant, check_baud, plant_of
+from ppafo.exports.hil.loop import BROKEN, NOT_SOUND, SILENT, STOPPED, Bench, LockStep, LogRow, RealTime
+from ppafo.exports.hil.plant import CompiledPlant, check_baud, plant_of
 from ppafo.exports.hil.result import HardwareRun, longest_silence
 from ppafo.exports.hil.run import run_plant
-from ppafo.exports.hil.wire import OVER, VENTED, Answer, Sample, answer_bytes
+from ppafo.exports.hil.wire import OVER, VENTED, Answer, WireSample, answer_bytes
 from ppafo.loading import load_scenario
 from ppafo.model.sensors import Measurement
 from ppafo.model.valves.kind import VENT
@@ -41,16 +41,16 @@ AT_REST = ("initial.pressure_1=20 psi_g", "initial.pressure_2=20 psi_g")
 
 
 @cache
-def plant(*overrides: str, name: str = TASK) -> Plant:
+def plant(*overrides: str, name: str = TASK) -> CompiledPlant:
     return plant_of(load_scenario(name, overrides or SHORT))
 
 
-def run_on(wire: VirtualWire, made: Plant | None = None, **further: object) -> HardwareRun:
+def run_on(wire: VirtualWire, made: CompiledPlant | None = None, **further: object) -> HardwareRun:
     pace = partial(RealTime, clock=wire.clock)
     return run_plant(made or plant(), wire, pace, run=RUN, **further)  # type: ignore[arg-type]
 
 
-def rows_of(found: HardwareRun) -> tuple[Row, ...]:
+def rows_of(found: HardwareRun) -> tuple[LogRow, ...]:
     return found.exchange.rows
 
 
@@ -341,7 +341,7 @@ def test_a_plant_that_leaves_what_is_possible_ends_the_run() -> None:
     found = bench.run(1.0, lambda: False)
     assert len(found.rows) == 7
     assert not found.is_stopped
-    assert all(isinstance(sample, Sample) and sample.counts["pressure_1"] == 200_000 for sample in partner.seen)
+    assert all(isinstance(sample, WireSample) and sample.counts["pressure_1"] == 200_000 for sample in partner.seen)
     assert partner.seen[-1].flags & OVER
 
 

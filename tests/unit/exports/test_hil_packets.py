@@ -18,7 +18,7 @@ from ppafo.exports.hil.wire import (
     Answer,
     Packet,
     Reader,
-    Sample,
+    WireSample,
     answer_bytes,
     count_of,
     sample_bytes,
@@ -32,14 +32,16 @@ HALVES = st.integers(0, 2**16 - 1)
 FLAGS = st.integers(0, 255)
 COUNTS = st.integers(-(2**31), 2**31 - 1)
 NAMES = [channel.name for channel in CHANNELS]
-SAMPLES = st.builds(Sample, FLAGS, HALVES, WORDS, WORDS, st.dictionaries(st.sampled_from(NAMES), COUNTS))
+SAMPLES = st.builds(WireSample, FLAGS, HALVES, WORDS, WORDS, st.dictionaries(st.sampled_from(NAMES), COUNTS))
 ANSWERS = st.builds(Answer, FLAGS, HALVES, WORDS, WORDS, st.integers(-FULL_COMMAND, FULL_COMMAND))
 PACKETS = st.one_of(SAMPLES, ANSWERS)
-SHOWN = Sample(0, 0x1234, 250, 250_000, dict(zip(NAMES[:5], (1_500_000, 1_308_997, 150_000, 101_325, 9), strict=True)))
+SHOWN = WireSample(
+    0, 0x1234, 250, 250_000, dict(zip(NAMES[:5], (1_500_000, 1_308_997, 150_000, 101_325, 9), strict=True))
+)
 
 
 def bytes_of(packet: Packet) -> bytes:
-    return sample_bytes(packet) if isinstance(packet, Sample) else answer_bytes(packet)
+    return sample_bytes(packet) if isinstance(packet, WireSample) else answer_bytes(packet)
 
 
 def rows_of_page(pattern: str) -> list[tuple[str, ...]]:
@@ -49,7 +51,7 @@ def rows_of_page(pattern: str) -> list[tuple[str, ...]]:
 def test_the_hex_of_the_page_is_the_sample_and_the_answer_it_speaks_of() -> None:
     found = [bytes.fromhex(line) for line in re.findall(r"^    (A5 5A [0-9A-F ]+)$", PAGE, re.MULTILINE)]
     sample, answer = (Reader(is_stream=False).take(data)[0] for data in found)
-    assert isinstance(sample, Sample)
+    assert isinstance(sample, WireSample)
     assert sample.sequence == 250
     assert sample.run == 4660
     values = {name: value_of(name, count) for name, count in sample.counts.items()}

@@ -21,7 +21,7 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.wire import Answer, Reader, Sample, answer_bytes, open_port, sample_bytes
+from ppafo.exports.hil.wire import Answer, Reader, WireSample, answer_bytes, open_port, sample_bytes
 from ppafo.processor.link import example_controller
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
@@ -173,7 +173,9 @@ class CSample(ctypes.Structure):
 WORDS = st.integers(0, 2**32 - 1)
 COUNTS = st.tuples(*[st.integers(-(2**31), 2**31 - 1)] * 5)
 SAMPLES = st.builds(
-    lambda flags, run, sequence, time, counts: Sample(flags, run, sequence, time, dict(zip(SENT, counts, strict=True))),
+    lambda flags, run, sequence, time, counts: WireSample(
+        flags, run, sequence, time, dict(zip(SENT, counts, strict=True))
+    ),
     *(st.integers(0, 255), st.integers(0, 2**16 - 1), WORDS, WORDS, COUNTS),
 )
 PIECES = st.one_of(
@@ -187,22 +189,22 @@ PIECES = st.one_of(
 
 @needs_compiler
 @given(pieces=st.lists(PIECES, max_size=6), last=SAMPLES)
-def test_a_board_finds_the_samples_that_python_finds(library: Any, pieces: list[bytes], last: Sample) -> None:
+def test_a_board_finds_the_samples_that_python_finds(library: Any, pieces: list[bytes], last: WireSample) -> None:
     stream = b"".join([*pieces, bytes(100), sample_bytes(last)])
     reader, sample = ctypes.create_string_buffer(45), CSample()
     found = []
     for byte in stream:
         if library.link_take(reader, ctypes.c_uint8(byte), ctypes.byref(sample)) & 1:
             counts = {name: getattr(sample, name) for name in SENT}
-            found.append(Sample(sample.flags, sample.run, sample.sequence, sample.time, counts))
-    wanted = [item for item in Reader(is_stream=True).take(stream) if isinstance(item, Sample)]
+            found.append(WireSample(sample.flags, sample.run, sample.sequence, sample.time, counts))
+    wanted = [item for item in Reader(is_stream=True).take(stream) if isinstance(item, WireSample)]
     assert found == [item for item in wanted if set(item.counts) == set(SENT)]
     assert found[-1] == last
 
 
 @needs_compiler
 @given(sample=SAMPLES, command=st.integers(-1_000_000, 1_000_000), flags=st.integers(0, 1), time=WORDS)
-def test_a_board_answers_as_python_does(library: Any, sample: Sample, command: int, flags: int, time: int) -> None:
+def test_a_board_answers_as_python_does(library: Any, sample: WireSample, command: int, flags: int, time: int) -> None:
     given_sample = CSample(*sample[:4], *(sample.counts[name] for name in SENT))
     answer = ctypes.create_string_buffer(24)
     library.link_answer(

@@ -17,8 +17,18 @@ from hypothesis import strategies as st
 
 from ppafo.cli.main import main
 from ppafo.errors import DataError
-from ppafo.exports.hil.recording import Collector, Recorded, kept_aside, record
-from ppafo.exports.hil.wire import COMPUTED, OVER, WRAP, Answer, Reader, Sample, answer_bytes, count_of, sample_bytes
+from ppafo.exports.hil.recording import CollectedRecording, Collector, kept_aside, record
+from ppafo.exports.hil.wire import (
+    COMPUTED,
+    OVER,
+    WRAP,
+    Answer,
+    Reader,
+    WireSample,
+    answer_bytes,
+    count_of,
+    sample_bytes,
+)
 from ppafo.storage import read_recording
 from tests.virtual_wire import free_port, sending_bench
 
@@ -53,11 +63,11 @@ class Tape:
 
 def packet(number: int, **changed: int) -> bytes:
     counts = {"angle": 1000 * number, "pressure_1": 101_325 + number}
-    made = Sample(0, 7, (WRAP - 20 + number) % WRAP, (START + 1000 * number) % WRAP, counts)
+    made = WireSample(0, 7, (WRAP - 20 + number) % WRAP, (START + 1000 * number) % WRAP, counts)
     return sample_bytes(made._replace(**changed))
 
 
-def played(packets: list[bytes], duration: float | None = None, is_stream: bool = False) -> Recorded:
+def played(packets: list[bytes], duration: float | None = None, is_stream: bool = False) -> CollectedRecording:
     tape = Tape(packets, is_stream)
     return record(tape, "bench", duration, 1.0, clock=tape.clock)
 
@@ -121,7 +131,7 @@ def test_a_bench_that_says_it_is_over_ends_the_recording() -> None:
     [
         (packet(5, run=8), "of another run"),
         (packet(30, time=START), "with a clock that ran backwards"),
-        (sample_bytes(Sample(0, 7, WRAP - 15, START + 5000, {"angle": 1})), "with other channels"),
+        (sample_bytes(WireSample(0, 7, WRAP - 15, START + 5000, {"angle": 1})), "with other channels"),
         (answer_bytes(Answer(0, 7, 5, 5, 5)), "no sample"),
     ],
 )
@@ -140,7 +150,7 @@ def test_where_no_sample_comes_one_line_says_what_came() -> None:
     with pytest.raises(DataError, match=r"^no sample received within 1 s; received: 5 stray bytes$"):
         played([b"hello"])
     with pytest.raises(DataError, match=r"1 without a channel$"):
-        played([sample_bytes(Sample(0, 7, 0, 0, {}))])
+        played([sample_bytes(WireSample(0, 7, 0, 0, {}))])
 
 
 def static_test() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -165,7 +175,7 @@ def play_static_test(port: int, stop: threading.Event) -> None:
                 counts = {name: count_of(name, float(value)) for name, value in named.items()}
                 flags = OVER if number == len(torque) - 1 else 0
                 for _ in range(3 if flags else 1):
-                    data = sample_bytes(Sample(flags, run, number, 10_000 * number, counts))
+                    data = sample_bytes(WireSample(flags, run, number, 10_000 * number, counts))
                     bench.sendto(data, ("127.0.0.1", port))
                 time.sleep(2.0e-4)
 
@@ -322,16 +332,16 @@ def test_an_hour_of_samples_needs_little_memory() -> None:
 @pytest.mark.parametrize(
     "stray",
     [
-        sample_bytes(Sample(0, 7, WRAP - 1, 5_000_000, {"angle": 1})),
-        sample_bytes(Sample(OVER, 7, WRAP - 1, 5_000_000, {"angle": 1})),
-        sample_bytes(Sample(0, 7, WRAP // 2, 3_000_000_000, {"angle": 1})),
-        sample_bytes(Sample(0, 6, WRAP - 1, 0, {"angle": 1})),
-        sample_bytes(Sample(COMPUTED, 7, WRAP - 1, 5_000_000, {"torque": 1, "angle": 1})),
+        sample_bytes(WireSample(0, 7, WRAP - 1, 5_000_000, {"angle": 1})),
+        sample_bytes(WireSample(OVER, 7, WRAP - 1, 5_000_000, {"angle": 1})),
+        sample_bytes(WireSample(0, 7, WRAP // 2, 3_000_000_000, {"angle": 1})),
+        sample_bytes(WireSample(0, 6, WRAP - 1, 0, {"angle": 1})),
+        sample_bytes(WireSample(COMPUTED, 7, WRAP - 1, 5_000_000, {"torque": 1, "angle": 1})),
     ],
 )
 @pytest.mark.parametrize("place", [0, 1, 20, 50])
 def test_a_stray_sample_costs_none_of_the_others(stray: bytes, place: int) -> None:
-    good = [sample_bytes(Sample(0, 7, number, 1000 * number, {"angle": number})) for number in range(50)]
+    good = [sample_bytes(WireSample(0, 7, number, 1000 * number, {"angle": number})) for number in range(50)]
     found = played([*good[:place], stray, *good[place:]])
     assert np.array_equal(np.rint(found.recording["angle"] * 1e6), np.arange(50))
     assert found.recording.time == pytest.approx(0.001 * np.arange(50))

@@ -17,7 +17,7 @@ from ppafo.errors import DataError
 from ppafo.gait import Gait, at_speed, list_gaits, load_gait, speed_range, walk_recording
 from ppafo.gait.document import gait_toml, json_schema, parse_gait
 from ppafo.gait.finding import gait_finding
-from ppafo.gait.gait import KNEE, Curve
+from ppafo.gait.gait import KNEE, GaitCurve
 from ppafo.gait.plausible import gait_file_remarks, standing_tilt
 from ppafo.gait.recorded import ImportedGait, ImportSettings, import_gait
 from ppafo.storage import write_csv
@@ -27,7 +27,7 @@ PHASES = np.linspace(0.0, 1.0, 201)
 
 
 MEAN, COSINES, SINES, STRIDE_TIME = 0.3, (0.5, -0.2, 0.05), (-0.1, 0.4, 0.02), 1.1
-CURVE = Curve(MEAN, COSINES, SINES, 0.1)
+CURVE = GaitCurve(MEAN, COSINES, SINES, 0.1)
 
 
 @pytest.mark.parametrize("phase", [-0.3, 0.0, 0.17, 0.5, 0.99, 7.25])
@@ -99,7 +99,7 @@ def test_a_wrong_gait_file_is_refused_with_key_and_value(normative: Gait, old: s
         parse_gait(text.replace(old, new, 1).encode(), "bad.toml")
 
 
-def negative(curve: Curve) -> Curve:
+def negative(curve: GaitCurve) -> GaitCurve:
     return curve.scale(-1.0)
 
 

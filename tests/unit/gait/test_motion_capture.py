@@ -1,5 +1,6 @@
 """Text exports of motion capture: one walk written as each system writes it gives one gait."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,18 @@ def dflow(path: Path) -> Path:
     return path
 
 
+def bts(path: Path) -> Path:
+    head = "\t".join(f"{name}.{axis}" for name in NAMES for axis in "XYZ")
+    lines = ["BTS ASCII format", "", "Type:         \tPoint 3D tracks", "Measure unit: \tmm", ""]
+    lines += [f"Tracks:       \t{len(NAMES)}", "Frequency:    \t100 Hz", f"Frames:       \t{len(ROWS)}"]
+    lines += ["Start time:   \t0.000", "", f" Frame\t  Time\t{head}\t"]
+    lines += [f"{n + 1}\t{n / 100:.3f}\t{cells(row, chr(9))}\t" for n, row in enumerate(ROWS)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
 FILES = {
+    "bts": (bts, ".emt"),
     "nexus": (nexus, ".csv"),
     "qualisys": (qualisys, ".tsv"),
     "qualisys with frames": (counted_qualisys, ".tsv"),
@@ -133,6 +145,39 @@ def test_a_cell_of_words_is_named_by_line_and_marker_and_no_key_of_a_map(tmp_pat
     with pytest.raises(DataError, match=r"line 15, column '\w+.x': 'lots.*' is not a finite number") as refused:
         import_gait([path], ImportSettings(MASS))
     assert "channels." not in str(refused.value)
+
+
+def test_rows_of_a_motive_export_are_known_by_their_order_where_they_have_no_words(tmp_path: Path) -> None:
+    path = motive(tmp_path / "walk.csv")
+    whole, text = read_table(path), path.read_text()
+    path.write_text(text.replace(",Type,", ",,").replace(",Name,", ",,").replace(",ID,", ",,"))
+    table = read_table(path)
+    assert list(table.columns) == list(whole.columns)
+    assert np.array_equal(table.columns["RKNE.z"], whole.columns["RKNE.z"])
+
+
+@pytest.mark.parametrize(
+    ("write", "old", "new", "said"),
+    [
+        (motive, "Marker,", "Bone,", "has no columns of markers; export the take with Markers, and their Position"),
+        (bts, "Point 3D tracks", "Emg tracks", "has 'Emg tracks' in the place of markers; export 'Point 3D tracks'"),
+    ],
+)
+def test_an_export_without_markers_says_what_to_export(
+    write: Callable[[Path], Path], old: str, new: str, said: str, tmp_path: Path
+) -> None:
+    path = write(tmp_path / ("walk.emt" if write is bts else "walk.csv"))
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(DataError) as refused:
+        import_gait([path], ImportSettings(MASS))
+    assert said in str(refused.value)
+
+
+def test_a_table_of_another_program_is_answered_with_the_line_of_pandas(tmp_path: Path) -> None:
+    path = tmp_path / "walk.xlsx"
+    path.write_bytes(b"PK")
+    with pytest.raises(DataError, match=r"write it as CSV: pandas.read_excel\('.*walk.xlsx'\).to_csv\("):
+        import_gait([path], ImportSettings(MASS))
 
 
 def test_a_counter_before_the_time_is_passed_over(tmp_path: Path) -> None:

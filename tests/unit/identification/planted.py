@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from ppafo.identification.bench.flow import GasAt, Opening, Sizes, orifice_shape
+from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, orifice_shape
 from ppafo.identification.bench.valve_map import area_of_command, spool_of
 from ppafo.identification.bench.vane_leak import pressures_of_fall
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
 
@@ -27,13 +27,15 @@ def angle_of_decay(
     return np.asarray(start_angle + swept)
 
 
-def source(label: str, time: Floats, **channels: tuple[Floats, str]) -> Source:
+def source(label: str, time: Floats, **channels: tuple[Floats, str]) -> RecordingSource:
     """A recording from arrays and units."""
     made = {name: Channel(np.asarray(values, dtype=float), unit) for name, (values, unit) in channels.items()}
-    return Source(Recording(label, time, made, "synthetic"))
+    return RecordingSource(Recording(label, time, made, "synthetic"))
 
 
-def static(noise: float = 0.03, growth: float = 0.0, seed: int = 1, sign: float = 1.0, floor: float = -9.0) -> Source:
+def static(
+    noise: float = 0.03, growth: float = 0.0, seed: int = 1, sign: float = 1.0, floor: float = -9.0
+) -> RecordingSource:
     """0 to 95 psi in steps of 5 and back, three times; friction grows with pressure by ``growth`` [N m/Pa]."""
     steps = np.arange(0.0, 96.0, 5.0) * PSI
     pressure = np.tile(np.concatenate([steps, steps[::-1]]), 3)
@@ -57,7 +59,7 @@ def decay(
     deceleration: float = DECELERATION,
     seed: int = 1,
     sign: float = 1.0,
-) -> Source:
+) -> RecordingSource:
     """Rest for one second, a push, and a free decay; 200 Hz."""
     time = np.arange(0.0, 8.0, 0.005)
     angle = sign * angle_of_decay(np.maximum(time - 1.0, 0.0), 0.4, 2.5, rate, deceleration)
@@ -66,7 +68,7 @@ def decay(
 
 def flow(
     area: float = 3.57e-6, ratios: tuple[float, float] = (0.22, 0.97), noise: float = 0.01, seed: int = 1
-) -> Source:
+) -> RecordingSource:
     """Sixty readings of flow through a fully open valve between two pressure ratios."""
     upstream = np.full(60, SUPPLY)
     downstream = SUPPLY * np.linspace(*ratios, 60)
@@ -82,27 +84,29 @@ def flow(
     )
 
 
-def leak(law: str, size: float, ratio: float = 1.3, seed: int = 1, lost: float = 0.0, volume: float = 60e-6) -> Source:
+def leak(
+    law: str, size: float, ratio: float = 1.3, seed: int = 1, lost: float = 0.0, volume: float = 60e-6
+) -> RecordingSource:
     """Two closed chambers, one at supply pressure and one at the atmosphere, 20 s at 20 Hz; Cd A or c is planted."""
     time = np.arange(0.0, 20.0, 0.05)
     opening = Opening(CO2, "laminar" if law == "laminar" else "orifice")
     rate = CO2.specific_gas_constant * CO2.temperature / volume
-    first, second = pressures_of_fall(opening, Sizes(size), SUPPLY, ROOM, ratio, rate, time)
+    first, second = pressures_of_fall(opening, OpeningSizes(size), SUPPLY, ROOM, ratio, rate, time)
     draw = np.random.default_rng(seed)
     first, second = (values + draw.normal(0.0, 300.0, time.size) - lost * time for values in (first, second))
     return source("leak", time, pressure_1=(first, "Pa"), pressure_2=(second, "Pa"))
 
 
-def steady(law: str, size: float, zero: float = 0.0, seed: int = 1) -> Source:
+def steady(law: str, size: float, zero: float = 0.0, seed: int = 1) -> RecordingSource:
     """Twenty-four readings of the flow that keeps up a pressure; Cd A or c is planted, and the zero of the meter."""
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, ROOM)
-    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow(Sizes(size), first, second)
+    flow = Opening(CO2, "laminar" if law == "laminar" else "orifice").flow(OpeningSizes(size), first, second)
     flow = flow * (1.0 + np.random.default_rng(seed).normal(0.0, 0.003, 24)) + zero
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     return source("steady", np.arange(24.0), **channels)
 
 
-def sweep(dead_band: float = 0.12, width: float = 0.04, sign: float = 1.0, seed: int = 1) -> Source:
+def sweep(dead_band: float = 0.12, width: float = 0.04, sign: float = 1.0, seed: int = 1) -> RecordingSource:
     """Command from -1 to 1 and back at constant pressures, with a valve that saturates."""
     command = np.concatenate([np.linspace(-1.0, 1.0, 101), np.linspace(1.0, -1.0, 101)])
     area = area_of_command(spool_of(command, width), dead_band, 4.2e-6, 0.9)

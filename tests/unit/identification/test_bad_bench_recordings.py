@@ -14,7 +14,7 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.signals import Recording
 from tests.unit.identification import planted
 
@@ -26,11 +26,11 @@ NEEDED = {
     "valve-map": ("command", "mass_flow", "upstream_pressure", "downstream_pressure"),
     "vane-leak": ("pressure_1", "pressure_2"),
 }
-Solve = Callable[[Source], BenchResult]
+Solve = Callable[[RecordingSource], BenchResult]
 
 
 @pytest.fixture
-def bench() -> dict[str, tuple[Source, Solve]]:
+def bench() -> dict[str, tuple[RecordingSource, Solve]]:
     """A good recording for each procedure, and the procedure."""
     co2 = planted.CO2
     leak = planted.leak("orifice", 3.39e-8)
@@ -43,16 +43,16 @@ def bench() -> dict[str, tuple[Source, Solve]]:
     }
 
 
-def changed(source: Source, name: str, values: np.ndarray) -> Source:
-    return Source(source.recording.with_channel(name, values, source.recording.unit(name)), source.reference)
+def changed(source: RecordingSource, name: str, values: np.ndarray) -> RecordingSource:
+    return RecordingSource(source.recording.with_channel(name, values, source.recording.unit(name)), source.reference)
 
 
-def retimed(source: Source, time: np.ndarray) -> Source:
+def retimed(source: RecordingSource, time: np.ndarray) -> RecordingSource:
     recording = source.recording
-    return Source(Recording(recording.label, time, recording.channels, recording.kind), source.reference)
+    return RecordingSource(Recording(recording.label, time, recording.channels, recording.kind), source.reference)
 
 
-def refusal(solve: Solve, source: Source) -> str:
+def refusal(solve: Solve, source: RecordingSource) -> str:
     with pytest.raises(IdentificationError) as caught:
         solve(source)
     text = str(caught.value)
@@ -62,19 +62,19 @@ def refusal(solve: Solve, source: Source) -> str:
 
 
 @pytest.mark.parametrize(("kind", "channel"), [(kind, name) for kind, names in NEEDED.items() for name in names])
-def test_a_missing_channel_is_named(bench: dict[str, tuple[Source, Solve]], kind: str, channel: str) -> None:
+def test_a_missing_channel_is_named(bench: dict[str, tuple[RecordingSource, Solve]], kind: str, channel: str) -> None:
     source, solve = bench[kind]
     kept = {name: item for name, item in source.recording.channels.items() if name != channel}
-    bare = Source(Recording(source.recording.label, source.recording.time, kept))
+    bare = RecordingSource(Recording(source.recording.label, source.recording.time, kept))
     text = refusal(solve, bare)
     assert f"needs a channel '{channel} [" in text
     assert "the file has " in text
 
 
 @pytest.mark.parametrize("kind", NEEDED)
-def test_a_recording_that_is_too_short_is_refused(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
+def test_a_recording_that_is_too_short_is_refused(bench: dict[str, tuple[RecordingSource, Solve]], kind: str) -> None:
     source, solve = bench[kind]
-    short = Source(source.recording.between(source.recording.time[0], source.recording.time[2]))
+    short = RecordingSource(source.recording.between(source.recording.time[0], source.recording.time[2]))
     assert "needs" in refusal(solve, short)
 
 
@@ -91,7 +91,7 @@ def test_a_recording_that_is_too_short_is_refused(bench: dict[str, tuple[Source,
     ],
 )
 def test_a_constant_channel_is_refused(
-    bench: dict[str, tuple[Source, Solve]], kind: str, channel: str, words: str
+    bench: dict[str, tuple[RecordingSource, Solve]], kind: str, channel: str, words: str
 ) -> None:
     source, solve = bench[kind]
     value = 1.0 if channel in ("direction", "angle") else float(source.recording[channel].mean())
@@ -99,7 +99,7 @@ def test_a_constant_channel_is_refused(
     assert words in refusal(solve, still)
 
 
-def test_two_chambers_that_both_stand_still_are_refused(bench: dict[str, tuple[Source, Solve]]) -> None:
+def test_two_chambers_that_both_stand_still_are_refused(bench: dict[str, tuple[RecordingSource, Solve]]) -> None:
     source, solve = bench["vane-leak"]
     # One alone would be a room.
     for name, value in (("pressure_1", 3.0e5), ("pressure_2", 1.0e5)):
@@ -118,7 +118,7 @@ def test_two_chambers_that_both_stand_still_are_refused(bench: dict[str, tuple[S
     ],
 )
 def test_a_saturated_sensor_is_refused_with_its_sample(
-    bench: dict[str, tuple[Source, Solve]], kind: str, channel: str, share: float
+    bench: dict[str, tuple[RecordingSource, Solve]], kind: str, channel: str, share: float
 ) -> None:
     source, solve = bench[kind]
     values = source.recording[channel]
@@ -130,7 +130,9 @@ def test_a_saturated_sensor_is_refused_with_its_sample(
 
 
 @pytest.mark.parametrize("kind", ["free-decay", "vane-leak"])
-def test_a_gap_in_a_decay_is_refused_with_its_sample(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
+def test_a_gap_in_a_decay_is_refused_with_its_sample(
+    bench: dict[str, tuple[RecordingSource, Solve]], kind: str
+) -> None:
     source, solve = bench[kind]
     time = source.recording.time.copy()
     time[200:] += 3.0
@@ -139,7 +141,7 @@ def test_a_gap_in_a_decay_is_refused_with_its_sample(bench: dict[str, tuple[Sour
 
 
 @pytest.mark.parametrize("kind", ["static-torque", "open-valve-flow", "valve-map"])
-def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[Source, Solve]], kind: str) -> None:
+def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[RecordingSource, Solve]], kind: str) -> None:
     source, solve = bench[kind]
     time = source.recording.time.copy()
     time[30:] += 1000.0
@@ -149,7 +151,7 @@ def test_a_pause_between_steady_readings_is_told(bench: dict[str, tuple[Source, 
 
 
 def test_a_saturated_flow_meter_is_told_and_a_valve_that_is_open_is_not(
-    bench: dict[str, tuple[Source, Solve]],
+    bench: dict[str, tuple[RecordingSource, Solve]],
 ) -> None:
     source, solve = bench["valve-map"]
     flow = source.recording["mass_flow"]
@@ -158,14 +160,14 @@ def test_a_saturated_flow_meter_is_told_and_a_valve_that_is_open_is_not(
     assert not any("'mass_flow'" in remark for remark in solve(source).remarks)
 
 
-def test_noise_alone_is_no_decay(bench: dict[str, tuple[Source, Solve]]) -> None:
+def test_noise_alone_is_no_decay(bench: dict[str, tuple[RecordingSource, Solve]]) -> None:
     source, solve = bench["free-decay"]
     noise = np.random.default_rng(3).normal(0.0, 2e-3, len(source.recording))
     assert "nothing moves" in refusal(solve, changed(source, "angle", noise))
 
 
 def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
-    bench: dict[str, tuple[Source, Solve]],
+    bench: dict[str, tuple[RecordingSource, Solve]],
 ) -> None:
     _, solve = bench["free-decay"]
     smooth = planted.decay(noise=0.0)
@@ -176,7 +178,7 @@ def test_a_vane_that_runs_into_a_stop_is_not_taken_for_one_that_comes_to_rest(
     assert solve(rests).estimates
 
 
-def test_steps_of_a_coarse_converter_are_no_saturation(bench: dict[str, tuple[Source, Solve]]) -> None:
+def test_steps_of_a_coarse_converter_are_no_saturation(bench: dict[str, tuple[RecordingSource, Solve]]) -> None:
     source, solve = bench["vane-leak"]
     coarse = changed(source, "pressure_1", np.round(source.recording["pressure_1"], -4))
     assert solve(coarse).estimates
@@ -184,7 +186,7 @@ def test_steps_of_a_coarse_converter_are_no_saturation(bench: dict[str, tuple[So
 
 @pytest.mark.parametrize("kind", NEEDED)
 def test_a_number_that_no_sensor_shows_is_refused_with_its_sample(
-    bench: dict[str, tuple[Source, Solve]], kind: str
+    bench: dict[str, tuple[RecordingSource, Solve]], kind: str
 ) -> None:
     source, solve = bench[kind]
     name = NEEDED[kind][0]

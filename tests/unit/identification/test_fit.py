@@ -9,14 +9,14 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import SMOOTH
 from ppafo.identification.fit import Fit, fit
 from ppafo.identification.noise import Noise, burg, noise_of, whiten
-from ppafo.identification.residuals import Block, Free
+from ppafo.identification.residuals import Free, ResidualBlock
 from ppafo.signals.recording import Floats
 
 _COUNT = 300
 _TIME = np.linspace(0.0, 1.0, _COUNT)
 _TRUTH = {"rate": 4.0, "level": 2.0, "zero_1": 0.01, "gain_2": -0.01, "start of rise": 0.3, "start of fall": 1.2}
 _BLOCKS = tuple(
-    Block(label, channel, slice(place * _COUNT, (place + 1) * _COUNT))
+    ResidualBlock(label, channel, slice(place * _COUNT, (place + 1) * _COUNT))
     for place, (label, channel) in enumerate(
         [("rise", "first"), ("rise", "second"), ("fall", "first"), ("fall", "second")]
     )
@@ -106,7 +106,7 @@ def test_numbers_that_act_only_as_their_product_are_not_identifiable() -> None:
     found = fit(
         lambda points: measured[:, None] - points[0] * points[1] * _TIME[:, None],
         numbers,
-        (Block("only", "first", slice(0, _COUNT)),),
+        (ResidualBlock("only", "first", slice(0, _COUNT)),),
     )
 
     assert len(found.unidentified) == 1
@@ -121,7 +121,7 @@ def test_the_tolerance_that_widens_an_interval_is_named_with_its_share_of_the_va
     found = fit(
         lambda points: measured[:, None] - (points[0] + points[1]) * np.ones((_COUNT, 1)),
         numbers,
-        (Block("only", "first", slice(0, _COUNT)),),
+        (ResidualBlock("only", "first", slice(0, _COUNT)),),
     )
 
     (name, share), *_ = found.shares["value"]
@@ -164,7 +164,7 @@ def test_a_sample_that_alone_decides_a_number_is_left_out() -> None:
     found = fit(
         lambda points: measured - slope * points[:1],
         (Free("value", 1.0, -10.0, 10.0, 1.0),),
-        [Block("only", "first", slice(0, _COUNT))],
+        [ResidualBlock("only", "first", slice(0, _COUNT))],
         memory=0,
         is_motion=True,
     )
@@ -179,7 +179,7 @@ def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
     found = fit(
         lambda points: measured[:, None] - points[:1],
         (Free("level", 1.0, -10.0, 10.0, 1.0),),
-        [Block("only", "first", slice(0, _COUNT))],
+        [ResidualBlock("only", "first", slice(0, _COUNT))],
     )
 
     assert found.conflict is not None
@@ -189,10 +189,10 @@ def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
 
 def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_keeps_its_weight() -> None:
     one = (Free("level", 1.0, -10.0, 10.0, 1.0),)
-    exact = fit(lambda points: 2.0 - np.ones((50, 1)) * points[:1], one, [Block("a", "first", slice(0, 50))])
+    exact = fit(lambda points: 2.0 - np.ones((50, 1)) * points[:1], one, [ResidualBlock("a", "first", slice(0, 50))])
     assert exact.values[0] == pytest.approx(2.0)
     measured = 2.0 + np.random.default_rng(1).normal(size=100)[:, None] * 0.1
-    blocks = [Block("a", "first", slice(0, 50)), Block("a", "second", slice(50, 100))]
+    blocks = [ResidualBlock("a", "first", slice(0, 50)), ResidualBlock("a", "second", slice(50, 100))]
     large, small = (
         fit(lambda points, unit=unit: unit * (measured - points[:1]), one, blocks)
         for unit in (np.ones((100, 1)), np.repeat([[1.0], [1.0e-13]], 50, axis=0))
@@ -203,7 +203,11 @@ def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_kee
 
 def test_as_many_samples_as_numbers_are_refused() -> None:
     with pytest.raises(IdentificationError, match="1 samples for 1 numbers"):
-        fit(lambda points: 2.5 - points[:1], (Free("a", 1.0, -9.0, 9.0, 1.0),), [Block("a", "first", slice(0, 1))])
+        fit(
+            lambda points: 2.5 - points[:1],
+            (Free("a", 1.0, -9.0, 9.0, 1.0),),
+            [ResidualBlock("a", "first", slice(0, 1))],
+        )
 
 
 @pytest.mark.parametrize(
@@ -216,7 +220,9 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
     ],
     ids=["no number", "no block", "equal bounds", "start outside"],
 )
-def test_a_fit_that_cannot_begin_says_why(numbers: tuple[Free, ...], blocks: tuple[Block, ...], said: str) -> None:
+def test_a_fit_that_cannot_begin_says_why(
+    numbers: tuple[Free, ...], blocks: tuple[ResidualBlock, ...], said: str
+) -> None:
     with pytest.raises(IdentificationError, match=said):
         fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
 
@@ -233,7 +239,7 @@ def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_en
     found = fit(
         lambda points: measured - points[0] * np.exp(points[1]) * np.ones((_COUNT, 1)),
         numbers,
-        (Block("only", "first", slice(0, _COUNT)),),
+        (ResidualBlock("only", "first", slice(0, _COUNT)),),
     )
 
     assert found.high[0] == pytest.approx(2.0 * math.exp(1.96 * deviation), rel=0.1)
@@ -271,7 +277,7 @@ def test_a_search_that_ends_where_no_run_succeeds_has_not_converged_and_names_th
         left = measured - points[0] * _TIME[:, None] - points[1]
         return np.where(side * points[0] > 1.0, np.nan, left)
 
-    block = Block("only", "first", slice(0, _COUNT))
+    block = ResidualBlock("only", "first", slice(0, _COUNT))
     offset = Free("offset", 0.9, -5.0, 5.0, 1.0)
     found = fit(residuals, (Free("rate", 0.2 * side, -5.0, 5.0, 1.0), offset), (block,))
     assert not found.has_converged

@@ -15,9 +15,9 @@ from ppafo.cli.main import main
 from ppafo.errors import IdentificationError, PpafoError
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import with_estimates
-from ppafo.identification.problem import FreeDecayProblem, Setting, VaneLeakProblem, json_schema, parse_problem
+from ppafo.identification.problem import FreeDecayProblem, ProcedureContext, VaneLeakProblem, json_schema, parse_problem
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory import Experiment, tolerance_parameters
+from ppafo.identification.trajectory import FittedExperiment, tolerance_parameters
 from ppafo.identification.trajectory.tolerances import stated_by
 from ppafo.parameters import apply_overrides, build_device
 from ppafo.parameters.audit import audit
@@ -423,9 +423,9 @@ def test_the_gas_temperature_is_known_as_well_as_it_is_stated(solved: Solve, ben
 
 
 def test_bench_and_trajectory_hold_a_number_alike() -> None:
-    chosen, device = Setting(load_parameter_set("ppafo2011"), "proportional", "here"), load_device("ppafo2011")
+    chosen, device = ProcedureContext(load_parameter_set("ppafo2011"), "proportional", "here"), load_device("ppafo2011")
     scenario = load_scenario("step-response", ["motion.kind=free"])
-    experiment = Experiment("step", scenario, simulate(scenario).recording)
+    experiment = FittedExperiment("step", scenario, simulate(scenario).recording)
     stated = stated_by(chosen.parameter_set, scenario)
     held = {one.path: one.deviation for one in tolerance_parameters(Tolerances(), (experiment,), (), stated)}
     leak = VaneLeakProblem(kind="vane-leak", recordings=("leak.csv",), angle="60 deg")

@@ -21,7 +21,8 @@ def test_a_value_has_as_many_digits_as_its_error_allows(value: float, error: flo
     assert with_error(value, error) == text
 
 
-def test_pressures_are_shown_in_kilopascals_and_angles_in_degrees() -> None:
-    assert in_shown_unit(480537.0, "Pa") == (pytest.approx(480.537), "kPa")
+def test_a_number_is_shown_as_everywhere_else_and_in_the_unit_of_its_file_where_that_states_one() -> None:
+    assert in_shown_unit(480537.0, "Pa") == (pytest.approx(69.6960), "psi")
+    assert in_shown_unit(480537.0, "Pa", "kPa_g") == (pytest.approx(480.537), "kPa")
     assert in_shown_unit(0.5, "rad")[1] == "deg"
     assert in_shown_unit(0.01, "kg m^2") == (0.01, "kg m^2")

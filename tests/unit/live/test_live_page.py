@@ -363,7 +363,7 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     import numpy as np
 
     from ppafo.running import simulate
-    from ppafo.validation.agreement import DEFAULT_LIMIT, Curve, channel_agreement, estimate_delay
+    from ppafo.validation.agreement import DEFAULT_LIMIT, ComparedCurve, channel_agreement, estimate_delay
 
     recording = simulate(load_scenario("torque-task-solenoid")).recording
     time = recording.time[50:2900:3]
@@ -377,7 +377,7 @@ def test_a_recording_of_one_s_own_is_compared_as_validate_does(chromium: Any, fi
     shown = page.locator(".recording tbody tr").first.inner_text()
     supply = load_scenario("torque-task-solenoid").device
     full = 2.0 * (supply.supply.pressure - supply.supply.atmospheric_pressure) * supply.actuator.torque_constant
-    curve = Curve("torque", "N m", time, late, recording.time, recording["torque"], full, usual_zero=0.0)
+    curve = ComparedCurve("torque", "N m", time, late, recording.time, recording["torque"], full, usual_zero=0.0)
     expected = channel_agreement(curve, estimate_delay([curve], DEFAULT_LIMIT).value)
     assert f"{expected.rms:.3g} N m" in shown
     assert f"{100.0 * expected.fraction:.3g} %" in shown

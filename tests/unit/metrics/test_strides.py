@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ppafo.metrics.strides import METER, PER_STRIDE, SETTLING, Strides
+from ppafo.metrics.strides import METER, PER_STRIDE, SETTLING, StrideMeter
 from ppafo.signals.meter import Course, EnergySample, FootSample, GasSample, Sample, StrideSample
 from ppafo.walking.strides import per_stride, stride_starts
 
@@ -30,7 +30,7 @@ def totals() -> dict[str, np.ndarray]:
     }
 
 
-def metered(columns: dict[str, np.ndarray], first: int = 0) -> Strides:
+def metered(columns: dict[str, np.ndarray], first: int = 0) -> StrideMeter:
     """The meter after all samples from one on."""
     blank = StrideSample(*[0.0] * len(StrideSample._fields))
     strides = [
@@ -39,7 +39,7 @@ def metered(columns: dict[str, np.ndarray], first: int = 0) -> Strides:
     ]
     nothing = GasSample(*[0.0] * 5), EnergySample(*[0.0] * 5), FootSample(0.0, 0.0, 0.0)
     rows = [Sample(*[0.0] * 10, *nothing, stride=stride) for stride in strides]
-    state: Strides = METER.start(NO_COURSE, rows[0])
+    state: StrideMeter = METER.start(NO_COURSE, rows[0])
     for row in rows[1:]:
         state = METER.update(state, NO_COURSE, row)
     return state

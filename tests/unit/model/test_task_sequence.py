@@ -23,7 +23,7 @@ from ppafo.walking.planning import planned_task_sequence
 from ppafo.walking.task_sequence import (
     FILE,
     PlannedSequence,
-    Segment,
+    TaskSegment,
     TaskSequence,
     load_task_sequence,
     pace_in_time,
@@ -38,7 +38,7 @@ MOVING = [f"{name}{of}" for name in ANGLES for of in ("", "_rate", "_acceleratio
 
 
 def sequence_of(*segments: tuple[str, dict[str, float]]) -> PlannedSequence:
-    listed = tuple(Segment(kind, values) for kind, values in segments)
+    listed = tuple(TaskSegment(kind, values) for kind, values in segments)
     return planned_task_sequence(TaskSequence("tried", "", listed, "tried.toml"), GAIT)
 
 

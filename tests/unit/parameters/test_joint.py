@@ -9,7 +9,7 @@ import pytest
 from ppafo.analyses.sets.values import shown_values
 from ppafo.errors import ParameterError
 from ppafo.parameters import load_device, load_parameter_set
-from ppafo.parameters.joint import ANKLE, Joint
+from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 from ppafo.report.stored_figure import draw_stored_result
 from ppafo.running import simulate
@@ -28,12 +28,12 @@ def elbow(tmp_path: Path) -> Path:
 
 
 def test_the_sets_that_ship_turn_an_ankle() -> None:
-    assert load_device("ppafo2011").joint == ANKLE == Joint("ankle", "plantarflexion", "dorsiflexion")
+    assert load_device("ppafo2011").joint == ANKLE == JointNames("ankle", "plantarflexion", "dorsiflexion")
 
 
 def test_a_set_names_its_joint_and_the_opposite_is_known(elbow: Path) -> None:
     loaded = load_parameter_set(elbow)
-    assert load_device(loaded).joint == Joint("elbow", "flexion", "extension")
+    assert load_device(loaded).joint == JointNames("elbow", "flexion", "extension")
     written = parse_parameter_set(parameter_set_toml(loaded).encode(), "again", elbow.parent)
     assert written.joint == loaded.joint
     assert "joint: elbow, whose angle grows in flexion, falls in extension" in str(shown_values(loaded))

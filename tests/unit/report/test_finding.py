@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from ppafo.report.finding import Column, Finding, Part
-from ppafo.report.kind import TIME, Interval, Kind, of_metric, of_path
+from ppafo.report.finding import Column, Finding, Section
+from ppafo.report.kind import TIME, ConfidenceInterval, Kind, of_metric, of_path
 from ppafo.report.panels import SHAPES, Mark, Panel
 
 
@@ -22,16 +22,19 @@ def test_a_kind_says_a_level_a_difference_and_an_interval_in_the_unit_of_the_fie
     assert pressure.text(101325.0) == "0 psi_g"
     assert pressure.change(6894.757) == "1 psi"
     assert pressure.axis == "Supply pressure (psig)"
-    assert gas.interval(Interval(0.001, 0.0005, 0.002)) == "1 [0.5, 2]"
+    assert gas.interval(ConfidenceInterval(0.001, 0.0005, 0.002)) == "1 [0.5, 2]"
     assert Kind("Switchings").text(3.0) == "3"
 
 
 def finding() -> Finding[Numbers]:
     """A finding with a table of everything that a cell may be, and a panel."""
     gas = of_metric("gas_supplied")
-    columns = [Column("run", ["a", "b", "c"]), Column("gas", [0.001, Interval(0.002, 0.001, 0.003), float("nan")], gas)]
+    columns = [
+        Column("run", ["a", "b", "c"]),
+        Column("gas", [0.001, ConfidenceInterval(0.002, 0.001, 0.003), float("nan")], gas),
+    ]
     panel = Panel(TIME, gas, [Mark("line", [0.0, 1.0], [0.001, 0.002], label="gas")])
-    part = Part("Gas", columns, panels=[panel], name="gas", caption="Gas over time.")
+    part = Section("Gas", columns, panels=[panel], name="gas", caption="Gas over time.")
     return Finding("trial", "Trial", "A trial", ["said"], [part], Numbers([0.001, float("nan")]))
 
 
@@ -67,7 +70,7 @@ def test_every_shape_can_be_drawn() -> None:
     assert set(given) == set(SHAPES)
     panels = [Panel(Kind("x"), Kind("y"), [mark], scale=Kind("z")) for mark in (given["map"], given["points"])]
     panels += [Panel(Kind("x"), Kind("y"), [given[name]]) for name in SHAPES if name not in ("map", "points")]
-    part = Part("Shapes", panels=panels, name="shapes", across=4)
+    part = Section("Shapes", panels=panels, name="shapes", across=4)
     figure = Finding("trial", "", "", [], [part], Numbers([])).plot()
     bars = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
     assert [bar.get_ylabel() for bar in bars] == ["z"], "two panels of one scale share its bar"

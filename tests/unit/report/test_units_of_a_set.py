@@ -8,8 +8,10 @@ import pytest
 
 import ppafo
 from ppafo.analyses.stored_figures import draw_folder, names_in
+from ppafo.arguments.words import quantity, units_given
 from ppafo.parameters.parameter_set import written_units
 from ppafo.rig.experiments import record, write_rig_recording
+from ppafo.units.shown import shown_in, shown_text, written_text
 
 PSI = 6894.757293168361
 TASK, SHORT = "torque-task-proportional", "run.duration=0.4 s"
@@ -40,11 +42,60 @@ def test_the_units_of_a_set_are_those_in_which_it_is_written(in_bar: str) -> Non
     assert written_units({}) == {}
 
 
-def test_an_override_in_another_unit_does_not_change_what_is_shown(in_bar: str) -> None:
+def test_the_unit_in_which_a_number_is_given_goes_before_that_of_the_set(in_bar: str) -> None:
     changed = ppafo.load_device(in_bar, overrides=["supply.pressure=70 psi_g"])
-    assert changed.shown["Pa_a"] == "bar_g"
-    # A number in SI neither.
+    assert (changed.shown["Pa_a"], changed.shown["Pa_d"], changed.shown["N m"]) == ("psi_g", "psi_d", "N cm")
+    # Who gives a number in SI says nothing of how he reads one.
     assert ppafo.load_device(in_bar, overrides={"supply.pressure": 4.0e5}).shown["Pa_a"] == "bar_g"
+    text = str(ppafo.simulate(TASK, overrides=[SHORT, "supply.pressure=3 bar_g"]))
+    assert re.search(r"largest_pressure +[\d.]+ bar_g", text)
+    assert "psi" not in text
+
+
+def test_a_refusal_is_in_the_unit_of_what_it_refuses_else_in_that_of_the_set(in_bar: str) -> None:
+    def refusal(*overrides: str) -> str:
+        with pytest.raises(ppafo.PpafoError) as caught:
+            ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}", *overrides])
+        return str(caught.value)
+
+    assert refusal("supply.pressure=2000 bar_g").endswith(
+        "must be at least 0.01 bar_a and at most 1000 bar_a (regulated pressure to chamber 1)"
+    )
+    assert "must be at least 0 mm^2 and at most 10000 mm^2" in refusal("valve.area=-1 mm^2")
+    lines = refusal("supply_line.plantarflexion.droop=1 bar_d", "supply.dorsiflexion_pressure=5 bar_g")
+    assert "supply.dorsiflexion_pressure, 5 bar_g, cannot be above supply.pressure, 3.44738 bar_g" in lines
+
+
+@pytest.mark.parametrize(
+    ("value", "si_unit", "text"),
+    [
+        (5.201e-4, "m^2", "520.1 mm^2"),
+        (5.295e-6, "N/Pa", "0.5295 N/bar"),
+        (3.929e-9, "m^3/(s Pa)", "0.3929 L/(s bar)"),
+        (401325.0, "Pa_a", "3 bar_g"),
+        (401325.0, "Pa", "3 bar_g"),
+        (3.0e5, "Pa_d", "3 bar"),
+        (0.05, "N m", "5 N cm"),
+        (6.6378e-7, "Pa_d", "0 bar"),
+        (2.665e-15, "N m", "0 N cm"),
+        (186.0, "1/(N m)", "186 1/(N m)"),
+        (0.5, "1", "0.5"),
+    ],
+)
+def test_a_number_is_written_in_the_units_of_the_set_with_digits_that_people_read(
+    value: float, si_unit: str, text: str
+) -> None:
+    with shown_in(BAR):
+        assert shown_text(value, si_unit) == text
+
+
+def test_a_command_to_paste_has_the_units_in_which_its_numbers_were_given() -> None:
+    with shown_in(BAR):
+        assert written_text(401325.0, "Pa_a") == "3 bar_g"
+        assert written_text(3.929e-9, "m^3/(s Pa)") == "0.3929 L/(s bar)"
+        assert written_text(3.0e5, "Pa_d") == "3 bar_d"
+    assert written_text(2.19e-3, "s", unit="ms") == "2.19 ms"
+    assert units_given({"Pa_a": quantity("Pa_a")("3 bar_g"), "N m": 2.5}) == {"Pa_a": "bar_g", "Pa_d": "bar_d"}
 
 
 def test_a_run_is_said_and_drawn_in_the_units_of_its_set(in_bar: str, tmp_path: Path) -> None:
@@ -71,13 +122,13 @@ def test_every_table_of_an_analysis_is_in_the_units_of_the_set(in_bar: str, tmp_
     compared = ppafo.compare([TASK, "torque-task-solenoid"], overrides=changes)
     assert "RMS error (N cm)" in str(compared)
     found = ppafo.find(TASK, vary="supply.pressure=40..60 psi_g", such_that="peak_torque >= 1 N m", overrides=changes)
-    assert re.search(r"supply.pressure = [\d.]+ bar_g is the lowest value", found.said[0])
+    assert re.search(r"supply.pressure = [\d.]+ psi_g is the lowest value.*: peak_torque is [\d.]+ N cm", found.said[0])
     linear = str(ppafo.linearise(TASK, overrides=[*changes, "reference.level=3 N m"]))
     assert re.search(r"supply_pressure +Pa +3.447\d* bar_g", linear)
     assert re.search(r"torque +N m +[\d.]+ N cm", linear)
     recorded = ppafo.simulate("step-response", overrides=[f"device.set={in_bar}"]).save(tmp_path / "bench")
     validated = ppafo.validate(in_bar, [recorded], motion="leg", overrides=["supply.pressure=3.8 bar_g"])
-    for said in (str(compared), str(found), linear, str(validated)):
+    for said in (str(compared), linear, str(validated)):
         assert "psi" not in said
     assert re.search(r"supply.pressure = [\d.]+ bar_g was used", str(validated))
     # Drawn later, out of the call, and from a file.

@@ -4,7 +4,7 @@ import pytest
 
 from ppafo.metrics import Metric
 from ppafo.report.display_units import display_value, metric_change, metric_text, metrics_lines
-from ppafo.report.kind import Interval, of_metric
+from ppafo.report.kind import ConfidenceInterval, of_metric
 from ppafo.simulation.check import ErrorEstimate
 from ppafo.units import without_exponent
 from ppafo.units.shown import shown_in
@@ -39,7 +39,7 @@ def test_a_pressure_at_the_atmosphere_is_0_in_the_units_of_a_set() -> None:
 
 def test_zero_has_neither_sign_nor_exponent() -> None:
     kind = of_metric("gas_supplied", "+.3g")
-    assert kind.change_interval(Interval(1.0e-18, -1.0e-18, 0.0)) == "0 [0, 0]"
+    assert kind.change_interval(ConfidenceInterval(1.0e-18, -1.0e-18, 0.0)) == "0 [0, 0]"
     assert ErrorEstimate(0.0, 0.3, {}).sentence.startswith(
         "Estimated error of the steps: at most 0 deg and 4.4e-05 psi"
     )

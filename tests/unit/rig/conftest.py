@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from ppafo.rig.experiments import rig_run
-from ppafo.rig.preset import Preset, Request, load_preset
+from ppafo.rig.preset import ExperimentRequest, Preset, load_preset
 from ppafo.rig.solution import RigRun
 from ppafo.simulation.loading import load_scenario
 
@@ -25,6 +25,6 @@ def on_the_rig() -> Callable[[str, Preset], RigRun]:
     """A scenario of the package on the rig, to be looked into."""
 
     def made(scenario: str, preset: Preset) -> RigRun:
-        return rig_run(load_scenario(scenario), Request(preset, 1, "ppafo2011", None, ()), 1000.0)
+        return rig_run(load_scenario(scenario), ExperimentRequest(preset, 1, "ppafo2011", None, ()), 1000.0)
 
     return made

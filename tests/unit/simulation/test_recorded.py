@@ -19,7 +19,7 @@ from ppafo.simulation.recorded.inputs import (
     with_highest_supply,
 )
 from ppafo.simulation.recorded.replay import replay_scenario
-from ppafo.simulation.recorded.rest import Start, samples_at_rest, value_at_rest
+from ppafo.simulation.recorded.rest import ReplayStart, samples_at_rest, value_at_rest
 
 
 def recording(time: np.ndarray, command: np.ndarray, supply: np.ndarray) -> Recording:
@@ -40,7 +40,7 @@ def test_inputs_begin_at_the_time_of_the_recording_that_is_zero_of_the_run() -> 
     time = np.arange(0.0, 0.1, 1e-3)
     given = recording(time, (time >= 0.0495).astype(float), 4.0e5 + 1.0e6 * time)
     device = load_device("ppafo2011")
-    run = plan_run(replay_scenario(given, device, Start(0.5, 0.0, 2e5, 2e5), 0.05, "bench.csv"))
+    run = plan_run(replay_scenario(given, device, ReplayStart(0.5, 0.0, 2e5, 2e5), 0.05, "bench.csv"))
     inputs = step_inputs(RecordedInputs(given, ("command", "supply_pressure"), 0.04), device, run)
     assert inputs.command is not None
     first_open = int(np.argmax(inputs.command))
@@ -103,7 +103,7 @@ def test_an_input_is_held_or_runs_straight_at_the_steps_of_a_run_as_its_channel_
     )
     found = []
     for one in (recording(time, command, supply), declared):
-        run = plan_run(replay_scenario(one, device, Start(1.0, 0.0, 1.0e5, 1.0e5), 0.02, "r.csv"))
+        run = plan_run(replay_scenario(one, device, ReplayStart(1.0, 0.0, 1.0e5, 1.0e5), 0.02, "r.csv"))
         given = step_inputs(RecordedInputs(one, ("command", "supply_pressure"), 0.0), device, run)
         assert given.command is not None
         middle = round(0.005 / run.step)

@@ -230,7 +230,7 @@ def test_a_ramp_that_would_leave_the_stops_after_the_run_is_allowed() -> None:
             'rate = "1 kHz"\nperiod = "1 ms"',
             "give either controller.rate or controller.period, not both",
         ),
-        ('delay = "0 s"', 'delay = "-1 ms"', "must be at least 0 s"),
+        ('delay = "0 s"', 'delay = "-1 ms"', "must be at least 0 ms"),
         ('delay = "0 s"', 'delay = "3.1 s"', "must not be longer than run.duration"),
     ],
 )

@@ -22,7 +22,7 @@ from ppafo.model.sensors import Measurement
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, DIVERGED, run_ensemble
 from ppafo.simulation.ensemble import _result as ensemble_result
-from ppafo.simulation.ensemble.running import Outcome, Request
+from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PrescribedMotion, ProfileChoice, Scenario
@@ -302,7 +302,7 @@ def test_runs_of_an_ensemble_and_walks_with_too_many_parts_say_so_too() -> None:
     states = np.zeros((3, 1))
     assert walk_status(1.5, True, states).message.endswith(f"t = 1.5 s; {TOO_MANY_PARTS}")
     assert "parts" not in walk_status(1.5, False, states).message
-    outcome = Outcome(2, Request({}, (), 1.0, np.empty(0)))
+    outcome = MeteredRuns(2, OutputRequest({}, (), 1.0, np.empty(0)))
     outcome.failure_time[:] = 1.5
     outcome.too_many_parts[1] = True
     told = ensemble_result(SimpleNamespace(reasons={}), outcome, {}).reasons  # type: ignore[arg-type]

@@ -206,3 +206,14 @@ def test_a_pair_that_is_too_coarse_is_told_by_result_and_comparison() -> None:
     assert result.warnings[0] == told
     assert told in str(result)
     assert told in ppafo.compare(["torque-task-slow-valve", "torque-task-solenoid"], overrides=changes).found.remarks
+
+
+def test_a_law_that_rests_within_the_dead_band_is_given_the_integral_that_it_lacks() -> None:
+    changes = ["controller.kind=pid", "controller.integral_gain=0 1/(N m s)", "reference.level=4 N m"]
+    scenario = load_scenario("torque-task-slow-valve", [*changes, "valve.dead_band=0.3"])
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert "its command of 0.3 stays within `valve.dead_band = 0.3`" in verdict.sentence
+    assert re.search(
+        r"with `controller.integral_gain = \S+ 1/\(N m s\)` it does, as a further run shows", verdict.sentence
+    )

@@ -10,7 +10,7 @@ from ppafo.errors import StudyError
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import effective_sample_size, fraction_interval, quantile_interval, replicates_interval
 from ppafo.studies.draws import (
-    Limit,
+    MetricLimit,
     check_metrics,
     choose_configuration,
     drawn_in,
@@ -152,7 +152,7 @@ def test_a_quantile_that_few_draws_cannot_bound_has_an_open_end() -> None:
 
 
 def test_a_limit_is_kept_at_itself_and_never_without_a_value() -> None:
-    most, least = Limit("rms_error", 0.5, True, "0.5 N m"), Limit("rms_error", 0.5, False, "0.5 N m")
+    most, least = MetricLimit("rms_error", 0.5, True, "0.5 N m"), MetricLimit("rms_error", 0.5, False, "0.5 N m")
     values = np.array([0.4, 0.5, 0.6, np.nan])
     assert most.is_kept(values).tolist() == [True, True, False, False]
     assert least.is_kept(values).tolist() == [False, True, True, False]

@@ -14,7 +14,7 @@ from ppafo.analyses.sweep.statistic import draw_until
 from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, quantile_of
 from ppafo.analyses.sweep.stopping import StoppingRule
 from ppafo.errors import StudyError
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.studies.distributions import Floats, NormalAround, noise_interval
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study
@@ -140,7 +140,7 @@ def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
         noise = stats.norm.ppf((columns.get(NOISE, np.zeros(columns["x"].size)) + 0.5) / 2.0**32)
         return {"rms_error": columns["x"] + 0.5 * noise}
 
-    def share_in(uncertainty: Uncertainty) -> Interval | None:
+    def share_in(uncertainty: Uncertainty) -> ConfidenceInterval | None:
         runs = Runs.of_model(model, ["rms_error"])
         return draw_until(runs, uncertainty, "rms_error", statistic, rule, 1).found.share_of_noise
 

@@ -19,7 +19,7 @@ from ppafo.studies.distributions import (
 )
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import cholesky_factor, permute, uniform_numbers
-from ppafo.studies.study import Sample
+from ppafo.studies.study import SamplingPlan
 from ppafo.study.blocks import chunk, chunk_count, drawn_values
 
 SHARES = np.linspace(1e-6, 1.0 - 1e-6, 201)
@@ -56,7 +56,7 @@ def test_a_choice_gives_every_value_its_share() -> None:
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("dimensions", [1, 4, 9])
 def test_a_draw_is_the_same_from_wherever_it_is_asked_for(method: Any, dimensions: int) -> None:
-    sample = Sample(method, 1000, 5)
+    sample = SamplingPlan(method, 1000, 5)
     whole = uniform_numbers(sample, dimensions, 0, 1000)
     assert whole.shape == (1000, dimensions)
     assert whole.min() > 0.0
@@ -67,14 +67,14 @@ def test_a_draw_is_the_same_from_wherever_it_is_asked_for(method: Any, dimension
 
 @pytest.mark.parametrize("method", METHODS)
 def test_another_seed_draws_otherwise(method: Any) -> None:
-    one, other = (uniform_numbers(Sample(method, 64, seed), 3, 0, 64) for seed in (1, 2))
+    one, other = (uniform_numbers(SamplingPlan(method, 64, seed), 3, 0, 64) for seed in (1, 2))
     assert np.count_nonzero(one == other) == 0
 
 
 def test_random_numbers_are_uniform_and_independent() -> None:
     from scipy import stats
 
-    uniform = uniform_numbers(Sample("random", 20_000, 11), 5, 0, 20_000)
+    uniform = uniform_numbers(SamplingPlan("random", 20_000, 11), 5, 0, 20_000)
     for column in uniform.T:
         assert stats.kstest(column, "uniform").pvalue > 1e-4
     assert np.abs(np.corrcoef(uniform.T) - np.eye(5)).max() < 0.03
@@ -83,7 +83,7 @@ def test_random_numbers_are_uniform_and_independent() -> None:
 
 @pytest.mark.parametrize("runs", [1, 2, 7, 100, 1023])
 def test_a_latin_hypercube_has_one_draw_in_every_stratum_of_every_dimension(runs: int) -> None:
-    uniform = uniform_numbers(Sample("latin_hypercube", runs, 4), 6, 0, runs)
+    uniform = uniform_numbers(SamplingPlan("latin_hypercube", runs, 4), 6, 0, runs)
     strata = np.sort(np.floor(uniform * runs).astype(int), axis=0)
     np.testing.assert_array_equal(strata, np.tile(np.arange(runs)[:, None], 6))
     if runs > 500:
@@ -93,11 +93,11 @@ def test_a_latin_hypercube_has_one_draw_in_every_stratum_of_every_dimension(runs
 def test_sobol_numbers_are_those_of_scipy_and_fill_space_better_than_random_ones() -> None:
     from scipy import stats
 
-    sobol = uniform_numbers(Sample("sobol", 512, 3), 4, 0, 512)
+    sobol = uniform_numbers(SamplingPlan("sobol", 512, 3), 4, 0, 512)
     expected = stats.qmc.Sobol(4, scramble=True, bits=32, rng=np.random.default_rng(3)).random(512)
     np.testing.assert_allclose(sobol, expected, atol=2.0**-32)
     assert stats.qmc.discrepancy(sobol) < 0.2 * stats.qmc.discrepancy(
-        uniform_numbers(Sample("random", 512, 3), 4, 0, 512)
+        uniform_numbers(SamplingPlan("random", 512, 3), 4, 0, 512)
     )
 
 

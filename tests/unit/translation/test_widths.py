@@ -11,7 +11,7 @@ from ppafo.translation.c99 import c_source
 from ppafo.translation.typed import Module
 from ppafo.translation.value_types import INT, INT16, INT32
 from ppafo.translation.walk import walk_module
-from ppafo.translation.widths import Interval, hull, narrowed
+from ppafo.translation.widths import IntegerRange, hull, narrowed
 
 
 class Pair(NamedTuple):
@@ -60,11 +60,11 @@ def module_of(function: Any) -> Module:
 
 def given(low: int, high: int, most: int) -> dict[str, Any]:
     """Ranges of the two parameters."""
-    return {"value": Interval(low, high), "places": Interval(0, most)}
+    return {"value": IntegerRange(low, high), "places": IntegerRange(0, most)}
 
 
 def test_what_may_leave_32_bits_is_refused_and_what_just_does_not_is_not() -> None:
-    assert narrowed(module_of(doubled_up), given(0, 2**15 - 1, 16)).returned == Interval(0, (2**15 - 1) * 2**16)
+    assert narrowed(module_of(doubled_up), given(0, 2**15 - 1, 16)).returned == IntegerRange(0, (2**15 - 1) * 2**16)
     with pytest.raises(ProgramError, match=r"doubled_up: a value from 0 to 2147483648, beyond 32 bits"):
         narrowed(module_of(doubled_up), given(0, 2**15, 16))
 
@@ -100,7 +100,7 @@ def test_no_value_is_ever_outside_of_its_range(function: Any) -> None:
 
 
 def _points(value: Any) -> Any:
-    return tuple(map(_points, value)) if isinstance(value, tuple) else Interval(value, value)
+    return tuple(map(_points, value)) if isinstance(value, tuple) else IntegerRange(value, value)
 
 
 def test_tuples_and_rows_have_the_widths_of_what_they_hold() -> None:

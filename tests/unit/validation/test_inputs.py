@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.engine.replay import Segment, segment_value
+from ppafo.engine.replay import AngleSegment, segment_value
 from ppafo.parameters import load_device
 from ppafo.parameters.device import Device, Orifice
 from ppafo.signals import Channel, Recording
@@ -159,7 +159,7 @@ def test_a_recorded_external_torque_moves_the_vane(agree: Agree) -> None:
 
 
 def test_one_straight_piece_runs_through_its_samples() -> None:
-    piece = Segment(2.0, 1.0, 0.5)
+    piece = AngleSegment(2.0, 1.0, 0.5)
     assert segment_value(piece, 2.0) == (1.0, 0.5, 0.0)
     assert segment_value(piece, 4.0)[0] == 2.0
 

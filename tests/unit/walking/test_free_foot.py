@@ -12,7 +12,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.engine.scheme.walking import DeviceShare, carried_foot, foot_direction, torque_with_carried
 from ppafo.gait import Gait, load_gait
-from ppafo.gait.gait import Curve
+from ppafo.gait.gait import GaitCurve
 from ppafo.model import contact as ground
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import foot_inertia_about_ankle, passive_torque
@@ -188,7 +188,7 @@ def test_the_lever_of_the_ground_is_bounded_by_the_heel_whatever_was_measured(me
         gait = replace(gait, ankle_moment=None)
     if measured == "centre of pressure":
         # It runs from 4 cm behind the ankle to the ankle while the foot comes down.
-        gait = replace(gait, centre_of_pressure=Curve(0.0, (-0.04,), (0.0,)))
+        gait = replace(gait, centre_of_pressure=GaitCurve(0.0, (-0.04,), (0.0,)))
     rocker = heel_rocker(gait, wearer)
     assert 0.0 <= rocker.flat <= rocker.raised <= wearer.heel_lever
     assert rocker.half > 0.0

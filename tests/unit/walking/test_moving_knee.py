@@ -12,7 +12,7 @@ from ppafo.engine.rows import leaves
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.walking import foot_direction
 from ppafo.gait import Gait, load_gait
-from ppafo.gait.gait import Curve
+from ppafo.gait.gait import GaitCurve
 from ppafo.model.contact import SWING
 from ppafo.model.gait import gait_at
 from ppafo.model.leg import (
@@ -31,8 +31,8 @@ from ppafo.walking.wearer import paper_subject
 NOTHING = (0.0,)
 
 
-def constant(level: float) -> Curve:
-    return Curve(level, NOTHING, NOTHING)
+def constant(level: float) -> GaitCurve:
+    return GaitCurve(level, NOTHING, NOTHING)
 
 
 def swung(plan: Any, forward: float, up: float) -> tuple[Any, Callable[[str], Floats]]:

@@ -9,9 +9,9 @@ import pytest
 
 from ppafo.analyses.walk.answer import comparison_table
 from ppafo.analyses.walk.wearers import wearers_finding
-from ppafo.report.finding import Part, text_of
+from ppafo.report.finding import Section, text_of
 from ppafo.signals import Channel, Recording
-from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk, walk_population
+from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
 from ppafo.walking.events import acting_phase, failure_times
 from ppafo.walking.figures import whole_walk
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
@@ -28,7 +28,7 @@ CONFIGURATIONS = ("solenoid", "proportional")
 
 
 @lru_cache(maxsize=4)
-def compared(name: str) -> Comparison:
+def compared(name: str) -> WalkComparison:
     return compare_walks(load_walk(name), minutes=0.15)
 
 
@@ -143,7 +143,7 @@ def test_parts_of_the_plant_that_fail_are_marked_and_close_failures_have_one_lab
 
 
 def test_the_table_has_a_cell_for_each_walk() -> None:
-    rows = {title: cells for title, *cells in Part(columns=comparison_table(compared("solenoid"))).rows}
+    rows = {title: cells for title, *cells in Section(columns=comparison_table(compared("solenoid"))).rows}
     assert rows["Gas per stride (g)"][1:] == ["0.000", "-"]
     assert rows["Strides that begin on the toes (%)"] == ["0", "0", "0"]
     assert float(rows["... of the healthy ankle's positive work (%)"][0]) == pytest.approx(7.3, abs=0.1)

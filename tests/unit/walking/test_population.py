@@ -10,7 +10,7 @@ from ppafo.engine.lanes import run_batch
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.run import Run, batch_of, state_row_numbers
 from ppafo.gait import load_gait
-from ppafo.gait.gait import KNEE, Curve
+from ppafo.gait.gait import KNEE, GaitCurve
 from ppafo.walking import load_walk, walk_population
 from ppafo.walking.gait_series import gait_timing
 from ppafo.walking.motion import walk_of, with_duration
@@ -41,7 +41,7 @@ def test_the_first_wearer_is_that_of_the_configuration(name: str) -> None:
         assert people.outcomes[work][0] * strides == pytest.approx(alone[rows[f"walk.{work}"]], rel=1e-9)
 
 
-def varied(curve: Curve | None, series: SeriesOfMany, index: int) -> Curve:
+def varied(curve: GaitCurve | None, series: SeriesOfMany, index: int) -> GaitCurve:
     assert curve is not None
     cosines, sines = (tuple(values[index].tolist()) for values in (series.cosines, series.sines))
     return replace(curve, mean=float(series.mean[index]), cosines=cosines, sines=sines)

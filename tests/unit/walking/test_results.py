@@ -14,7 +14,7 @@ from ppafo.metrics import METRICS
 from ppafo.metrics.strides import PER_STRIDE, SETTLING
 from ppafo.signals import CHANNELS, Channel, Recording
 from ppafo.storage.opensim import read_opensim
-from ppafo.walking import Comparison, WalkResult, compare_walks, load_walk, walk
+from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.strides import (
     PHASES,
@@ -30,7 +30,7 @@ MINUTES = 0.15
 
 
 @lru_cache(maxsize=4)
-def compared(name: str) -> Comparison:
+def compared(name: str) -> WalkComparison:
     return compare_walks(load_walk(name), minutes=MINUTES)
 
 

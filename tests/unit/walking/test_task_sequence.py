@@ -19,7 +19,7 @@ from ppafo.walking.planning import plan_walk, planned_task_sequence
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.strides import steady_strides, task_sequence_metrics
 from ppafo.walking.task_sequence import FILE, TaskSequence, load_task_sequence
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 from tests.composed_programs import lane_source
 
 HEAD = 'schema_version = 1\nname = "tried"\n'
@@ -225,7 +225,7 @@ def test_a_walk_longer_than_its_task_sequence_has_the_gas_and_the_time_of_the_se
 
 
 def test_the_table_of_a_task_sequence_counts_helped_strides_as_it_counts_strides(corridor: WalkResult) -> None:
-    table = task_sequence_parts(Comparison(corridor, corridor, {}))[0]
+    table = task_sequence_parts(WalkComparison(corridor, corridor, {}))[0]
     for column in (3, 4):
         *parts, whole = (int(str(row[column])) for row in table.rows)
         assert whole == sum(parts)

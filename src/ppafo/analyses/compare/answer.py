@@ -12,8 +12,8 @@ from ppafo.analyses.compare.pairs import Paired, pareto_front
 from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.report.display_units import display_difference
-from ppafo.report.finding import Column, Finding, Part
-from ppafo.report.kind import Interval, Kind, of_metric
+from ppafo.report.finding import Column, Finding, Section
+from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.live_parts import live_part
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, COLOURS, GREY, look_of_valve
@@ -33,7 +33,7 @@ _ERROR, _GAS = "rms_error", "gas_supplied"
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class ConfigurationResult:
     """A configuration on a task: how the nominal run ended, its metrics, and how many draws failed and first why.
 
     ``tracking`` is the verdict on a nominal run that does not follow its reference.
@@ -78,18 +78,18 @@ class OnTask:
 
     task: str
     overrides: list[str]
-    cases: list[Case]
+    cases: list[ConfigurationResult]
     pareto_front: list[str]
     pairs: dict[str, list[Paired]]
-    best: dict[str, dict[str, Interval]]
+    best: dict[str, dict[str, ConfidenceInterval]]
 
-    def case(self, configuration: str) -> Case:
+    def case(self, configuration: str) -> ConfigurationResult:
         """Return what a configuration did."""
         return next(case for case in self.cases if case.configuration == configuration)
 
 
 @dataclass(frozen=True, slots=True)
-class Compared:
+class ComparisonResult:
     """Configurations on tasks, one of them the ``baseline``; numbers in SI.
 
     ``draws`` is 0 without uncertainty; ``varied`` are the uncertain paths but the noise; ``confidence`` is the level of
@@ -129,7 +129,7 @@ _PARETO = (
 
 
 @in_units(lambda comparison: comparison.tasks[0].cases[0].scenario.device.shown)
-def finding_of(comparison: Compared) -> Finding[Compared]:
+def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
     """Return a comparison in words, tables and panels."""
     names = comparison.configurations
     has_errors = _ERROR in comparison.metrics
@@ -145,14 +145,14 @@ def finding_of(comparison: Compared) -> Finding[Compared]:
         lead += f"{comparison.draws:,} draws of {values}{beside}, the same for all; each "
         lead += f"interval with {100.0 * comparison.confidence:g} % confidence"
     pareto, change = (
-        Part(
+        Section(
             "Error against gas",
             panels=partial(_pareto_panels, comparison),
             name="pareto",
             caption=_PARETO,
             is_detail=True,
         ),
-        Part(
+        Section(
             "Spread of the change",
             panels=partial(_change_panels, comparison),
             name="change",
@@ -171,8 +171,8 @@ def finding_of(comparison: Compared) -> Finding[Compared]:
             *(part for task in comparison.tasks for part in _parts(comparison, task)),
             *([pareto] if has_errors else []),
             *([change] if has_errors and comparison.draws else []),
-            Part(remarks=comparison.remarks),
-            Part("How to read it" if said else "", said=said, is_detail=True),
+            Section(remarks=comparison.remarks),
+            Section("How to read it" if said else "", said=said, is_detail=True),
         ),
         found=comparison,
         passed=all(case.status.is_completed for task in comparison.tasks for case in task.cases),
@@ -180,7 +180,7 @@ def finding_of(comparison: Compared) -> Finding[Compared]:
     )
 
 
-def _parts(comparison: Compared, task: OnTask) -> list[Part]:
+def _parts(comparison: ComparisonResult, task: OnTask) -> list[Section]:
     """Return the metrics of all configurations, each other one against the baseline, and which is the best."""
     where = "" if len(comparison.tasks) == 1 else f", {task.task}"
     kinds = [(name, of_metric(name)) for name in comparison.metrics]
@@ -190,7 +190,7 @@ def _parts(comparison: Compared, task: OnTask) -> list[Part]:
         if len(comparison.configurations) > 2 and task.best.get(metric)
     }
     return [
-        Part(
+        Section(
             f"Task: {task.task}",
             [
                 Column("configuration", [case.configuration for case in task.cases]),
@@ -199,18 +199,18 @@ def _parts(comparison: Compared, task: OnTask) -> list[Part]:
             ],
         ),
         *(
-            Part(f"{name} against {comparison.baseline}{where}", _paired(comparison, task, name))
+            Section(f"{name} against {comparison.baseline}{where}", _paired(comparison, task, name))
             for name, pairs in task.pairs.items()
             if pairs
         ),
-        *([Part(remarks=[f"best: {metric}: {text}" for metric, text in best.items()])] if best else []),
+        *([Section(remarks=[f"best: {metric}: {text}" for metric, text in best.items()])] if best else []),
     ]
 
 
 _PROBABILITY = Kind(form=".4g")
 
 
-def _paired(comparison: Compared, task: OnTask, name: str) -> list[Column]:
+def _paired(comparison: ComparisonResult, task: OnTask, name: str) -> list[Column]:
     """Return a row for each metric: change without and with uncertainty, mean difference, probability of a gain."""
     pairs = task.pairs[name]
     kinds = [of_metric(pair.metric, "+.3g") for pair in pairs]
@@ -249,7 +249,7 @@ def _percent(fraction: float) -> str:
     return "" if math.isnan(fraction) else f"{without_exponent(100.0 * fraction, '+.3g')} %"
 
 
-def remarks_of(comparison: Compared) -> list[str]:
+def remarks_of(comparison: ComparisonResult) -> list[str]:
     """Return what is not as one would expect: other tasks, runs that failed, means that few draws decide, noise."""
     said, failed, carried = [], [], []
     for task in comparison.tasks:
@@ -284,7 +284,7 @@ def remarks_of(comparison: Compared) -> list[str]:
     return [*said, *failed, *carried, *([_NOISE] if comparison.has_noise else [])]
 
 
-def front_of(cases: Sequence[Case]) -> list[str]:
+def front_of(cases: Sequence[ConfigurationResult]) -> list[str]:
     """Return the configurations that no other beats in both error and gas; none that does not follow its reference."""
     judged = [case for case in cases if case.follows]
     points = np.array([[case.value(name) for name in (_ERROR, _GAS)] for case in judged]).reshape(-1, 2)
@@ -298,15 +298,15 @@ _SHOWN = (0.5, 99.5)
 """Percentiles between which changes are drawn: a few far ones would make all others one bar."""
 
 
-def _pareto_panels(comparison: Compared) -> list[Panel]:
+def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:
     return [_pareto(comparison, task) for task in comparison.tasks]
 
 
-def _change_panels(comparison: Compared) -> list[Panel]:
+def _change_panels(comparison: ComparisonResult) -> list[Panel]:
     return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
 
 
-def _pareto(comparison: Compared, task: OnTask) -> Panel:
+def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:
     """Return error over gas, a mark for each configuration that completed and a dot for each draw."""
     cases = [case for case in task.cases if case.status.is_completed]
     front, marks, on_front = front_of(cases), [], []
@@ -330,7 +330,7 @@ def _pareto(comparison: Compared, task: OnTask) -> Panel:
     return Panel(of_metric(_GAS), of_metric(_ERROR), marks, title, legend="inside")
 
 
-def _change(comparison: Compared, task: OnTask, metric: str) -> Panel:
+def _change(comparison: ComparisonResult, task: OnTask, metric: str) -> Panel:
     """Return histograms of the change of a metric against the baseline; dashed: the nominal device."""
     baseline, marks, ends = task.case(comparison.baseline), [], []
     for number, name in enumerate(comparison.configurations):

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ppafo.metrics import METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, TRACKING
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import (
@@ -61,14 +61,14 @@ class Paired:
 
     metric: str
     pairs: int
-    difference: Interval
+    difference: ConfidenceInterval
     change: float
     change_low: float
     change_high: float
-    better: Interval | None
+    better: ConfidenceInterval | None
     equal: float
     effective_size: float
-    noise: Interval | None = None
+    noise: ConfidenceInterval | None = None
 
 
 def pareto_front(points: Floats) -> Masks:
@@ -124,7 +124,7 @@ def compare_pairs(
     )
 
 
-def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[Interval]:
+def best_probabilities(values: Sequence[Floats], better: int, confidence: float) -> list[ConfidenceInterval]:
     """Return the probability of each configuration to be the best in a draw; ties count for all of them."""
     table = better * np.stack(values)
     known = np.all(np.isfinite(table), axis=0)

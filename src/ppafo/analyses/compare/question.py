@@ -11,7 +11,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
-    from ppafo.analyses.compare.answer import Compared
+    from ppafo.analyses.compare.answer import ComparisonResult
     from ppafo.report.finding import Finding
     from ppafo.simulation.scenario import Scenario
     from ppafo.studies.study import Study
@@ -38,7 +38,7 @@ def compare(
     check: bool = False,
     plugins: Plugins = (),
     progress: Report | None = None,
-) -> Finding[Compared]:
+) -> Finding[ComparisonResult]:
     """Compare configurations, also over an uncertain device.
 
     All have common random numbers. ``configurations`` are scenarios by name (or a list of names, files or Scenario
@@ -63,8 +63,8 @@ def compare(
         progress: called with every count of a long computation
 
     Returns:
-        a Finding whose ``found`` is a Compared: per task the cases with their metrics, and the differences from the
-        baseline
+        a Finding whose ``found`` is a ComparisonResult: per task the cases with their metrics, and the differences
+        from the baseline
 
     Raises:
         StudyError: a study or a configuration that cannot be used, and more than ``maximum_failed`` of its runs fail

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from ppafo.analyses.compare.answer import Case, Compared, OnTask, front_of, remarks_of
+from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, OnTask, front_of, remarks_of
 from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs, compared_metrics
 from ppafo.errors import StudyError, first_twice, nearest_name
 from ppafo.progress import Report
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
 from ppafo.studies.draws import (
@@ -92,7 +92,7 @@ def compared(
     overrides: Mapping[str, Sequence[str]],
     study: Study | None,
     draws: Draws,
-) -> Compared:
+) -> ComparisonResult:
     """Return configurations side by side on tasks, given by their ``overrides``, and over the values of a study.
 
     Without a study the noise of the sensors alone is drawn, where there is any. StudyError where too many runs fail,
@@ -110,7 +110,7 @@ def compared(
         seed = DEFAULT_SEED if study is None else study.sample.seed
     drawn = _drawn_runs(scenarios, metrics, study, uncertainty, draws, seed)
     cases = _cases(scenarios, drawn, draws.threads)
-    comparison = Compared(
+    comparison = ComparisonResult(
         units="SI: N m, kg, J; fractions from 0 to 1",
         configurations=[configuration.name for configuration in configurations],
         baseline=baseline,
@@ -139,7 +139,17 @@ def _drawn_runs(
     if not uncertainty.drawn:
         return {}
     if study is not None:
-        _check_same(study, scenarios)
+        # Where cases differ in a value that the study draws for all of them, the difference would not count.
+        # Orifices of different valves are meant to differ: what the study draws replaces each one's own.
+        for path in (path for path in study.paths if not path.startswith("valve.") and path != NOISE):
+            own = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
+            values = [value for value in own if value is not None]
+            lowest, highest = min(values, default=0.0), max(values, default=0.0)
+            if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+                raise StudyError(
+                    f"the study draws '{path}' for every configuration, so the different values of the configurations "
+                    f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
+                )
     columns = uncertainty.replicated_columns(0, draws.count, seed)
     renoised = with_new_noise(columns) if uncertainty.has_noise else {}
     tally = Tally((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
@@ -159,15 +169,15 @@ def _drawn_runs(
 
 def _cases(
     scenarios: Scenarios, drawn: Mapping[tuple[str, str], DrawnRuns], threads: int | None
-) -> dict[str, list[Case]]:
+) -> dict[str, list[ConfigurationResult]]:
     """Return the cases of each task: the nominal run of every configuration, beside its runs over the draws."""
     # With the seed of each scenario: what the tables call nominal is one realisation of its noise.
     results = simulate_many(list(scenarios.values()), threads)
-    cases: dict[str, list[Case]] = {}
+    cases: dict[str, list[ConfigurationResult]] = {}
     for ((task, name), scenario), result in zip(scenarios.items(), results, strict=True):
         runs = drawn.get((task, name))
         cases.setdefault(task, []).append(
-            Case(
+            ConfigurationResult(
                 configuration=name,
                 status=result.status,
                 metrics={metric: value for metric, value in result.metrics.items() if metric in COMPARED},
@@ -182,22 +192,13 @@ def _cases(
     return cases
 
 
-def _check_same(study: Study, scenarios: Scenarios) -> None:
-    """Refuse cases that differ in a value that the study draws for all of them: the difference would not count."""
-    # Orifices of different valves are meant to differ: what the study draws replaces each one's own.
-    for path in (path for path in study.paths if not path.startswith("valve.") and path != NOISE):
-        own = [value_at(path, scenario) for (_, name), scenario in scenarios.items() if study.varies(path, name)]
-        values = [value for value in own if value is not None]
-        lowest, highest = min(values, default=0.0), max(values, default=0.0)
-        if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
-            raise StudyError(
-                f"the study draws '{path}' for every configuration, so the different values of the configurations "
-                f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
-            )
-
-
 def _on_task(
-    task: str, overrides: Sequence[str], cases: list[Case], baseline: str, metrics: Sequence[str], confidence: float
+    task: str,
+    overrides: Sequence[str],
+    cases: list[ConfigurationResult],
+    baseline: str,
+    metrics: Sequence[str],
+    confidence: float,
 ) -> OnTask:
     """Return the cases of a task with their statistics: each against the baseline, and which is the best of all."""
     first = next(case for case in cases if case.configuration == baseline)
@@ -212,7 +213,9 @@ def _on_task(
     )
 
 
-def _pairs(baseline: Case, other: Case, metrics: Sequence[str], confidence: float) -> list[Paired]:
+def _pairs(
+    baseline: ConfigurationResult, other: ConfigurationResult, metrics: Sequence[str], confidence: float
+) -> list[Paired]:
     """Return each metric of a case against the baseline's, draw by draw; none without draws."""
     if baseline.rows is None or other.rows is None:
         return []
@@ -226,7 +229,9 @@ def _pairs(baseline: Case, other: Case, metrics: Sequence[str], confidence: floa
     return pairs
 
 
-def _best(cases: Sequence[Case], metrics: Sequence[str], confidence: float) -> dict[str, dict[str, Interval]]:
+def _best(
+    cases: Sequence[ConfigurationResult], metrics: Sequence[str], confidence: float
+) -> dict[str, dict[str, ConfidenceInterval]]:
     """Return the probability of each case to be the best, by metric and configuration; nothing without draws.
 
     One that does not follow its reference is not among the best, and a metric may have no end that is better.
@@ -235,7 +240,7 @@ def _best(cases: Sequence[Case], metrics: Sequence[str], confidence: float) -> d
     rows = [case.rows for case in judged if case.rows is not None]
     if not rows:
         return {}
-    best: dict[str, dict[str, Interval]] = {}
+    best: dict[str, dict[str, ConfidenceInterval]] = {}
     for metric in metrics:
         if COMPARED[metric]:
             # All at once: no pair says which of three is the best. No shares where no draw has a value of all.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from ppafo.arguments import FileOrName, Length, Mass, Minutes, Pressure, Threads, Torque, Word, checked
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report, report_nothing
+from ppafo.units.shown import shown_in
 
 if TYPE_CHECKING:
     from ppafo.analyses.design.profile.answer import Sizing
@@ -70,6 +71,7 @@ def design(
     from ppafo.analyses.design.wearer import answer as wearer
     from ppafo.analyses.design.wearer.solve import size_for_wearer
     from ppafo.analyses.design.wearer.wish import Wish
+    from ppafo.arguments.words import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
 
@@ -82,8 +84,9 @@ def design(
             raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
         if mass is None or torque is None or pressure is None or minutes is None:
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
-        wish = Wish(mass, stature, torque, pressure, 60.0 * minutes, toes)
-        return wearer.finding_of(size_for_wearer(wish, report, DEFAULT if catalogue is None else catalogue))
+        wish = Wish(mass, stature, float(torque), float(pressure), 60.0 * minutes, toes)
+        with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
+            return wearer.finding_of(size_for_wearer(wish, report, DEFAULT if catalogue is None else catalogue))
     of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:

@@ -20,7 +20,7 @@ _AT_ONCE = 16_384
 OSCILLATES = "the torque loop oscillates"
 
 
-class Outcome(NamedTuple):
+class TrialMetrics(NamedTuple):
     """Metrics (streams, trials) by name, nan where a run failed or oscillates; runs, failures, why."""
 
     metrics: dict[str, Floats]
@@ -31,7 +31,7 @@ class Outcome(NamedTuple):
 
 def run_trials(
     scenario: Scenario, columns: Mapping[str, Floats], metrics: Sequence[str], seeds: Floats, threads: int | None
-) -> Outcome:
+) -> TrialMetrics:
     """Return what came of trials with columns (trials,) of numbers [SI] by path.
 
     ``seeds`` (streams,) name the streams of noise, the same for every trial, so that trials differ by what is tried and
@@ -55,4 +55,4 @@ def run_trials(
         reasons += [*result.reasons.values(), *([OSCILLATES] if turns.any() else [])]
         parts.append({name: np.where(turns, np.nan, result.metrics[name]).reshape(streams, size) for name in metrics})
     values = {name: np.concatenate([part[name] for part in parts], axis=1) for name in metrics}
-    return Outcome(metrics=values, runs=streams * count, failed=failed, reasons=reasons)
+    return TrialMetrics(metrics=values, runs=streams * count, failed=failed, reasons=reasons)

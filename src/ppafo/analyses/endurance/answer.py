@@ -12,7 +12,7 @@ from ppafo.analyses.endurance.draw import Draw
 from ppafo.model.cold_gas import heat_to_warm
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
-from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLUE, GREEN, GREY, ORANGE, VERMILION
@@ -117,8 +117,8 @@ def finding_of(endurance: Endurance) -> Finding[Endurance]:
         title=_TITLE,
         said=(endurance.bottle.title, f"gas use: {endurance.draw.origin}"),
         parts=(
-            Part(columns=facts(_facts(endurance))),
-            Part(
+            Section(columns=facts(_facts(endurance))),
+            Section(
                 "The bottle over time",
                 panels=partial(endurance_panels, endurance),
                 name="endurance",
@@ -130,7 +130,7 @@ def finding_of(endurance: Endurance) -> Finding[Endurance]:
                 remarks=(_LEFT_OUT,),
                 is_detail=True,
             ),
-            Part(
+            Section(
                 "Values",
                 columns_of(("value", "", "origin", "source"), values),
                 remarks=(f"Gas properties: {endurance.bottle.fluid.source}.",),
@@ -165,8 +165,8 @@ def finding_of_several(several: Endurances) -> Finding[Endurances]:
         title=_TITLE,
         said=(next(iter(several.uses.values())).bottle.title,),
         parts=(
-            Part(columns=columns_of(titles, rows)),
-            Part("What is not in the model", said=(_LEFT_OUT,), is_detail=True),
+            Section(columns=columns_of(titles, rows)),
+            Section("What is not in the model", said=(_LEFT_OUT,), is_detail=True),
         ),
         found=several,
     )

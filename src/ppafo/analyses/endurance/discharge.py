@@ -113,7 +113,7 @@ _ABOVE_FREEZING = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
+class DischargeInterval:
     """A time [s] of one draw [kg/s], the solution in it and at its end, and what stopped it before its time.
 
     The solution is mass [kg] and energy [J] of the content, temperature of the wall [K], and the sums of gas [kg], its
@@ -189,7 +189,7 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
         )
     energy = content_energy(bottle.fluid.table, bottle.mass, bottle.volume, bottle.room_temperature)
     start = np.array([bottle.mass, energy, bottle.room_temperature, 0.0, 0.0, 0.0])
-    stretches: list[Stretch] = []
+    stretches: list[DischargeInterval] = []
     time, values, walking = 0.0, start, True
     reason: Stop | None = None
     while reason is None:
@@ -244,7 +244,7 @@ def _unchanged(values: Floats, _times: Floats) -> Floats:
     return values
 
 
-def _recording(bottle: Bottle, stretches: Sequence[Stretch]) -> Recording:
+def _recording(bottle: Bottle, stretches: Sequence[DischargeInterval]) -> Recording:
     """Return the course at evenly spaced times, and exactly at its end."""
     times = np.linspace(0.0, stretches[-1].end, SAMPLES)
     ends = np.array([stretch.end for stretch in stretches])
@@ -277,7 +277,9 @@ def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
     return bottle_content(table, mass, bottle.volume, content_temperature(table, mass, bottle.volume, energy))
 
 
-def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: Floats, walking: bool) -> Stretch:
+def solve_stretch(
+    bottle: Bottle, draw: Draw, start: float, end: float, values: Floats, walking: bool
+) -> DischargeInterval:
     """Return one stretch; walking, it may end early where the supply pressure is no longer maintained."""
     from scipy.integrate import solve_ivp
 
@@ -301,7 +303,7 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
 
     # A stretch may begin without a reserve, and the solver finds crossings only.
     if walking and to_spare(start, values) <= 0.0:
-        return Stretch(start, start, flow, partial(_unchanged, values), values, "supply")
+        return DischargeInterval(start, start, flow, partial(_unchanged, values), values, "supply")
     events: list[Any] = [kelvins_above_freezing, *([to_spare] if walking else [])]
     for event in events:
         # It ends the stretch where it falls through 0.
@@ -320,4 +322,6 @@ def solve_stretch(bottle: Bottle, draw: Draw, start: float, end: float, values: 
         raise SimulationError(f"the bottle could not be simulated beyond {solution.t[-1]:.4g} s: {solution.message}")
     stopped: Stop = "frozen" if len(solution.t_events[0]) else "supply"
     last = np.asarray(solution.y[:, -1])
-    return Stretch(start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None)
+    return DischargeInterval(
+        start, float(solution.t[-1]), flow, solution.sol, last, stopped if solution.status == 1 else None
+    )

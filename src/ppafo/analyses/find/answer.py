@@ -5,19 +5,26 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ppafo.analyses.find.solve import Outcome
-from ppafo.report.finding import Column, Finding, Part
-from ppafo.report.kind import of_metric, of_path
+from ppafo.analyses.find.solve import FindResult
+from ppafo.metrics.tracking import ONE_INSTANT
+from ppafo.report.display_units import metric_words
+from ppafo.report.finding import Column, Finding, Section
+from ppafo.report.kind import Kind, of_metric, of_path
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, GREEN, VERMILION
+from ppafo.report.style import BLACK, GREEN, GREY, VERMILION
 
 
 @dataclass(frozen=True, slots=True)
-class Tried:
-    """A value [SI] that was tried, and the metric there [SI], nan where the run failed."""
+class FindSample:
+    """A value [SI] that was tried, the metric there [SI], nan where the run failed, and by what it was judged [SI].
+
+    ``judged`` is the metric, where the loop oscillates on the hold the larger one of it and of the RMS error there, and
+    nan where the loop oscillates throughout.
+    """
 
     value: float
     metric: float
+    judged: float
     is_of_grid: bool
 
 
@@ -28,7 +35,7 @@ class Threshold:
     ``value`` is None where none does, and ``not_met_at`` the next value on its outer side that was tried and does not,
     None at the end of the range. ``changes`` counts how often the condition begins or ceases to be met along the values
     that were tried, ``met`` are the ends of each stretch where it is. ``unsettled`` counts the runs whose loop
-    oscillates at the instant of the metric, so that their RMS error on the hold was taken in its place.
+    oscillates at the instant of the metric, so that their RMS error on the hold has to meet the condition too.
     """
 
     scenario: str
@@ -48,24 +55,25 @@ class Threshold:
     runs: int
     failed: int
     unsettled: int
-    tried: list[Tried]
+    tried: list[FindSample]
 
 
-def finding_of(outcome: Outcome) -> Finding[Threshold]:
+def finding_of(outcome: FindResult) -> Finding[Threshold]:
     """Return the search in words, a table of where the condition is met, and the metric over the value."""
     wanted = "highest" if outcome.highest else "lowest"
-    kind = of_path(outcome.path.path, outcome.path.quantity.unit)
+    kind = _varied(outcome)
     met = outcome.stretches
     columns = [Column(title, [kind.text(ends[end]) for ends in met]) for end, title in enumerate(("from", "to"))]
     remarks = list(_remarks(outcome))
+    rows = (outcome.values, outcome.metrics, outcome.judged, outcome.is_of_grid)
     return Finding(
         name="find",
         kicker="Search",
         title=f"The {wanted} {outcome.path.path} such that {outcome.condition.text}",
         said=(_verdict(outcome), *remarks),
         parts=(
-            Part("Met in the range that was tried", columns),
-            Part(
+            Section("Met in the range that was tried", columns),
+            Section(
                 "Metric over the value",
                 panels=(_panel(outcome),),
                 name="find",
@@ -90,35 +98,40 @@ def finding_of(outcome: Outcome) -> Finding[Threshold]:
             runs=outcome.runs,
             failed=outcome.failed,
             unsettled=outcome.unsettled,
-            tried=list(map(Tried, outcome.values.tolist(), outcome.metrics.tolist(), outcome.is_of_grid.tolist())),
+            tried=list(map(FindSample, *(row.tolist() for row in rows))),
         ),
         passed=outcome.value is not None,
     )
 
 
-def _range(outcome: Outcome) -> str:
-    kind = of_path(outcome.path.path, outcome.path.quantity.unit)
+def _varied(outcome: FindResult) -> Kind:
+    """Return what is varied, in the unit of the range that was given."""
+    return of_path(outcome.path.path, outcome.path.quantity.unit, given=outcome.path.given)
+
+
+def _range(outcome: FindResult) -> str:
+    kind = _varied(outcome)
     return f"{kind.text(outcome.values[0])} to {kind.text(outcome.values[-1])}"
 
 
-def _metric_at_value(outcome: Outcome) -> float | None:
+def _metric_at_value(outcome: FindResult) -> float | None:
     if outcome.value is None:
         return None
     return float(outcome.metrics[np.searchsorted(outcome.values, outcome.value)])
 
 
-def _verdict(outcome: Outcome) -> str:
+def _verdict(outcome: FindResult) -> str:
     """Return the value, or where none meets the condition the one that comes nearest."""
     path, condition = outcome.path.path, outcome.condition
-    kind, of_condition = of_path(path, outcome.path.quantity.unit), of_metric(condition.metric)
+    kind, of_condition = _varied(outcome), of_metric(condition.metric)
     wanted, further = ("highest", "higher") if outcome.highest else ("lowest", "lower")
     metric = _metric_at_value(outcome)
     if outcome.value is None or metric is None:
         # The nearest one says whether a wider range could.
-        row = int((np.nanargmin if condition.is_most else np.nanargmax)(outcome.metrics))
+        row = int((np.nanargmin if condition.is_most else np.nanargmax)(outcome.judged))
         return (
             f"no {path} from {_range(outcome)} meets {condition.text}; the nearest is "
-            f"{of_condition.text(outcome.metrics[row])} at {kind.text(outcome.values[row])}"
+            f"{of_condition.text(outcome.judged[row])} at {kind.text(outcome.values[row])}"
         )
     # Beyond it the condition may be met by a loop that does not follow its reference.
     follows = " and follows its reference" if _not_followed(outcome) else ""
@@ -129,12 +142,12 @@ def _verdict(outcome: Outcome) -> str:
     return f"{lead}: {there} (bracketed to {kind.change(abs(outcome.value - outcome.beyond), '.1g')})"
 
 
-def _not_followed(outcome: Outcome) -> int:
+def _not_followed(outcome: FindResult) -> int:
     """Number of values at which the condition is met, but the reference is not followed."""
-    return int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.metrics)))
+    return int(np.count_nonzero(~outcome.follows & outcome.condition.is_kept(outcome.judged)))
 
 
-def _remarks(outcome: Outcome) -> Iterator[str]:
+def _remarks(outcome: FindResult) -> Iterator[str]:
     """Yield what else is to be known: runs, other stretches, noise, oscillation and failures."""
     condition, is_met = outcome.condition, outcome.is_met
     evenly, closer = np.count_nonzero(outcome.is_of_grid), np.count_nonzero(~outcome.is_of_grid)
@@ -167,7 +180,7 @@ def _remarks(outcome: Outcome) -> Iterator[str]:
     if outcome.unsettled:
         yield (
             f"in {outcome.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
-            "that: their rms_error_hold was taken in its place"
+            f"that: their condition is asked of {ONE_INSTANT[condition.metric][0]} too"
         )
     if outcome.oscillating:
         yield f"in {outcome.oscillating} of {outcome.runs} runs the loop oscillates: they count as not met"
@@ -180,14 +193,27 @@ def _remarks(outcome: Outcome) -> Iterator[str]:
         )
 
 
-def _panel(outcome: Outcome) -> Panel:
+def _larger(outcome: FindResult) -> list[Mark]:
+    """Return the RMS error on the hold where that is larger, and what the condition is asked of."""
+    larger = np.where(outcome.judged > outcome.metrics, outcome.judged, np.nan)
+    if not np.isfinite(larger).any():
+        return []
+    crosses = {"linestyle": "", "marker": "x", "markersize": 4}
+    label = metric_words(ONE_INSTANT[outcome.condition.metric][0])
+    return [
+        Mark("line", outcome.values, larger, label=f"{label}, of a loop that oscillates", colour=GREY, style=crosses)
+    ]
+
+
+def _panel(outcome: FindResult) -> Panel:
     """Return the metric over the value, with the limit, where it is met, and the value that was found."""
     values, metrics, is_of_grid = outcome.values, outcome.metrics, outcome.is_of_grid
-    kind = of_path(outcome.path.path, outcome.path.quantity.unit)
+    kind = _varied(outcome)
     dots, dashes = {"linestyle": "", "marker": "o", "markersize": 3}, {"linestyle": "--", "linewidth": 1.0}
     marks = [
         Mark("line", values, metrics),
         Mark("line", values[is_of_grid], metrics[is_of_grid], style=dots),
+        *_larger(outcome),
         Mark("level", (), outcome.condition.limit, label="limit", colour=BLACK, style=dashes),
     ]
     marks += [

@@ -12,9 +12,9 @@ from ppafo.progress import Report
 from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
-from ppafo.studies.draws import Limit, atmosphere_of, check_metrics, level_of, seeds_of_noise
+from ppafo.studies.draws import MetricLimit, atmosphere_of, check_metrics, level_of, seeds_of_noise
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.varying import VariedPath, varied_path
+from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import Runs, Tally, follows, oscillating, settled, with_companions
 from ppafo.units import split_quantity
 
@@ -34,13 +34,14 @@ _RANGE = re.compile(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*")
 _CONDITION = re.compile(r"\s*(\w+)\s*(<=|>=)\s*(.+?)\s*")
 
 
-class Search:
-    """Values tried so far, the metric of each, and its standard deviation over the noise, in order of trial."""
+class FindProgress:
+    """Values tried so far; of each the metric, its judged value, and its standard deviation over the noise."""
 
-    def __init__(self, base: Scenario, path: str, condition: Limit, runs: Runs, seeds: Floats) -> None:
+    def __init__(self, base: Scenario, path: str, condition: MetricLimit, runs: Runs, seeds: Floats) -> None:
         self._base, self._path, self.condition, self.runs, self.seeds = base, path, condition, runs, seeds
         self.values: Floats = np.empty(0)
         self.metrics: Floats = np.empty(0)
+        self.judged: Floats = np.empty(0)
         self.spread: Floats = np.empty(0)
         self.follows: NDArray[np.bool_] = np.empty(0, dtype=np.bool_)
         self.unsettled = 0
@@ -60,9 +61,12 @@ class Search:
         turns = oscillating(rows, self._base)
         self.oscillating += int(np.count_nonzero(turns))
         judged = np.where(turns, np.nan, judged)
-        by_stream = judged.reshape(streams, values.size)
+        by_stream, judged_by_stream = (
+            each.reshape(streams, values.size) for each in (rows[self.condition.metric], judged)
+        )
         self.values = np.concatenate([self.values, values])
         self.metrics = np.concatenate([self.metrics, by_stream.mean(axis=0)])
+        self.judged = np.concatenate([self.judged, judged_by_stream.mean(axis=0)])
         self.spread = np.concatenate([self.spread, by_stream.std(axis=0, ddof=min(1, streams - 1))])
         # A reference that lies beyond reach on purpose is followed by no run.
         on_purpose = self._base.beyond_reach and not changes_reach([self._path])
@@ -72,7 +76,7 @@ class Search:
     @property
     def is_met(self) -> NDArray[np.bool_]:
         """True for each value that meets the condition with a reference that is followed."""
-        return np.asarray(self.condition.is_kept(self.metrics) & self.follows)
+        return np.asarray(self.condition.is_kept(self.judged) & self.follows)
 
     def ends(self, highest: bool) -> tuple[float | None, float | None]:
         """Return the outermost value that meets the condition, and its neighbour on the outer side."""
@@ -104,13 +108,13 @@ def range_of(text: str, base: Scenario) -> SearchedRange:
         # As in '20..90 psi_g': the low end has the unit of the high one unless it says its own.
         unit = split_quantity(parts[3])[1]
         lower = parts[2] if split_quantity(parts[2])[1] else f"{parts[2]} {unit}".rstrip()
-        low, high = path.level(lower), path.level(parts[3])
+        low, high, path = path.level(lower), path.level(parts[3]), given_in(path, [parts[3]])
     if not low < high:
         raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
     return SearchedRange(path, low, high)
 
 
-def condition_of(text: str, base: Scenario, path: str) -> Limit:
+def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
     """Return the condition of a text ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; StudyError for any other text.
 
     The ambient pressure behind a gauge pressure is the scenario's, unless ``path``, which varies, is that pressure.
@@ -124,25 +128,28 @@ def condition_of(text: str, base: Scenario, path: str) -> Limit:
     metric, sign, limit = parts.groups()
     check_metrics([metric], base)
     level = level_of(limit, metric, quoted, atmosphere_of(base, [path]))
-    return Limit(metric, level, sign == "<=", f"{metric} {sign} {limit}")
+    return MetricLimit(metric, level, sign == "<=", f"{metric} {sign} {limit}")
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class FindResult:
     """A finished search; numbers in SI.
 
     ``values`` (values,) ascend, ``metrics`` are the metric at each, nan where the run failed, and ``spread`` its
-    standard deviation over ``noise_streams``. ``is_met`` tells which meet the condition: none that does not follow its
+    standard deviation over ``noise_streams``. ``judged`` is what the condition is asked of: the metric, where the loop
+    oscillates on the hold the larger one of it and of the RMS error there, and nan where it turns all the time.
+    ``is_met`` tells which meet the condition: none that does not follow its
     reference, of which ``follows`` tells. ``value`` is the outermost that meets the condition, None where none does,
     and ``beyond`` its neighbour on the outer side, None at the end of the range.
     """
 
     scenario: str
     path: VariedPath
-    condition: Limit
+    condition: MetricLimit
     highest: bool
     values: Floats
     metrics: Floats
+    judged: Floats
     spread: Floats
     is_of_grid: NDArray[np.bool_]
     is_met: NDArray[np.bool_]
@@ -178,7 +185,7 @@ def outermost(
     grid: int,
     threads: int | None = None,
     progress: Report | None = None,
-) -> Outcome:
+) -> FindResult:
     """Return the search for the outermost value; StudyError for bad input, and where no run has the metric.
 
     ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; ``grid`` values
@@ -192,7 +199,7 @@ def outermost(
     seeds = seeds_of_noise([base], [searched.path.path], 0, _STREAMS, _SEED)
     tally = Tally(grid * max(1, seeds.size), progress)
     runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
-    search = Search(base, searched.path.path, condition, runs, seeds)
+    search = FindProgress(base, searched.path.path, condition, runs, seeds)
     search.run(np.linspace(searched.low, searched.high, grid))
     _check_has_metric(search, base, searched)
     # All parts of a bracket side by side: a bisection would wait for every one of its runs.
@@ -202,13 +209,14 @@ def outermost(
         search.run(np.linspace(value, beyond, _PARTS + 1)[1:-1])
         value, beyond = search.ends(highest)
     order = np.argsort(search.values)
-    return Outcome(
+    return FindResult(
         scenario=base.name,
         path=searched.path,
         condition=condition,
         highest=highest,
         values=search.values[order],
         metrics=search.metrics[order],
+        judged=search.judged[order],
         spread=search.spread[order],
         is_of_grid=order < grid,
         is_met=search.is_met[order],
@@ -224,9 +232,9 @@ def outermost(
     )
 
 
-def _check_has_metric(search: Search, base: Scenario, searched: SearchedRange) -> None:
+def _check_has_metric(search: FindProgress, base: Scenario, searched: SearchedRange) -> None:
     """Refuse a search in which no run has the metric of the condition."""
-    if np.isfinite(search.metrics).any():
+    if np.isfinite(search.judged).any():
         return
     ends = f"from {searched.path.quote(searched.low)} to {searched.path.quote(searched.high)}"
     if search.oscillating:

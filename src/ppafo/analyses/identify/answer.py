@@ -19,10 +19,10 @@ from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure
-from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
-from ppafo.report.residuals import Course, course_panels
+from ppafo.report.residuals import FittedCurve, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
@@ -105,7 +105,7 @@ def trajectory_panels(measurement: Recording, model: Recording) -> list[Panel]:
     for name in (name for name in _CHANNELS if name in measurement):
         kind, look = _CHANNELS[name]
         is_angle = name == "angle"
-        course = Course(
+        course = FittedCurve(
             time=TIME,
             level=kind,
             change=Kind("Residual (measured - model)", quantity="angle" if is_angle else "pressure change"),
@@ -156,7 +156,7 @@ def finding_of(identification: Identification) -> Finding[Identification]:
         kicker="Identification",
         title=f"The parameter set {name}",
         said=(),
-        parts=(*parts, Part(said=(f"new set '{name}': {count}{rest}", *problem)), *_figures(identification)),
+        parts=(*parts, Section(said=(f"new set '{name}': {count}{rest}", *problem)), *_figures(identification)),
         found=identification,
         passed=identification.is_good,
         kind=identification.kind,
@@ -169,10 +169,10 @@ def _toml_bytes(parameter_set: ParameterSet) -> bytes:
     return parameter_set_toml(parameter_set).encode()
 
 
-def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Part:
+def _table(heading: str, estimates: Iterable[Estimate], before: ParameterSet, remarks: Sequence[str]) -> Section:
     """Return a row for each estimate, in the units of the set before, and remarks below them."""
     rows = (estimate_row(estimate, before) for estimate in estimates)
-    return Part(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
+    return Section(heading, columns_of(("",) * 4, rows), remarks=tuple(remarks))
 
 
 _FAR_FROM_SET = 5.0
@@ -199,7 +199,7 @@ def _conflict(sentence: str) -> tuple[str, ...]:
     return (f"holds for this model only: {sentence}",) if sentence else ()
 
 
-def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Part:
+def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Section:
     """Return estimates, each with its sentence, then tolerances that matter, what is left, and candidates."""
     kind, fit = kind_of_fit(outcome.fit), outcome.fit
     origin = "" if kind == "measured" else f" ({kind})"
@@ -284,7 +284,7 @@ def estimate_row(estimate: Estimate, before: ParameterSet) -> tuple[str, ...]:
     return estimate.path, text, f"{low:#.{digits}g} to {high:#.{digits}g}", estimate.verdict
 
 
-def _figures(identification: Identification) -> list[Part]:
+def _figures(identification: Identification) -> list[Section]:
     """Return a figure for each procedure and recording, figure 3 where both of its panels are there."""
     figures = []
     counts: dict[str, int] = {}
@@ -293,17 +293,17 @@ def _figures(identification: Identification) -> list[Part]:
         number = counts[result.procedure]
         name = result.procedure if number == 1 else f"{result.procedure}-{number}"
         draw = partial(bench_figure, result.panels, result.kind)
-        figures.append(Part(name=name, caption=result.summary, is_detail=True, draw=draw))
+        figures.append(Section(name=name, caption=result.summary, is_detail=True, draw=draw))
     fit = None if identification.trajectory is None else identification.trajectory.fit
     for measurement, model in zip(fit.measurements, fit.models, strict=True) if fit else ():
         label = measurement.label
         panels = partial(trajectory_panels, measurement, model)
         name, caption = f"trajectory-fit-{label}", f"{label} and the fit."
-        figures.append(Part(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
+        figures.append(Section(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
     first = {result.procedure: result for result in reversed(identification.results)}
     if {"static-torque", "free-decay"} <= first.keys():
         draw = partial(figure_3, first["static-torque"], first["free-decay"])
-        figures.append(Part(name="figure-3", caption="Like figure 3 of the paper.", is_detail=True, draw=draw))
+        figures.append(Section(name="figure-3", caption="Like figure 3 of the paper.", is_detail=True, draw=draw))
     return figures
 
 

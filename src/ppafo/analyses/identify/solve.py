@@ -11,15 +11,14 @@ from ppafo.identification.new_set import with_estimates
 from ppafo.identification.problem import (
     PROCEDURES,
     ProblemFile,
+    ProcedureContext,
     ProcedureProblem,
-    Setting,
     run_procedure,
     window_of,
 )
-from ppafo.identification.source import Source, Use, double_use, source_of
+from ppafo.identification.source import RecordingSource, Use, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
-from ppafo.identification.trajectory.section import Setting as FitSetting
-from ppafo.identification.trajectory.section import solve_section
+from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import audit
 from ppafo.parameters.loading import list_sets, load_parameter_set
 from ppafo.parameters.overrides import check_valve, read_overrides, with_overrides
@@ -37,7 +36,12 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
     the errors of ``identify``.
     """
     given = _Given(problem, folder, file)
-    before = _base_set(problem, folder)
+    name = problem.device.set
+    beside = folder / name
+    base = load_parameter_set(beside if beside.suffix == ".toml" else name)
+    valve, overrides = problem.device.valve, read_overrides(problem.device.overrides)
+    check_valve(overrides, valve, f"device.valve = '{valve}'")
+    before = with_overrides(base, overrides, valve)
     with shown_in(counted_from(before.shown, atmospheric_pressure(before))):
         valve = chosen_valve(before, problem.device.valve)
         tasks = _tasks(given, before)
@@ -45,14 +49,16 @@ def solve_problem(problem: ProblemFile, folder: Path, file: str, progress: Repor
         tolerances = tolerances_of(problem.bench, file)
         current, results = before, list[BenchResult]()
         for task in tasks:
-            result = run_procedure(task.sources, task.procedure, Setting(current, valve, task.place, tolerances))
+            result = run_procedure(
+                task.sources, task.procedure, ProcedureContext(current, valve, task.place, tolerances)
+            )
             results.append(result)
             # The next procedure leans on what this one found; the new set is made of the old one at the end.
             current = with_estimates(current, result.estimates).parameter_set
         estimates = [estimate for result in results for estimate in result.estimates]
         fitted = None
         if problem.trajectory is not None:
-            setting = FitSetting(
+            setting = SectionContext(
                 read=lambda experiment: given.source(experiment.recording, experiment.columns, current),
                 folder=folder,
                 file=f"{file}: trajectory",
@@ -78,7 +84,7 @@ class _Given:
     folder: Path
     file: str
 
-    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> Source:
+    def source(self, name: str, columns: str | None, parameter_set: ParameterSet) -> RecordingSource:
         """Return the only recording in a file; IdentificationError where a map takes several trials of it."""
         found = self.sources(name, columns, parameter_set)
         if len(found) > 1:
@@ -87,7 +93,7 @@ class _Given:
             )
         return found[0]
 
-    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[Source, ...]:
+    def sources(self, name: str, columns: str | None, parameter_set: ParameterSet) -> tuple[RecordingSource, ...]:
         """Return the recordings in a file that the problem names, read through one of its column maps if it says one.
 
         The set has the atmosphere from which gauge pressures count, and the gas of volume flows.
@@ -110,18 +116,8 @@ class _Task:
     """A procedure with its recordings, and what messages call it."""
 
     procedure: ProcedureProblem
-    sources: tuple[Source, ...]
+    sources: tuple[RecordingSource, ...]
     place: str
-
-
-def _base_set(problem: ProblemFile, folder: Path) -> ParameterSet:
-    """Return the set on which a problem begins, with its overrides: one beside the problem's file, or one by name."""
-    name = problem.device.set
-    beside = folder / name
-    base = load_parameter_set(beside if beside.suffix == ".toml" else name)
-    valve, overrides = problem.device.valve, read_overrides(problem.device.overrides)
-    check_valve(overrides, valve, f"device.valve = '{valve}'")
-    return with_overrides(base, overrides, valve)
 
 
 def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
@@ -147,7 +143,7 @@ def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -
         of_kind: list[Use] = []
         for task in tasks:
             if task.procedure.kind == kind:
-                first, last = window_of(task.procedure, Setting(before, valve, task.place))
+                first, last = window_of(task.procedure, ProcedureContext(before, valve, task.place))
                 of_kind += [
                     Use(
                         by=f"recording {number} of procedure {kind}",
@@ -178,7 +174,12 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
     What others report of another device is left out of a set that has values of this one.
     """
     old, new = identification.new_set.parameter_set, identification.new_set
-    files = recording_files(problem)
+    named = [name for procedure in problem.procedure for name in procedure.recordings]
+    if problem.trajectory is not None:
+        named += [experiment.recording for experiment in problem.trajectory.experiments]
+    paths = dict.fromkeys(map(Path, named))
+    names = [path.name for path in paths]
+    files = ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]
     left_out = len(files) - _FILES_IN_TITLE
     shown = ", ".join(files[:_FILES_IN_TITLE]) + (f" and {left_out} more" if left_out > 0 else "")
     outcome = "identified" if new.written or new.fitted else "no value identified"
@@ -210,13 +211,3 @@ def _named_set(identification: Identification, problem: ProblemFile) -> Paramete
         parent=problem.device.set if problem.device.set in list_sets() else "",
         notes=f"{old.notes.rstrip()}\n{origins}".lstrip(),
     )
-
-
-def recording_files(problem: ProblemFile) -> list[str]:
-    """Return the names of the recordings of a problem, with the folder where two have one name."""
-    named = [name for procedure in problem.procedure for name in procedure.recordings]
-    if problem.trajectory is not None:
-        named += [experiment.recording for experiment in problem.trajectory.experiments]
-    paths = dict.fromkeys(map(Path, named))
-    names = [path.name for path in paths]
-    return ["/".join(path.parts[-2:]) if names.count(path.name) > 1 else path.name for path in paths]

@@ -12,14 +12,13 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.replay import StepInputs, replay
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.engine.scheme.actuators import pressures_of, torque_of
-from ppafo.report.display_units import quantity_of_unit
-from ppafo.report.finding import Column, Finding, Part, columns_of, facts
+from ppafo.report.finding import Column, Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Initial
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +34,7 @@ _LARGEST_COMMAND = 0.7
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Steps:
+class StepResponses:
     """Torque [N m] after steps of the command, less the steady one: (steps, times) on the runs and linear.
 
     ``amplitudes`` (steps,) of the command [-], ``times`` [s] after the step.
@@ -69,7 +68,7 @@ def can_step(model: LinearModel) -> bool:
     return 0.0 < abs(_value_at_point(model, "command")) < _LARGEST_COMMAND
 
 
-def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
+def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> StepResponses:
     """Torque after steps of the command by shares of its steady value [-]; the model is one that ``can_step``."""
     command = _value_at_point(model, "command")
     times: Floats = INTERVAL * np.arange(round(DURATION / INTERVAL) + 1, dtype=np.float64)
@@ -81,7 +80,7 @@ def steps_of(model: LinearModel, shares: tuple[float, ...] = SHARES) -> Steps:
     row = [variable.name for variable in model.outputs].index("torque")
     system = StateSpace(model.a, model.b[:, [column]], model.c[[row]], model.d[[row]][:, [column]])
     linear = amplitudes[:, None] * step(system, T=times)[1]
-    return Steps(amplitudes, times, np.array(runs) - still, linear)
+    return StepResponses(amplitudes, times, np.array(runs) - still, linear)
 
 
 def _value_at_point(model: LinearModel, name: str) -> float:
@@ -132,6 +131,8 @@ _STEPS_CAPTION = (
 def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model in words, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
+    steps, caption = partial(steps_panels, model), _STEPS_CAPTION
+    far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(4.4, 3.4))
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -139,10 +140,10 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
         said=_sentences(model),
         parts=[
             _point(model),
-            Part("Which side was taken", facts(model.sides.items()), remarks=_edges(model)),
+            Section("Which side was taken", facts(model.sides.items()), remarks=_edges(model)),
             _poles(model),
             *_matrices(model),
-            *([_how_far(model)] if can_step(model) else []),
+            *([far] if can_step(model) else []),
         ],
         found=model,
         files={"linearise.npz": partial(_arrays, model)},
@@ -167,7 +168,7 @@ def _sentences(model: LinearModel) -> list[str]:
     return [*sentences, f"not in the model: {left_out}, noise, resolution and bandwidth of sensors"]
 
 
-def _point(model: LinearModel) -> Part:
+def _point(model: LinearModel) -> Section:
     """Return the table of states, inputs and outputs at the point; an output that is a state stands in it once."""
     states = {variable.name for variable in model.states}
     outputs = [variable for variable in model.outputs if variable.name not in states]
@@ -177,7 +178,7 @@ def _point(model: LinearModel) -> Part:
             unit = "" if variable.unit == "1" else variable.unit
             value = Kind("", unit, quantity_of_unit(variable.unit), ".5g").text(variable.value)
             rows.append((role, variable.name, variable.unit, value))
-    return Part("The point", columns_of(("", "name", "unit in the model", "at the point"), rows), left=3)
+    return Section("The point", columns_of(("", "name", "unit in the model", "at the point"), rows), left=3)
 
 
 def _edges(model: LinearModel) -> list[str]:
@@ -193,7 +194,7 @@ def _edges(model: LinearModel) -> list[str]:
     return remarks
 
 
-def _poles(model: LinearModel) -> Part:
+def _poles(model: LinearModel) -> Section:
     """Return the poles with their time constants; a pair of complex ones is a row with its frequency and damping.
 
     The frequency response is drawn where the command changes anything.
@@ -210,7 +211,7 @@ def _poles(model: LinearModel) -> Part:
     ratio = ("damping ratio", Kind(form=".3f"))
     # The command is the first input.
     responds = bool(np.any(model.b[:, 0]) or np.any(model.d[:, 0]))
-    return Part(
+    return Section(
         "Poles",
         columns_of(("pole (1/s)", ("time constant", constant), ("frequency", frequency), ratio), rows),
         panels=partial(frequency_panels, model),
@@ -220,7 +221,7 @@ def _poles(model: LinearModel) -> Part:
     )
 
 
-def _matrices(model: LinearModel) -> list[Part]:
+def _matrices(model: LinearModel) -> list[Section]:
     """Return a table for each matrix; those of the outputs stand on the page alone."""
     parts = []
     for name, values, rows, columns, is_detail in (
@@ -234,20 +235,8 @@ def _matrices(model: LinearModel) -> list[Part]:
             for variable, column in zip(columns, values.T.tolist(), strict=True)
         ]
         table = [Column("", [variable.name for variable in rows]), *numbers]
-        parts.append(Part(f"Matrix {name} (SI)", table, is_detail=is_detail))
+        parts.append(Section(f"Matrix {name} (SI)", table, is_detail=is_detail))
     return parts
-
-
-def _how_far(model: LinearModel) -> Part:
-    """Return the figure of steps on the runs and of the model."""
-    return Part(
-        "How far it holds",
-        panels=partial(steps_panels, model),
-        name="steps",
-        caption=_STEPS_CAPTION,
-        across=2,
-        size=(4.4, 3.4),
-    )
 
 
 def frequency_panels(model: LinearModel) -> list[Panel]:

@@ -19,7 +19,7 @@ _SINGULAR = 1.0e13
 
 
 @dataclass(frozen=True, slots=True)
-class Variable:
+class LinearSignal:
     """A state, input or output: its name, unit in SI, and value at the point."""
 
     name: str
@@ -39,7 +39,7 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True)
-class Delays:
+class OmittedDelays:
     """Delays that the linear model omits [s]: dead time of the valve, age of measurements, sample period."""
 
     command: float
@@ -58,9 +58,9 @@ class LinearModel:
 
     scenario: Scenario
     time: float | None
-    states: tuple[Variable, ...]
-    inputs: tuple[Variable, ...]
-    outputs: tuple[Variable, ...]
+    states: tuple[LinearSignal, ...]
+    inputs: tuple[LinearSignal, ...]
+    outputs: tuple[LinearSignal, ...]
     a: Floats
     b: Floats
     c: Floats
@@ -68,7 +68,7 @@ class LinearModel:
     rates: Floats
     sides: Mapping[str, str]
     edges: tuple[Edge, ...]
-    delays: Delays
+    delays: OmittedDelays
 
     @property
     def is_steady(self) -> bool:
@@ -139,7 +139,7 @@ class LinearModel:
         return control.ss(self.a, self.b, self.c, self.d, name=self.scenario.name.replace("-", "_"), **names)
 
 
-def _index_of(name: str, variables: Sequence[Variable], kind: str) -> int:
+def _index_of(name: str, variables: Sequence[LinearSignal], kind: str) -> int:
     """Index of a variable by its name, whose ``kind`` is a word for the error; ScenarioError where there is none."""
     names = [variable.name for variable in variables]
     if name not in names:

@@ -56,7 +56,7 @@ class PlantValues(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Plant:
+class LinearisedPlant:
     """Plant of a run without its controller and sensors; the shank of a leg is where it is at ``time`` [s].
 
     ``way`` is the direction of a free vane, 0 for one that is held by friction or a stop; None where the ankle is
@@ -108,15 +108,15 @@ DRIVEN = ("supply_pressure", "dorsiflexion_pressure", "external_torque")
 """Numbers of the plant that a linear model has as inputs, by their names in ``PlantParameters``."""
 
 
-def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: float = 0.0) -> Plant:
-    """Return the plant of a run near some values; other arguments as in ``Plant``.
+def plant_of(run: Run, way: float | None, values: Mapping[str, float], time: float = 0.0) -> LinearisedPlant:
+    """Return the plant of a run near some values; other arguments as in ``LinearisedPlant``.
 
     Near a request that has arrived no slew limit is at work: a small command is followed in no time. SimulationError
     for an effect with a state of its own.
     """
     limitless, functions = without_slew_limit(run), functions_in(run)
     has_arrived = valve_at(run, functions, values).state == valve_at(limitless, functions, values).state
-    return Plant(limitless if has_arrived else run, way, time, functions)
+    return LinearisedPlant(limitless if has_arrived else run, way, time, functions)
 
 
 def functions_in(run: Run) -> PythonFunctions:

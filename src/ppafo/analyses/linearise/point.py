@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.analyses.linearise.plant import (
     VALVE,
-    Plant,
+    LinearisedPlant,
     functions_in,
     one_sided_slopes,
     plant_of,
@@ -169,7 +169,7 @@ def _steady(run: Run, held: float | None, values: Mapping[str, float], wanted: f
     return next((steady for steady in reached if steady is not None), None)
 
 
-def _imbalance(plant: Plant, wanted: float | None, values: Mapping[str, float]) -> Floats:
+def _imbalance(plant: LinearisedPlant, wanted: float | None, values: Mapping[str, float]) -> Floats:
     """All rates over the sizes of their states [1/s], and the torque less the one that is wanted [N m]."""
     found = plant.at(values)
     # So that pascals and openings count alike.

@@ -5,11 +5,11 @@ from numbers import Real
 
 import numpy as np
 
-from ppafo.analyses.linearise.model import Delays, Edge, LinearModel, Variable
+from ppafo.analyses.linearise.model import Edge, LinearModel, LinearSignal, OmittedDelays
 from ppafo.analyses.linearise.plant import (
     UNITS,
     VALVE,
-    Plant,
+    LinearisedPlant,
     PlantValues,
     functions_in,
     one_sided_slopes,
@@ -24,7 +24,7 @@ from ppafo.engine.lanes import Floats
 from ppafo.engine.run import Run
 from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.orifice import FlowCurve
-from ppafo.parameters.joint import Joint
+from ppafo.parameters.joint import JointNames
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.units import parse_quantity
@@ -36,7 +36,7 @@ Slopes by differences agree to some 1e-9 where the plant has no kink.
 """
 
 
-def sides_of(run: Run, point: Point, joint: Joint) -> dict[str, str]:
+def sides_of(run: Run, point: Point, joint: JointNames) -> dict[str, str]:
     """Side of each limit that the operating point is on, in words, by component; ``joint`` names what moves."""
     at, plant = point.values, run.plant
     openings = valve_at(run, functions_in(run), at).openings
@@ -128,9 +128,9 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
     return LinearModel(
         scenario=scenario,
         time=point.time,
-        states=tuple(Variable(name, UNITS[name], values[name]) for name in states),
-        inputs=tuple(Variable(name, UNITS[name], values[name]) for name in plant.inputs),
-        outputs=tuple(Variable(name, UNITS[name], here.outputs[name]) for name in outputs),
+        states=tuple(LinearSignal(name, UNITS[name], values[name]) for name in states),
+        inputs=tuple(LinearSignal(name, UNITS[name], values[name]) for name in plant.inputs),
+        outputs=tuple(LinearSignal(name, UNITS[name], here.outputs[name]) for name in outputs),
         a=a,
         b=b,
         c=c,
@@ -138,11 +138,11 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         rates=np.array([here.rates[name] for name in states]),
         sides=sides,
         edges=tuple(Edge(name, side_of(name, values, point.way) > 0.0) for name in kinks),
-        delays=Delays(run.command_delay, run.signal_delay, run.period),
+        delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
     )
 
 
-def _both_slopes(plant: Plant, values: Mapping[str, float], name: str) -> tuple[Floats, Floats, Floats]:
+def _both_slopes(plant: LinearisedPlant, values: Mapping[str, float], name: str) -> tuple[Floats, Floats, Floats]:
     """Slopes (rates and outputs,) by a state or an input on its side of the point, beyond it, and their errors."""
 
     def moved(value: float) -> Floats:

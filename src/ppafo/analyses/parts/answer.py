@@ -54,7 +54,7 @@ def finding_of_catalogue(catalogue: Catalogue) -> Finding[Parts]:
             (part.name, part.title, part.full_mass, ", ".join(part.doubtful) or "-", ", ".join(part.unknown) or "-")
             for part in members.values()
         ]
-        tables.append(finding.Part(group.capitalize(), columns_of(head, rows), left=len(head)))
+        tables.append(finding.Section(group.capitalize(), columns_of(head, rows), left=len(head)))
     return Finding(
         name="parts",
         kicker="Parts",
@@ -81,7 +81,7 @@ def finding_of_part(catalogue: Catalogue, part: Part) -> Finding[Parts]:
         kicker="Parts",
         title=part.title,
         said=[f"{part.name}: {part.title} ({part.group}{kind})", *filter(None, (part.document, part.note))],
-        parts=[finding.Part(columns=columns_of(head, figures), remarks=remarks, left=len(head))],
+        parts=[finding.Section(columns=columns_of(head, figures), remarks=remarks, left=len(head))],
         found=Parts(catalogue, part),
         kind="measured",
     )

@@ -11,12 +11,12 @@ from ppafo.report import finding
 from ppafo.report.finding import facts
 
 
-def part_titles(parts: Iterable[Part]) -> finding.Part:
+def part_titles(parts: Iterable[Part]) -> finding.Section:
     """Return maker and model of parts, each once, for the page."""
-    return finding.Part("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
+    return finding.Section("Parts", facts({part.name: part.title for part in parts}.items()), is_detail=True)
 
 
-def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Part]:
+def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Section]:
     """Return what to check before buying, a row for each part, and for the page the reason of each doubtful figure."""
     pairs = tuple(doubtful)
     if not pairs:
@@ -34,8 +34,8 @@ def parts_to_check(doubtful: Iterable[tuple[Part, str]]) -> list[finding.Part]:
         "quoted from a document that was not itself consulted, or assumed; 'ppafo sets parts PART' gives the reasons"
     )
     return [
-        finding.Part("Check before buying", rows, [meaning]),
-        finding.Part("Why these figures are uncertain", remarks=reasons, is_detail=True),
+        finding.Section("Check before buying", rows, [meaning]),
+        finding.Section("Why these figures are uncertain", remarks=reasons, is_detail=True),
     ]
 
 

@@ -1,7 +1,7 @@
 """The reproduction: every claim with its verdict, figures, recordings, and the one bespoke page."""
 
 import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -28,15 +28,15 @@ from ppafo.analyses.reproduce.claim import (
 from ppafo.analyses.reproduce.drawing import device_figure
 from ppafo.analyses.reproduce.figures import step_response_figure, torque_task_figure
 from ppafo.analyses.reproduce.meaning_of_u import WITHIN_REACH, InterpretationOfU
-from ppafo.analyses.reproduce.publication import ALL, SEED, Study
-from ppafo.analyses.reproduce.step_response import Levels, StepEvents
+from ppafo.analyses.reproduce.publication import ALL, SEED, PublicationClaims
+from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
 from ppafo.identification.bench.result import figure_3
 from ppafo.metrics import Metric
 from ppafo.parameters import load_parameter_set
-from ppafo.parameters.audit import Finding as AuditFinding
+from ppafo.parameters.audit import AuditFinding
 from ppafo.parameters.publications.publication import paper_entries
 from ppafo.report.display_units import metric_level
-from ppafo.report.finding import Cell, Finding, Part, columns_of
+from ppafo.report.finding import Cell, Finding, Section, columns_of
 from ppafo.report.live_parts import live_part
 from ppafo.report.writing import inline_figure, quantity, render_page, sentence
 from ppafo.simulation.simulate import Result
@@ -91,7 +91,7 @@ class Reproduction:
 class Studies:
     """Some publications with their judged claims, and the reproduction of the paper where it is among them."""
 
-    studies: tuple[Study, ...]
+    studies: tuple[PublicationClaims, ...]
     reproduction: Reproduction | None = None
 
     @property
@@ -143,6 +143,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
     """Return the page as HTML; ``drawn`` has SVG files by the names of the figures, which become part of the page."""
     changed = [word for override in reproduction.overrides for word in ("--set", override)]
     runs = (reproduction.solenoid, reproduction.proportional, reproduction.step)
+    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
     values = {
         "paper": load_parameter_set(reproduction.printed_set).citation,
         "nothing_confirmed": NOTHING_CONFIRMED,
@@ -152,7 +153,7 @@ def reproduction_page(reproduction: Reproduction, drawn: Mapping[str, bytes]) ->
         **_synthetic(reproduction.synthetic, drawn.get(IDENTIFICATION_FIGURE)),
         **_task_values(reproduction),
         "versions": ", ".join(f"{name} {version}" for name, version in reproduction.step.versions.items()),
-        "steps": _steps_text(runs),
+        "steps": f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms",
         "device_figure": inline_figure(drawn[DEVICE_FIGURE]),
         "step_figure": inline_figure(drawn[STEP_FIGURE]),
         "torque_figure": inline_figure(drawn[TORQUE_FIGURE]),
@@ -181,6 +182,10 @@ def _claim_values(reproduction: Reproduction) -> dict[str, Any]:
 def _set_values(reproduction: Reproduction) -> dict[str, Any]:
     """Return what the page says of both parameter sets: findings of the printed one, and those that the other keeps."""
     severities = {"error": "contradictions", "warning": "remarks", "note": "notes"}
+    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
+    for value in reproduction.assumed:
+        groups.setdefault(value.used_by, []).append(value)
+    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
     return {
         "printed_set": reproduction.printed_set,
         "completed_set": reproduction.completed_set,
@@ -189,17 +194,8 @@ def _set_values(reproduction: Reproduction) -> dict[str, Any]:
             for severity, name in severities.items()
         },
         "kept": [finding for finding in reproduction.completed_findings if finding.severity != "note"],
-        "assumed_groups": _assumed_groups(reproduction.assumed),
+        "assumed_groups": [(_users(users), values) for users, values in ordered],
     }
-
-
-def _assumed_groups(assumed: Iterable[AssumedValue]) -> list[tuple[str, list[AssumedValue]]]:
-    """Return assumed values by the experiments that use them; what all of them rest on comes first."""
-    groups: dict[tuple[str, ...], list[AssumedValue]] = {}
-    for value in assumed:
-        groups.setdefault(value.used_by, []).append(value)
-    ordered = sorted(groups.items(), key=lambda group: -len(group[0]))
-    return [(_users(users), values) for users, values in ordered]
 
 
 def _task_values(reproduction: Reproduction) -> dict[str, Any]:
@@ -217,12 +213,6 @@ def _task_values(reproduction: Reproduction) -> dict[str, Any]:
         ],
         "ceiling": f"{holding_torque(reproduction.solenoid):.1f}",
     }
-
-
-def _steps_text(runs: Sequence[Result]) -> str:
-    """Return the step of the engine in some runs, or the range of theirs."""
-    steps = sorted({1e3 * float(run.engine["step"]) for run in runs})
-    return f"{steps[0]:g} ms" if len(steps) == 1 else f"{steps[0]:g} to {steps[-1]:g} ms"
 
 
 def holding_torque(result: Result) -> float:
@@ -291,7 +281,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
     """Return the table of studies; a claim of another publication that is not met is a result, no failure."""
     reproduction = solved.reproduction
     rows: list[Sequence[Cell]] = [] if reproduction is None else [(SEED, *row) for row in _paper_rows(reproduction)]
-    details = [] if reproduction is None else [Part(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
+    details = [] if reproduction is None else [Section(f"{SEED}: the paper", said=(_PAPER,), is_detail=True)]
     for study in solved.studies:
         stated_claims: list[Sequence[Cell]] = []
         for claim in study.claims:
@@ -304,7 +294,7 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
             stated_claims.append((entry.id, stated, agrees, "; ".join(entry.assumed) or None, claim.note or None))
         heading, said = f"{study.publication.name}: {study.publication.title}", (study.publication.citation,)
         columns = columns_of(_DETAILS_HEAD, stated_claims)
-        details.append(Part(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
+        details.append(Section(heading, columns, said, left=len(_DETAILS_HEAD), is_detail=True))
     name = solved.studies[0].publication.name
     return Finding(
         name="claims",
@@ -312,12 +302,12 @@ def finding_of_studies(solved: Studies) -> Finding[Studies]:
         title=f"{name}, run again" if reproduction is None else "Published studies, run again",
         said=(),
         parts=(
-            Part(
+            Section(
                 columns=columns_of(_STUDIES_HEAD, rows),
                 remarks=("", count_sentence(solved.verdicts)),
                 left=len(_STUDIES_HEAD),
             ),
-            Part("How to read it", said=(_RULE,), is_detail=True),
+            Section("How to read it", said=(_RULE,), is_detail=True),
             *details,
         ),
         found=solved,
@@ -367,13 +357,13 @@ def finding_of(reproduction: Reproduction) -> Finding[Reproduction]:
         for claim in missed
         if claim.window is not None
     ]
-    claims = Part(
+    claims = Section(
         columns=columns_of(_HEAD, _paper_rows(reproduction)),
         remarks=("", count_sentence([claim.verdict for claim in reproduction.claims]), *remarks),
         left=len(_HEAD),
     )
     head = ("U is", "RMS error less by", "CO2 less by", f"error less by at {WITHIN_REACH:g} N m")
-    of_u = [Part(columns=columns_of(head, _reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
+    of_u = [Section(columns=columns_of(head, _reading_rows(rows)), remarks=("", *result_on_u(rows)))] if rows else []
     runs = (reproduction.step, reproduction.solenoid, reproduction.proportional)
     return Finding(
         name="claims",
@@ -394,10 +384,10 @@ def _page_bytes(reproduction: Reproduction, drawn: Mapping[str, bytes]) -> bytes
     return reproduction_page(reproduction, drawn).encode()
 
 
-def _figures(reproduction: Reproduction) -> list[Part]:
+def _figures(reproduction: Reproduction) -> list[Section]:
     """Return the figures of the page, each drawn where it is wanted."""
     supply = reproduction.step.scenario.device.supply
-    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     stated = {claim.id: claim.paper or 0.0 for claim in reproduction.claims}
     # Without the bench figures 7 and 8 have the simulation alone.
     step, tasks, synthetic = None, None, reproduction.synthetic
@@ -417,4 +407,4 @@ def _figures(reproduction: Reproduction) -> list[Part]:
     }
     if not isinstance(synthetic, NoEvidence):
         drawn[IDENTIFICATION_FIGURE] = partial(figure_3, synthetic.torque, synthetic.decay)
-    return [Part(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]
+    return [Section(name=name, draw=draw, is_detail=True) for name, draw in drawn.items()]

@@ -9,7 +9,7 @@ from functools import cache
 
 from ppafo.errors import DataError, SimulationError
 from ppafo.identification.bench import BenchResult, free_decay, static_torque
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.parameters import load_device, load_parameter_set
 from ppafo.parameters.overrides import read_overrides, with_overrides
 from ppafo.parameters.parameter_set import SOURCE as OVERRIDE
@@ -147,7 +147,7 @@ def bench_figure() -> tuple[BenchResult, BenchResult]:
     # Kept: it takes seconds, and no override reaches it.
     inertia = load_device(PLANTED_SET).foot_plate.inertia
     torque, decay = (
-        Source(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)
+        RecordingSource(record(experiment, BENCH_PRESET, RIG_SEED, PLANTED_SET).recording)
         for experiment in ("static-torque", "free-decay")
     )
     return static_torque((torque,)), free_decay((decay,), inertia=inertia)

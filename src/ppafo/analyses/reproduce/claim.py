@@ -9,7 +9,7 @@ from ppafo.errors import ParameterError
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
 from ppafo.parameters import ParameterSet, load_parameter_set
-from ppafo.parameters.audit.evidence import Evidence, Interval, digits
+from ppafo.parameters.audit.evidence import Evidence, ReportedRange, digits
 from ppafo.parameters.device import Gas
 from ppafo.parameters.parameter_set import Entry
 from ppafo.parameters.publications.publication import paper_entries
@@ -175,7 +175,7 @@ REPORTED_SET = "ppafo2011-printed"
 
 
 @dataclass(frozen=True, slots=True)
-class Reported:
+class ReportedSet:
     """Read access to the reported set; every requested value has to be there."""
 
     parameter_set: ParameterSet
@@ -202,7 +202,7 @@ class Reported:
         """Return a value in the reported unit of a path as it is shown."""
         return quantity(value, self.entry(path).unit or "-", digits)
 
-    def range(self, path: str) -> Interval:
+    def range(self, path: str) -> ReportedRange:
         """Return the range in SI that the reported digits leave open, without sign."""
         return self._known(path, self.evidence.magnitude(path))
 
@@ -216,16 +216,16 @@ class Reported:
         return value
 
 
-def load_reported() -> Reported:
+def load_reported() -> ReportedSet:
     """Return the paper's numbers, exactly as reported."""
     parameter_set = load_parameter_set(REPORTED_SET)
-    return Reported(parameter_set, Evidence(parameter_set, parameter_set.declarations()))
+    return ReportedSet(parameter_set, Evidence(parameter_set, parameter_set.declarations()))
 
 
 _INERTIA = "foot_plate.inertia"
 
 
-def arithmetic_claims(reported: Reported) -> list[Claim]:
+def arithmetic_claims(reported: ReportedSet) -> list[Claim]:
     """Return the claims that the reported numbers alone decide."""
     return [
         _orifice_constants(reported),
@@ -240,7 +240,7 @@ def _verdict(holds: bool) -> Verdict:
     return "consistent" if holds else "inconsistent_as_reported"
 
 
-def _orifice_constants(reported: Reported) -> Claim:
+def _orifice_constants(reported: ReportedSet) -> Claim:
     """Compare C1, C2 and the critical ratio with the gas as reported; equations (6), (7)."""
     gas = reported.gas()
     k, constant, temperature = gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature
@@ -250,7 +250,7 @@ def _orifice_constants(reported: Reported) -> Claim:
         "reported.critical_pressure_ratio": 1.0 / critical_pressure_ratio(k),
     }
     # The reported digits leave a range open; what is computed from the gas does not.
-    holds = all(reported.range(path).meets(Interval(value, value)) for path, value in constants.items())
+    holds = all(reported.range(path).meets(ReportedRange(value, value)) for path, value in constants.items())
     return Claim(
         id="orifice_constants",
         statement="C1, C2 and the critical pressure ratio follow from k, molar mass and temperature of the gas.",
@@ -274,7 +274,7 @@ def _step_percentages() -> Claim:
     ranges = list(STEP_ERRORS.values())
     # Both numbers are rounded: their ranges have to meet.
     holds = all(
-        Interval(*(100.0 * end / full for end in digits(error))).meets(digits(percent))
+        ReportedRange(*(100.0 * end / full for end in digits(error))).meets(digits(percent))
         for error, full, percent in zip(errors, ranges, percents, strict=True)
     )
     percentages = [100.0 * error / full for error, full in zip(errors, ranges, strict=True)]
@@ -297,7 +297,7 @@ _RATES = {
 """Products of the inertia, and what it is multiplied by; a rate in 1/s is one, whatever it is called."""
 
 
-def _damping_and_friction(reported: Reported) -> Claim:
+def _damping_and_friction(reported: ReportedSet) -> Claim:
     """Compare damping and dynamic friction with inertia times the reported rates: one inertia decides both."""
     inertia = reported.range(_INERTIA)
     # The slope of acceleration over velocity is reported with its sign, the damping without.
@@ -321,7 +321,7 @@ def _damping_and_friction(reported: Reported) -> Claim:
     )
 
 
-def _discharge_coefficient(reported: Reported) -> Claim:
+def _discharge_coefficient(reported: ReportedSet) -> Claim:
     """Compare the reported Cd with what the reported flow needs through each reported area; equation (6)."""
     coefficients, passed, held, gas = [], [], [], reported.gas()
     choked = choked_flow_constant(gas.heat_capacity_ratio, gas.specific_gas_constant, gas.temperature)
@@ -333,7 +333,7 @@ def _discharge_coefficient(reported: Reported) -> Claim:
         psi = isentropic_flow_function(min(STANDARD_ATMOSPHERE / pressure, 1.0), gas.heat_capacity_ratio)
         per_area = choked * pressure * psi
         # The product Cd A follows from the flow; each area asks for a coefficient of its own.
-        needed = reported.range(flow).over(reported.range(area)).over(Interval(per_area, per_area))
+        needed = reported.range(flow).over(reported.range(area)).over(ReportedRange(per_area, per_area))
         held.append(needed.meets(reported.range(coefficient)))
         coefficients.append(reported.in_si(flow) / (per_area * reported.in_si(area)))
         passed.append(1e3 * reported.in_si(coefficient) * reported.in_si(area) * per_area)
@@ -359,7 +359,7 @@ def _discharge_coefficient(reported: Reported) -> Claim:
     )
 
 
-def _swept_volume(reported: Reported) -> Claim:
+def _swept_volume(reported: ReportedSet) -> Claim:
     """Compare the displacement per radian with the torque constant, which virtual work makes one number."""
     path, constant = "actuator.displacement_per_radian", "actuator.torque_constant"
     needed = reported.in_si(constant)

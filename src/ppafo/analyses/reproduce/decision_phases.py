@@ -44,21 +44,10 @@ class _Run(NamedTuple):
 def phased_runs(solenoid: Result) -> PhasedRuns:
     """Return the pair's task with its decisions at each phase; its own run alone where the task has no such phase."""
     scenario = solenoid.scenario
-    if _has_phase(scenario):
-        fine = replace(scenario, run=replace(scenario.run, step=_STEP, output_interval=_STEP))
-        runs = [run for tie in (_TIE, -_TIE) for run in _runs_with_first_valve(fine, tie)]
-    else:
-        gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
-        runs = [_Run(solenoid.metrics["rms_error"].value, gas)]
-    return PhasedRuns(np.array([run.error for run in runs]), np.array([run.gas for run in runs]))
-
-
-def _has_phase(scenario: Scenario) -> bool:
-    """True where the task starts in a tie, and a run can be joined from two."""
     # Two runs are joined by their pressures, which are the whole state only of a locked vane at constant temperature
     # without lines; and a tie is only where reference and torque both begin at 0.
     reference, period = scenario.reference, scenario.controller.period
-    return (
+    if (
         scenario.controller.kind == "on_off"
         and isinstance(scenario.motion, PrescribedMotion)
         and scenario.motion.kind == "locked"
@@ -69,7 +58,13 @@ def _has_phase(scenario: Scenario) -> bool:
         and reference.start_level == 0.0
         and reference.ramp_time > period
         and scenario.run.duration > period
-    )
+    ):
+        fine = replace(scenario, run=replace(scenario.run, step=_STEP, output_interval=_STEP))
+        runs = [run for tie in (_TIE, -_TIE) for run in _runs_with_first_valve(fine, tie)]
+    else:
+        gas = GRAMS_PER_KILOGRAM * solenoid.metrics["gas_supplied"].value
+        runs = [_Run(solenoid.metrics["rms_error"].value, gas)]
+    return PhasedRuns(np.array([run.error for run in runs]), np.array([run.gas for run in runs]))
 
 
 def _runs_with_first_valve(scenario: Scenario, tie: float) -> Iterator[_Run]:

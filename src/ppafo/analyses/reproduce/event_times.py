@@ -14,7 +14,7 @@ from ppafo.walking.events import EVENTS, EventErrors, event_errors, known_events
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import plan_walk, task_sequence_of_walk
 from ppafo.walking.result import REMEDY
-from ppafo.walking.task_sequence import Segment, TaskSequence
+from ppafo.walking.task_sequence import TaskSegment, TaskSequence
 from ppafo.walking.walk import lasting
 
 WEARERS = {"healthy": ("wearer.keeps_gait=1",), "impaired": ("wearer.keeps_gait=0",)}
@@ -39,8 +39,8 @@ def uneven_task_sequence(cadence: float) -> TaskSequence:
     generator = np.random.default_rng(SEED)
     paces = cadence / (1.0 + VARIATION * np.clip(generator.standard_normal(UNEVEN_STRIDES), -2.0, 2.0))
     # Each stride is a segment of its own, since a segment has one pace.
-    strides = (Segment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())
-    begin = (Segment("start", {"strides": 1.0}), Segment("walk", {"strides": 6.0}))
+    strides = (TaskSegment("walk", {"cadence": pace, "strides": 1.0}) for pace in paces.tolist())
+    begin = (TaskSegment("start", {"strides": 1.0}), TaskSegment("walk", {"strides": 6.0}))
     return TaskSequence("uneven", "Strides of uneven time.", (*begin, *strides), "uneven")
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.reproduce.step_response import Levels, StepEvents
+from ppafo.analyses.reproduce.step_response import StepEvents, SupplyLevels
 from ppafo.constants import GRAMS_PER_KILOGRAM, PASCALS_PER_PSI
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
@@ -53,7 +53,7 @@ _WORDS: dict[str, Any] = {"fontsize": 8.5, "va": "center"}
 
 
 def step_response_figure(
-    recording: Recording, levels: Levels, events: StepEvents | None, synthetic: Recording | None = None
+    recording: Recording, levels: SupplyLevels, events: StepEvents | None, synthetic: Recording | None = None
 ) -> "Figure":
     """Return figure 7: angle, pressure difference, and both pressures over time; ``events`` are marked where known.
 
@@ -99,7 +99,7 @@ def step_response_figure(
     return draw_panels(panels, 2, (3.65, 1.0), kind=(synthetic or recording).kind)
 
 
-def _curves(recording: Recording, levels: Levels) -> tuple[Floats, ...]:
+def _curves(recording: Recording, levels: SupplyLevels) -> tuple[Floats, ...]:
     """Return what the panels show, in their order and units."""
     first, second = recording["pressure_1"], recording["pressure_2"]
     gauge = ((pressure - levels.atmosphere) / PASCALS_PER_PSI for pressure in (first, second))

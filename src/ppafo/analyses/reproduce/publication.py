@@ -74,7 +74,7 @@ def share_of_healthy_moment(values: Values) -> float:
 def walking_torque(values: Values) -> float:
     """Largest torque [N m] of the mean stride of the walk 'solenoid' at a supply pressure."""
     # As repr, so that the walk has this very number. Nothing is published of a limit of the torque.
-    overrides = (f"supply.pressure={float(values['pressure'])!r} Pa_a", "controller.largest_torque=100 N m")
+    overrides = (f"supply.pressure={float(values['pressure'])!r} SI", "controller.largest_torque=100 N m")
     return float(_walked(PAIR, overrides).averages["torque"].mean.max())
 
 
@@ -258,7 +258,7 @@ class JudgedClaim:
 
 
 @dataclass(frozen=True, slots=True)
-class Study:
+class PublicationClaims:
     """A publication with the judged claims of it."""
 
     publication: Publication
@@ -286,7 +286,7 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
         raise ScenarioError(f"--set {overrides[0]}: goes with the study '{SEED}' only; leave --set or --study out")
 
 
-def run_studies(study: str, report: Report) -> tuple[Study, ...]:
+def run_studies(study: str, report: Report) -> tuple[PublicationClaims, ...]:
     """Return one study, or all but the paper's, with every claim judged; ScenarioError, SimulationError."""
     studies = []
     for name in study_names()[1:-1] if study == ALL else (study,):
@@ -294,7 +294,7 @@ def run_studies(study: str, report: Report) -> tuple[Study, ...]:
         for claim in publication.claims:
             report(Progress(f"{publication.name}: {claim.entry.id}"))
             claims.append(judge(claim))
-        studies.append(Study(publication, tuple(claims)))
+        studies.append(PublicationClaims(publication, tuple(claims)))
     return tuple(studies)
 
 

@@ -21,7 +21,7 @@ from ppafo.analyses.reproduce.claim import (
 )
 from ppafo.analyses.reproduce.decision_phases import PhasedRuns, phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
-from ppafo.analyses.reproduce.step_response import Levels, step_events, step_observations
+from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, ScenarioError, SimulationError, count_of
 from ppafo.parameters import load_parameter_set
@@ -242,7 +242,7 @@ def reproduce_paper(overrides: Sequence[str] = (), report: Report = report_nothi
     completed = load_parameter_set(step.scenario.origin.parameter_set)
     assumed = assumed_values(scenarios)
     events, supply = step_events(step.recording), step.scenario.device.supply
-    levels = Levels(supply.pressure, supply.atmospheric_pressure)
+    levels = SupplyLevels(supply.pressure, supply.atmospheric_pressure)
     step_observed = tuple(step_observations(step.recording, levels, events))
     torque_observed = tuple(torque_task_observations(solenoid, proportional))
     report(Progress(f"simulating {SOLENOID} over the phase of its decisions"))

@@ -42,7 +42,7 @@ class StepEvents:
 
 
 @dataclass(frozen=True, slots=True)
-class Levels:
+class SupplyLevels:
     """Supply and atmosphere [Pa absolute], between which a step response runs."""
 
     supply: float
@@ -78,7 +78,7 @@ def step_events(recording: Recording, resolution: float = RESOLUTION) -> StepEve
     return StepEvents(breakaway, stop, float(recording.time[breakaway]), float(recording.time[stop]))
 
 
-def step_observations(recording: Recording, levels: Levels, events: StepEvents | None) -> list[Observation]:
+def step_observations(recording: Recording, levels: SupplyLevels, events: StepEvents | None) -> list[Observation]:
     """Return each sentence of the text with whether the recording shows it; none holds where the vane does not move."""
     if events is None:
         return [observation(identifier, False, "the vane does not move from rest to rest") for identifier in _SAID]
@@ -91,7 +91,7 @@ class _Step:
     """The values with which the sentences are compared."""
 
     recording: Recording
-    levels: Levels
+    levels: SupplyLevels
     events: StepEvents
 
     def gauge(self, pressure: float) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.analyses.sensitivity.methods import METHODS
 from ppafo.analyses.sensitivity.solve import Influences, OfMetric
-from ppafo.report.finding import Column, Finding, Part
+from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -40,7 +40,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         f"{influences.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
     )
-    figure = Part(
+    figure = Section(
         "Indices and their convergence",
         panels=partial(_panels, influences),
         name="sensitivity",
@@ -64,7 +64,7 @@ def _panels(influences: Influences) -> list[Panel]:
     return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
-def _part(influences: Influences, metric: OfMetric) -> Part:
+def _part(influences: Influences, metric: OfMetric) -> Section:
     """Return a row for each uncertain value, the most important one first, and what these numbers leave open."""
     kind, indices = of_metric(metric.metric, "+.3g"), metric.indices
     order = np.argsort(-indices.values[METHODS[influences.method].shown[0]])
@@ -80,7 +80,7 @@ def _part(influences: Influences, metric: OfMetric) -> Part:
     if metric.dropped_blocks:
         label = METHODS[influences.method].sizes_label
         heading += f"; {metric.dropped_blocks:,} of {influences.settings.samples:,} {label} left out"
-    return Part(heading, columns, remarks=remarks(influences, metric))
+    return Section(heading, columns, remarks=remarks(influences, metric))
 
 
 def overlapping_pairs(influences: Influences, metric: OfMetric) -> list[tuple[str, str]]:

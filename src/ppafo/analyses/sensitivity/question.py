@@ -61,7 +61,7 @@ def sensitivity(
     name_plugins(plugins)
     from ppafo.analyses.sensitivity.answer import finding_of
     from ppafo.analyses.sensitivity.methods import METHODS
-    from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, Settings, analyse
+    from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, SensitivitySettings, analyse
     from ppafo.errors import StudyError, nearest_name
     from ppafo.studies.draws import drawn_in
     from ppafo.study.runs import Runs, Tally
@@ -77,7 +77,7 @@ def sensitivity(
     if not requested:
         raise StudyError(f"study '{chosen.name}' keeps no metrics; name the metric to analyse")
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
-    settings = Settings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
+    settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = Tally(count * by.block_rows(len(used.drawn)), progress)
     runs = Runs(base.scenario, requested, tally, used.gauge, threads)
     with shown_in(base.scenario.device.shown):

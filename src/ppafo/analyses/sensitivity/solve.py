@@ -30,7 +30,7 @@ _SIZES = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class SensitivitySettings:
     """Number of blocks, seed, confidence of the bands, fraction of the runs that may fail."""
 
     samples: int
@@ -86,7 +86,7 @@ class Influences:
 
     study: str
     method: str
-    settings: Settings
+    settings: SensitivitySettings
     paths: list[str]
     runs: int
     failed: int
@@ -98,7 +98,9 @@ _POLICY = "above the maximum fraction refused; below, every block with a failed 
 
 
 @on_one_thread
-def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Settings, study: str = "") -> Influences:
+def analyse(
+    runs: Runs, uncertainty: Uncertainty, method: Method, settings: SensitivitySettings, study: str = ""
+) -> Influences:
     """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures."""
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
@@ -140,7 +142,7 @@ def analyse(runs: Runs, uncertainty: Uncertainty, method: Method, settings: Sett
     )
 
 
-def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, settings: Settings) -> OfMetric:
+def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, settings: SensitivitySettings) -> OfMetric:
     """Return the indices of a metric, whose ``values`` are (rows,), from growing parts of the sample.
 
     StudyError where it is the same in every run, or too few blocks have a value in all their runs.

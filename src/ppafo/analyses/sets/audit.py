@@ -7,10 +7,9 @@ from typing import Any
 
 from ppafo.errors import ParameterError, count_of, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
-from ppafo.parameters.audit import Finding, audit, changed_paths
+from ppafo.parameters.audit import AuditFinding, audit, changed_paths
 from ppafo.parameters.audit.changes import changes
-from ppafo.report.finding import Finding as Report
-from ppafo.report.finding import Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 
 _WIDTH = 100
 _INDENT = "    "
@@ -19,7 +18,7 @@ _SEVERITIES = ("error", "warning", "note")
 
 def audited(
     names: Sequence[str], parent: str | None, is_whole: bool, overrides: Sequence[str]
-) -> Report[dict[str, Any]]:
+) -> Finding[dict[str, Any]]:
     """Return changes and findings of one set, or a table of several; it has not passed where one is an error.
 
     Where ``is_whole`` is false, findings that concern no changed value of a set with a parent or overrides are counted.
@@ -36,7 +35,7 @@ def audited(
             parts.insert(0, _changes_part(sets[0].name, parents[0].name, documents[0]["changes"]))
     else:
         parts = [_table(sets, findings)]
-    return Report(
+    return Finding(
         name=f"audit-{sets[0].name}" if len(sets) == 1 else "audit",
         kicker="Audit",
         title=", ".join(parameter_set.name for parameter_set in sets),
@@ -59,7 +58,7 @@ def _parent(parameter_set: ParameterSet, parent: str | None) -> ParameterSet | N
 
 
 def _document(
-    parameter_set: ParameterSet, parent: ParameterSet | None, findings: list[Finding], overrides: Sequence[str]
+    parameter_set: ParameterSet, parent: ParameterSet | None, findings: list[AuditFinding], overrides: Sequence[str]
 ) -> dict[str, Any]:
     return {
         "set": parameter_set.name,
@@ -71,29 +70,29 @@ def _document(
     }
 
 
-def _counts(findings: list[Finding]) -> dict[str, int]:
+def _counts(findings: list[AuditFinding]) -> dict[str, int]:
     return {severity: sum(finding.severity == severity for finding in findings) for severity in _SEVERITIES}
 
 
-def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Part:
+def _changes_part(name: str, parent: str, changed: list[dict[str, Any]]) -> Section:
     """Return what a set changes of its parent."""
     rows = [(change["path"], change["before"] or None, change["after"] or None, change["origin"]) for change in changed]
     changes = count_of(len(rows), "value") if rows else "nothing"
     said = f"{name} changes {changes} of its parent {parent}"
-    return Part(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
+    return Section(said=[said], columns=columns_of(("value", parent, name, "origin"), rows), left=4)
 
 
-def _table(sets: list[ParameterSet], findings: list[list[Finding]]) -> Part:
+def _table(sets: list[ParameterSet], findings: list[list[AuditFinding]]) -> Section:
     """Return a row for each finding and a column for each set, with how serious it is there."""
     verdicts = [
         {finding.id: "accepted" if finding.accepted else finding.severity for finding in of_set} for of_set in findings
     ]
     head = ["finding", *(parameter_set.name for parameter_set in sets)]
     ids = dict.fromkeys(name for verdict in verdicts for name in verdict)
-    return Part(columns=columns_of(head, ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)))
+    return Section(columns=columns_of(head, ([name, *(verdict.get(name) for verdict in verdicts)] for name in ids)))
 
 
-def _parts(parameter_set: ParameterSet, findings: list[Finding], changed: frozenset[str] | None) -> list[Part]:
+def _parts(parameter_set: ParameterSet, findings: list[AuditFinding], changed: frozenset[str] | None) -> list[Section]:
     """Return the errors and what concerns a ``changed`` value, all findings for None, then how many there are."""
     shown = [
         finding
@@ -108,10 +107,10 @@ def _parts(parameter_set: ParameterSet, findings: list[Finding], changed: frozen
     if left:
         concern = "concerns" if left == 1 else "concern"
         summary += f"; {left} of them {concern} no changed value: --all"
-    return [*(Part(said=_lines(finding)) for finding in shown), Part(said=[f"{parameter_set.name}: {summary}"])]
+    return [*(Section(said=_lines(finding)) for finding in shown), Section(said=[f"{parameter_set.name}: {summary}"])]
 
 
-def _lines(finding: Finding) -> list[str]:
+def _lines(finding: AuditFinding) -> list[str]:
     lines = [f"{finding.severity}: {finding.title} [{finding.id}]"]
     for value in finding.values:
         text = value.value if isinstance(value.value, str) else f"{value.value:.6g}"

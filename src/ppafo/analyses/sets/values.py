@@ -6,7 +6,7 @@ from typing import Any
 
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.parameter_set import with_followers
-from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 
 _WIDTH = 110
 _SECTIONS = ("gas", "actuator", "friction", "foot_plate", "supply", "flow", "effects", "valves", "reported")
@@ -61,12 +61,12 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
         title=document["title"],
         said=[f"{document['name']}: {document['title']}", *_wrapped(notes)],
         parts=[
-            Part(said=_wrapped(cited)),
-            Part(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
-            Part(
+            Section(said=_wrapped(cited)),
+            Section(said=[f"valves: {valves}; default {document['default_valve']}; actuator: {document['actuator']}"]),
+            Section(
                 said=[f"joint: {joint['name']}, whose angle grows in {joint['positive']}, falls in {joint['negative']}"]
             ),
-            Part(
+            Section(
                 columns=columns_of(_COLUMNS, rows),
                 remarks=[
                     text
@@ -76,7 +76,7 @@ def shown_values(parameter_set: ParameterSet) -> Finding[dict[str, Any]]:
                 ],
                 left=len(_COLUMNS),
             ),
-            *(Part(said=_wrapped(f"accepted: {name}: {why}")) for name, why in document["accepted"].items()),
+            *(Section(said=_wrapped(f"accepted: {name}: {why}")) for name, why in document["accepted"].items()),
         ],
         found=document,
         kind="measured",

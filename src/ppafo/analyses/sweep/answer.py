@@ -12,8 +12,8 @@ from ppafo.analyses.sweep.results import SUMMARY, StudyResults, metric_kind
 from ppafo.arguments import checked
 from ppafo.documents.models import validate
 from ppafo.errors import DataError
-from ppafo.report.finding import Finding, Part, columns_of, facts, files_of
-from ppafo.storage.places import Place, place_at, read_document
+from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
+from ppafo.storage.places import place_at, read_document
 from ppafo.study.manifest import MANIFEST, read_manifest
 from ppafo.units.shown import in_units
 
@@ -29,13 +29,13 @@ def _fraction(text: str) -> str:
     return text
 
 
-class _Table(BaseModel):
+class _OpenTable(BaseModel):
     """A table of which more may be written than is read."""
 
     model_config = ConfigDict(strict=True)
 
 
-class _Described(_Table):
+class _Described(_OpenTable):
     """A metric over the runs of a configuration: ``count`` of them have it."""
 
     count: _Count
@@ -50,7 +50,7 @@ class _Described(_Table):
         return self
 
 
-class _Failure(_Table):
+class _Failure(_OpenTable):
     """A run without metrics, and why."""
 
     run: _Count
@@ -58,7 +58,7 @@ class _Failure(_Table):
     reason: str
 
 
-class _Summary(_Table):
+class _Summary(_OpenTable):
     """Guaranteed fields of a study summary."""
 
     completed: _Count
@@ -70,25 +70,6 @@ class _Summary(_Table):
     failures: list[_Failure]
     quantile_definition: str
     configurations: dict[str, dict[str, _Described]]
-
-
-def read_summary(location: Place, document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the summary of the study with this ``study.json``; DataError where it is not finished, or damaged."""
-    try:
-        summary: dict[str, Any] = read_document(location, SUMMARY)
-    except (OSError, ValueError) as error:
-        raise DataError(
-            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
-        ) from error
-    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
-    described = validate(_Summary, summary, whose, DataError)
-    names = {configuration["name"] for configuration in document["study"]["configurations"]}
-    # A configuration or a metric in one of the two documents alone would be looked up in vain.
-    has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
-    metrics = document["metrics"].keys()
-    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
-        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
-    return summary
 
 
 @in_units(lambda results: results.document.get("shown", {}))
@@ -106,6 +87,10 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         ("summary", SUMMARY),
         ("study", f"study.json, sha256 {document['sha256'][:16]}"),
     )
+    rows = []
+    for number in document["study"].get("vary", ()):
+        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
+        rows.append((number["path"], number["kind"], ", ".join(keys)))
     return Finding(
         name="sweep",
         kicker="Study",
@@ -114,11 +99,11 @@ def finding_of(results: StudyResults) -> Finding[StudyResults]:
         parts=(
             figure_of(results, [described] if described else [], failures),
             *(_metrics(results, name, metrics) for name, metrics in results.metrics.items()),
-            Part("How to read it", said=[quantile], is_detail=True),
-            _varied(document["study"]),
-            Part(said=_sampling(document["study"]), is_detail=True),
+            Section("How to read it", said=[quantile], is_detail=True),
+            Section("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True),
+            Section(said=_sampling(document["study"]), is_detail=True),
             _assumed(document["scenarios"]),
-            Part("Files", facts(files), is_detail=True),
+            Section("Files", facts(files), is_detail=True),
         ),
         found=results,
         passed=summary["completed"] > 0,
@@ -145,15 +130,6 @@ def _useless_runs(results: StudyResults) -> list[str]:
     ]
 
 
-def _varied(study: Mapping[str, Any]) -> Part:
-    """Return a row for each number that a study varies: its path, how, and the keys of that."""
-    rows = []
-    for number in study.get("vary", ()):
-        keys = [f"{key.replace('_', ' ')} {value}" for key, value in number.items() if key not in ("path", "kind")]
-        rows.append((number["path"], number["kind"], ", ".join(keys)))
-    return Part("What varied" if rows else "", columns_of(("path", "kind", ""), rows), left=3, is_detail=True)
-
-
 def _sampling(study: Mapping[str, Any]) -> list[str]:
     """Return the correlations of what a study draws, and how it draws them."""
     sentences = [
@@ -167,13 +143,13 @@ def _sampling(study: Mapping[str, Any]) -> list[str]:
     return sentences
 
 
-def _assumed(scenarios: Mapping[str, Any]) -> Part:
+def _assumed(scenarios: Mapping[str, Any]) -> Section:
     """Return what the base scenarios assume, once where several assume the same."""
     names: dict[tuple[str, str, str], list[str]] = {}
     for name, scenario in scenarios.items():
         for number in scenario["assumptions"]:
             names.setdefault((number["path"], number["value"], number["note"]), []).append(name)
-    return Part(
+    return Section(
         "What the base scenarios assume" if names else "",
         columns_of(
             ("value", "", "why", "in"), [(*assumption, ", ".join(having)) for assumption, having in names.items()]
@@ -183,7 +159,7 @@ def _assumed(scenarios: Mapping[str, Any]) -> Part:
     )
 
 
-def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Part:
+def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str, Any]]) -> Section:
     """Return the table of the metrics of a configuration: how many runs have each, mean, deviation and quantiles."""
     described = [
         description for own in results.metrics.values() for description in own.values() if description["count"]
@@ -199,7 +175,7 @@ def _metrics(results: StudyResults, name: str, metrics: Mapping[str, Mapping[str
             cells += [kind.number(description["mean"]), deviation, *map(kind.number, description["quantiles"].values())]
         rows.append([*cells, *[""] * (len(head) - len(cells))])
     completed = f"{name}: {results.summary['completed_by_configuration'][name]:,} runs completed"
-    return Part(columns=columns_of(head, rows), said=[completed], left=2)
+    return Section(columns=columns_of(head, rows), said=[completed], left=2)
 
 
 def write_report(results: StudyResults) -> None:
@@ -224,4 +200,18 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     """
     location = place_at(folder)
     document = read_manifest(location)
-    return finding_of(StudyResults(location, document, read_summary(location, document)))
+    try:
+        summary: dict[str, Any] = read_document(location, SUMMARY)
+    except (OSError, ValueError) as error:
+        raise DataError(
+            f"{location.address}: the study is not finished (no complete {SUMMARY}); run it again to resume"
+        ) from error
+    whose = f"{location.address}: {SUMMARY} is damaged; run the study again into this folder"
+    described = validate(_Summary, summary, whose, DataError)
+    names = {configuration["name"] for configuration in document["study"]["configurations"]}
+    # A configuration or a metric in one of the two documents alone would be looked up in vain.
+    has_same_names = names == described.configurations.keys() == described.completed_by_configuration.keys()
+    metrics = document["metrics"].keys()
+    if not has_same_names or any(own.keys() != metrics for own in described.configurations.values()):
+        raise DataError(f"{whose}: its configurations and metrics differ from {MANIFEST}")
+    return finding_of(StudyResults(location, document, summary))

@@ -12,7 +12,7 @@ from uuid import uuid4
 from ppafo.errors import StudyError, one_line, reason
 from ppafo.storage.places import place_at
 from ppafo.study.blocks import chunk_count
-from ppafo.study.store import Finished, Task, note_file, work_on_chunk
+from ppafo.study.store import ChunkTask, Finished, note_file, work_on_chunk
 
 _TASKS_PER_THREAD = 3
 """Tasks that wait at the scheduler for every thread of the workers: enough to keep them busy, few for 10^9 runs."""
@@ -39,7 +39,9 @@ def check_scheduler(address: str) -> None:
         raise _unreachable(address, error) from error
 
 
-def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
+def compute_on_cluster(
+    address: str, task: ChunkTask, numbers: Iterable[int], finish: Callable[[Finished], None]
+) -> None:
     """Compute the chunks of these numbers on the workers of the scheduler at an address; ``finish`` hears of each one.
 
     They finish in any order. A chunk whose worker dies is given to another one by the scheduler. StudyError where the
@@ -65,7 +67,7 @@ def compute_on_cluster(address: str, task: Task, numbers: Iterable[int], finish:
 
 
 def _compute(
-    client: Any, distributed: Any, task: Task, numbers: Iterable[int], finish: Callable[[Finished], None]
+    client: Any, distributed: Any, task: ChunkTask, numbers: Iterable[int], finish: Callable[[Finished], None]
 ) -> None:
     """Keep some chunks waiting at the scheduler, one more for each that is finished, until all are.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.analyses.sweep.results import StudyResults, metric_kind
-from ppafo.report.finding import Part
+from ppafo.report.finding import Section
 from ppafo.report.kind import TIME, Kind, of_channel, of_path
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -80,14 +80,14 @@ class _Content:
         return 2 if count == 4 else min(_COLUMNS, max(1, count))
 
 
-def _content_of(results: StudyResults) -> _Content:
-    """Return what the figure of a study shows."""
+def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Section:
+    """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
     study, all_metrics = results.document["study"], list(results.document["metrics"])
     # A metric that no run has would be a hole in the figure, unless no metric has a value.
     with_values = [
         metric for metric in all_metrics if any(described[metric]["count"] for described in results.metrics.values())
     ]
-    return _Content(
+    content = _Content(
         metrics=(with_values or all_metrics)[:MOST_METRICS],
         bands=list(study["outputs"].get("bands", ())),
         # As many as colours that can be told apart.
@@ -95,15 +95,10 @@ def _content_of(results: StudyResults) -> _Content:
         varied=[path for path in results.varied if path != NOISE],
         grid=[number["path"] for number in study.get("vary", ()) if number["kind"] in _GRIDDED],
     )
-
-
-def figure_of(results: StudyResults, said: Sequence[str], remarks: Sequence[str]) -> Part:
-    """Return maps for a grid of two axes, points for two values that are drawn, else a panel a metric; and bands."""
-    content = _content_of(results)
     title = f"{results.name}, {results.summary['completed']:,} runs"
     if not content.is_mapped and len(content.varied) > 1:
         title += f" over {len(content.varied)} values: {_listed(content.varied)}"
-    return Part(
+    return Section(
         said=said,
         remarks=remarks,
         panels=partial(_panels, results, content),

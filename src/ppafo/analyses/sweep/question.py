@@ -11,7 +11,7 @@ from ppafo.progress import Report
 
 if TYPE_CHECKING:
     from ppafo.analyses.sweep.results import StudyResults
-    from ppafo.analyses.sweep.stopping import Estimate
+    from ppafo.analyses.sweep.stopping import StatisticEstimate
     from ppafo.report.finding import Finding
     from ppafo.studies.study import Study
 
@@ -43,7 +43,7 @@ def sweep_into_folder(
     confidence: Fraction | None = None,
     maximum_failed: Fraction | None = None,
     progress: Report | None = None,
-) -> Finding[StudyResults] | Finding[Estimate]:
+) -> Finding[StudyResults] | Finding[StatisticEstimate]:
     """Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.
 
     study: name of a study, or a .toml file
@@ -128,7 +128,7 @@ def _rows_into_folder(
     return swept
 
 
-def _statistic_into_folder(study: Study, folder: Path, **asked: Any) -> Finding[Estimate]:
+def _statistic_into_folder(study: Study, folder: Path, **asked: Any) -> Finding[StatisticEstimate]:
     """Estimate a statistic and write it into a folder that is absent, empty or of another study; see ``estimate``."""
     from dataclasses import replace
 

@@ -46,9 +46,9 @@ from ppafo.study.store import (
     FOLLOWS,
     OSCILLATES,
     STATUSES,
+    ChunkTask,
     Finished,
-    Store,
-    Task,
+    StudyStore,
     compute_chunk,
     note_file,
     stored_unit,
@@ -250,8 +250,8 @@ def sweep(
         check_scheduler(scheduler)
     kept = temporary_folder("ppafo-study") if out is None else None
     location = place_at(kept.name if kept is not None else str(out))
-    store = Store.claim(chosen, location, agreed, threads)
-    _work(Task(chosen, location.address, threads), store, scheduler, progress)
+    store = StudyStore.claim(chosen, location, agreed, threads)
+    _work(ChunkTask(chosen, location.address, threads), store, scheduler, progress)
     results = StudyResults(location, read_manifest(location), {}, kept)
     summary = _summary(chosen, results)
     if chosen.outputs.bands:
@@ -273,7 +273,7 @@ def studies_of_the_package() -> list[dict[str, Any]]:
     return [{"name": study.name, "runs": study.runs, "description": study.description} for study in studies]
 
 
-def _work(task: Task, store: Store, scheduler: str | None, progress: Report | None) -> None:
+def _work(task: ChunkTask, store: StudyStore, scheduler: str | None, progress: Report | None) -> None:
     """Compute the chunks that are missing, and add a line on this session to the log."""
     study, location, started = store.study, store.place, time.monotonic()
     known = store.finished()
@@ -319,7 +319,9 @@ def _work(task: Task, store: Store, scheduler: str | None, progress: Report | No
     location.write(LOG, before + f"{json.dumps(line)}\n".encode())
 
 
-def _compute_here(task: Task, store: Store, numbers: Iterable[int], finish: Callable[[Finished], None]) -> None:
+def _compute_here(
+    task: ChunkTask, store: StudyStore, numbers: Iterable[int], finish: Callable[[Finished], None]
+) -> None:
     """Compute chunks one after the other; while one is written, the next one is computed."""
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
         writing: Future[Finished] | None = None

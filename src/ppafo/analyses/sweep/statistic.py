@@ -12,7 +12,7 @@ import numpy as np
 
 from ppafo.analyses.sweep.statistic_answer import finding_of, kind_of, remarks_on
 from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic, parse_statistic
-from ppafo.analyses.sweep.stopping import Estimate, Look, OfMean, StoppingRule, stopping_rule
+from ppafo.analyses.sweep.stopping import InterimEstimate, OfMean, StatisticEstimate, StoppingRule, stopping_rule
 from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import plain
 from ppafo.plugins import Plugins, name_plugins
@@ -53,7 +53,7 @@ def estimate(
     threads: Threads | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
-) -> Finding[Estimate]:
+) -> Finding[StatisticEstimate]:
     """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
 
     ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a fraction of its value
@@ -91,7 +91,7 @@ def draw_until(
     rule: StoppingRule,
     seed: int,
     also: Sequence[str] = (),
-) -> Finding[Estimate]:
+) -> Finding[StatisticEstimate]:
     """Draw from one stream until the rule is met or there are no more looks.
 
     A narrow interval from few draws is not trusted: drawing continues. For a mean it continues until an event of one
@@ -101,7 +101,7 @@ def draw_until(
     Runs that fail have no value: up to the fraction that the rule allows they are left out and counted, above it
     StudyError.
     """
-    looks: list[Look] = []
+    looks: list[InterimEstimate] = []
     first_drawn: Columns = {}
     is_met = False
     for size in rule.sizes:
@@ -124,7 +124,7 @@ def draw_until(
     if uncertainty.has_noise:
         noise = noise_interval(rows[metric], runs.run(with_new_noise(first_drawn))[metric], rule.confidence)
     values = rows[metric][np.isfinite(rows[metric])]
-    estimated = Estimate(
+    estimated = StatisticEstimate(
         metric=metric,
         statistic=statistic.label,
         unit=statistic.unit,
@@ -143,12 +143,12 @@ def draw_until(
     return finding_of(estimated, statistic, rule)
 
 
-def _look(values: Floats, statistic: Statistic, rule: StoppingRule) -> Look:
+def _look(values: Floats, statistic: Statistic, rule: StoppingRule) -> InterimEstimate:
     """Return what is seen of the values (draws,) of a metric [SI], nan where there is none."""
     missing = int(np.count_nonzero(~np.isfinite(values)))
     interval = statistic.estimate(values, rule.confidence_of_look)
     unseen = statistic.unseen(values, rule.confidence)
-    return Look(values.size, missing, interval, statistic.effective_size(values), unseen)
+    return InterimEstimate(values.size, missing, interval, statistic.effective_size(values), unseen)
 
 
 def _mean_of_further(values: Floats, rule: StoppingRule) -> OfMean:

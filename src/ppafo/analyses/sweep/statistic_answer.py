@@ -6,9 +6,9 @@ from functools import partial
 import numpy as np
 
 from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, FURTHEST_UNSEEN, Statistic
-from ppafo.analyses.sweep.stopping import Estimate, Look, StoppingRule
-from ppafo.report.finding import Finding, Part, columns_of
-from ppafo.report.kind import Interval, Kind, of_metric
+from ppafo.analyses.sweep.stopping import InterimEstimate, StatisticEstimate, StoppingRule
+from ppafo.report.finding import Finding, Section, columns_of
+from ppafo.report.kind import ConfidenceInterval, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.style import GREY, VERMILION
 from ppafo.studies.distributions import Floats, fraction_text
@@ -27,7 +27,9 @@ def kind_of(metric: str, statistic: Statistic) -> Kind:
     return Kind("Probability", form=".5g") if statistic.unit == "-" else of_metric(metric, ".5g")
 
 
-def remarks_on(last: Look, values: Floats, statistic: Statistic, kind: Kind, noise: Interval | None) -> list[str]:
+def remarks_on(
+    last: InterimEstimate, values: Floats, statistic: Statistic, kind: Kind, noise: ConfidenceInterval | None
+) -> list[str]:
     """Return what the number must not be read without: draws that decide alone, and noise."""
     said = []
     are_equal = values.size > 0 and float(np.ptp(values)) == 0.0
@@ -60,7 +62,7 @@ def remarks_on(last: Look, values: Floats, statistic: Statistic, kind: Kind, noi
     return said
 
 
-def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) -> Finding[Estimate]:
+def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: StoppingRule) -> Finding[StatisticEstimate]:
     """Return an estimate in words, its looks as a table, the trace and the histogram of the values."""
     kind, of_values, looks = kind_of(estimated.metric, statistic), of_metric(estimated.metric), estimated.looks
     unit = kind.shown_unit if kind.quantity else ""
@@ -84,7 +86,7 @@ def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) ->
         (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
         for name, mean in estimated.also.items()
     ]
-    also = Part(
+    also = Section(
         "Further metrics",
         columns_of(("mean over the same draws", "with a value", *_ENDS), further),
         said=[f"Each with {100.0 * rule.confidence_of_look:.4g} % confidence, of the draws that have a value."],
@@ -98,7 +100,7 @@ def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) ->
         said=(verdict, *estimated.remarks),
         parts=(
             *([also] if further else []),
-            Part(
+            Section(
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
@@ -114,7 +116,7 @@ def finding_of(estimated: Estimate, statistic: Statistic, rule: StoppingRule) ->
     )
 
 
-def _row_of(look: Look, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
+def _row_of(look: InterimEstimate, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
     """Return a look as texts: draws, those without a value, estimate and interval, its width, and what it lacks."""
     interval = look.interval
     met = ["narrow enough"] if rule.is_narrow(look) else []
@@ -125,12 +127,14 @@ def _row_of(look: Look, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
     return (f"{look.draws:,}", f"{look.missing:,}", *ends, width, ", but ".join(met))
 
 
-def _panels(estimated: Estimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind) -> list[Panel]:
+def _panels(
+    estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind
+) -> list[Panel]:
     """Return the looks one after the other, and the values of all draws."""
     return [_trace(estimated, kind, rule), _histogram(estimated, statistic, of_values)]
 
 
-def _trace(estimated: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
+def _trace(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule) -> Panel:
     """Return estimate and interval at each look, and the target width."""
     draws = np.array([look.draws for look in estimated.looks])
     values = np.array([(look.interval.value, look.interval.low, look.interval.high) for look in estimated.looks]).T
@@ -145,7 +149,7 @@ def _trace(estimated: Estimate, kind: Kind, rule: StoppingRule) -> Panel:
     return Panel(Kind("Draws"), kind, marks, label, then=lambda axes: axes.set_xscale("log", base=2))
 
 
-def _histogram(estimated: Estimate, statistic: Statistic, kind: Kind) -> Panel:
+def _histogram(estimated: StatisticEstimate, statistic: Statistic, kind: Kind) -> Panel:
     """Return the values of all draws, and the estimate or the value that a probability is about."""
     bins = min(_MAXIMUM_BINS, max(10, int(np.sqrt(estimated.values.size))))
     counts, edges = np.histogram(estimated.values, bins)

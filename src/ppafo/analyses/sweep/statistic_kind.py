@@ -15,7 +15,7 @@ import numpy as np
 
 from ppafo.errors import StudyError
 from ppafo.metrics import METRICS
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.studies.distributions import (
     Floats,
     effective_sample_size,
@@ -45,7 +45,7 @@ class Statistic:
 
     label: str
     unit: str
-    estimate: Callable[[Floats, float], Interval] = field(compare=False)
+    estimate: Callable[[Floats, float], ConfidenceInterval] = field(compare=False)
     is_of_replicates: bool = False
     threshold: float | None = None
 
@@ -88,17 +88,17 @@ def quantile_of(unit: str, fraction: float) -> Statistic:
     return Statistic(f"quantile {fraction:g}", unit, partial(_quantile, fraction))
 
 
-def _mean_interval(values: Floats, level: float) -> Interval:
+def _mean_interval(values: Floats, level: float) -> ConfidenceInterval:
     """Return the mean of replicates and its interval at a level of confidence."""
     return floored_interval(values, REPLICATES, level)
 
 
-def _quantile(fraction: float, values: Floats, level: float) -> Interval:
+def _quantile(fraction: float, values: Floats, level: float) -> ConfidenceInterval:
     """Return the value below which a fraction lies, and its interval at a level of confidence."""
     return quantile_interval(values[np.isfinite(values)], fraction, level)
 
 
-def _probability(threshold: float, is_above: bool, values: Floats, level: float) -> Interval:
+def _probability(threshold: float, is_above: bool, values: Floats, level: float) -> ConfidenceInterval:
     """Return the fraction of values that are beyond a threshold, and its interval at a level of confidence."""
     # Strictly beyond: a metric that counts may be exactly at the threshold in many runs.
     known = values[np.isfinite(values)]

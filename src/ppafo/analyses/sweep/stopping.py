@@ -12,7 +12,7 @@ from typing import Any
 from ppafo.analyses.sweep.statistic_kind import Statistic
 from ppafo.documents.json_text import plain
 from ppafo.errors import StudyError, UnitError, refused_as
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.studies.distributions import Floats, is_carried
 from ppafo.studies.draws import CONFIDENCE, FEWEST_DRAWS, MAXIMUM_DRAWS, check_fraction, difference_of
 from ppafo.units import number_text, parse_quantity
@@ -60,7 +60,7 @@ class StoppingRule:
         """Confidence of each single look, so that all of them together keep ``confidence``."""
         return 1.0 - (1.0 - self.confidence) / len(self.sizes)
 
-    def is_narrow(self, look: "Look") -> bool:
+    def is_narrow(self, look: "InterimEstimate") -> bool:
         """Tell whether an interval is narrow enough, with what values that were not drawn would add to it."""
         allowed = self.width * (abs(look.interval.value) if self.is_relative else 1.0)
         return look.interval.width + look.unseen <= allowed
@@ -81,7 +81,7 @@ def stopping_rule(statistic: Statistic, metric: str, width: str, like: StoppingR
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class InterimEstimate:
     """Interim estimate: number of draws, number without a value, and the interval [SI].
 
     ``effective_size`` is how many of them determine the estimate: fewer than there are where a few large values decide.
@@ -90,7 +90,7 @@ class Look:
 
     draws: int
     missing: int
-    interval: Interval
+    interval: ConfidenceInterval
     effective_size: float
     unseen: float = 0.0
 
@@ -111,7 +111,7 @@ class OfMean:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class StatisticEstimate:
     """A statistic of a metric, with its interval [SI] and the looks one after the other.
 
     ``is_met`` is true where the last interval is narrow enough and can be believed. ``share_of_noise`` is the fraction
@@ -124,13 +124,13 @@ class Estimate:
     is_met: bool
     draws: int
     failed: int
-    interval: Interval
+    interval: ConfidenceInterval
     remarks: list[str]
     also: dict[str, OfMean]
-    share_of_noise: Interval | None
+    share_of_noise: ConfidenceInterval | None
     seed: int
     rule: dict[str, float | str]
-    looks: list[Look]
+    looks: list[InterimEstimate]
     values: Floats = field(compare=False, repr=False)
     folder: str = field(default="", compare=False)
 

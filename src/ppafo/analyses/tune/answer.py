@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ppafo.analyses.tune.problem import Problem
-from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Setting, Start, Tuned, agreement
+from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, agreement
 from ppafo.errors import count_of
 from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
-from ppafo.report.display_units import quantity_of_unit
-from ppafo.report.finding import Column, Finding, Part, columns_of
+from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
@@ -23,7 +22,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage, without_exponent
-from ppafo.units.shown import in_units
+from ppafo.units.shown import in_units, quantity_of_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +34,7 @@ _BEYOND = 0.05
 """Fraction of the range between the bounds by which gains before the tuning are shown outside at most."""
 
 
-def task_panels(before: Setting, after: Setting) -> list[Panel]:
+def task_panels(before: GainResult, after: GainResult) -> list[Panel]:
     """Return what is controlled, command and gas over time with the gains before and after, on the nominal device."""
     recording = after.result.recording
     controlled = controlled_in(recording) or CONTROLLED[TORQUE]
@@ -53,7 +52,7 @@ def task_panels(before: Setting, after: Setting) -> list[Panel]:
     ]
 
 
-def _courses(channel: str, before: Setting, after: Setting) -> list[Mark]:
+def _courses(channel: str, before: GainResult, after: GainResult) -> list[Mark]:
     """Return a channel over time, before and after."""
     style = {"linewidth": 1.3, "drawstyle": "steps-post" if channel == "command" else "default"}
     marks = []
@@ -63,12 +62,14 @@ def _courses(channel: str, before: Setting, after: Setting) -> list[Mark]:
     return marks
 
 
-def search_panels(problem: Problem, before: Setting, after: Setting, starts: Sequence[Start]) -> list[Panel]:
+def search_panels(
+    problem: Problem, before: GainResult, after: GainResult, starts: Sequence[SearchStart]
+) -> list[Panel]:
     """Return the best cost of each start over its generations, and where the gains lie between their bounds."""
     return [_cost_panel(before, starts), _bounds_panel(problem, after, starts)]
 
 
-def _cost_panel(before: Setting, starts: Sequence[Start]) -> Panel:
+def _cost_panel(before: GainResult, starts: Sequence[SearchStart]) -> Panel:
     marks = []
     for number, start in enumerate(starts):
         costs = np.array(start.generations)
@@ -85,7 +86,7 @@ def _cost_panel(before: Setting, starts: Sequence[Start]) -> Panel:
     return Panel(Kind("Generation"), Kind(), marks, "Objective, best so far; dashed: before", then=scale)
 
 
-def _bounds_panel(problem: Problem, after: Setting, starts: Sequence[Start]) -> Panel:
+def _bounds_panel(problem: Problem, after: GainResult, starts: Sequence[SearchStart]) -> Panel:
     """Return where the gains lie between their bounds: before, after, and where each start ended."""
     searched = problem.searched
     rows = np.arange(len(searched))[::-1]
@@ -120,21 +121,31 @@ _SEARCH_CAPTION = "Left: the best objective so far in each start. Right: where t
 
 @in_units(lambda problem, *_: problem.scenario.device.shown)
 def finding_of(
-    problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
+    problem: Problem,
+    scales: dict[str, float],
+    before: GainResult,
+    after: GainResult,
+    starts: list[SearchStart],
+    runs: int,
 ) -> Finding[Tuned]:
     """Return what a search came to; it has passed where the gains satisfy all constraints, over fresh draws too.
 
     ``scales`` are those of the goals [SI], ``starts`` best first, ``runs`` all that were simulated.
     """
     tuned = _tuned(problem, scales, before, after, starts, runs)
+    rows = []
+    for gain in tuned.problem.searched:
+        numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
+        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
+        rows.append((gain.path, *map(gain.place.quote, numbers), end))
     return Finding(
         name="tune",
         kicker="Tuning",
         title=problem.name,
         said=(tuned.verdict, *([problem.description] if problem.description else [])),
         parts=(
-            _gains_part(tuned),
-            Part(
+            Section("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows)),
+            Section(
                 "Before and after",
                 _metric_columns(problem, before, after),
                 panels=partial(task_panels, before, after),
@@ -142,7 +153,7 @@ def finding_of(
                 caption="The nominal device.",
                 size=(6.9, 2.1),
             ),
-            Part(
+            Section(
                 "The search",
                 remarks=tuned.remarks,
                 panels=partial(search_panels, problem, before, after, starts),
@@ -151,7 +162,7 @@ def finding_of(
                 across=2,
                 size=(4.4, max(2.6, 0.9 + 0.4 * len(problem.searched))),
             ),
-            Part("To use the gains", code=_command(tuned)),
+            Section("To use the gains", code=_command(tuned)),
         ),
         found=tuned,
         passed=after.is_feasible and not after.useless,
@@ -160,7 +171,12 @@ def finding_of(
 
 
 def _tuned(
-    problem: Problem, scales: dict[str, float], before: Setting, after: Setting, starts: list[Start], runs: int
+    problem: Problem,
+    scales: dict[str, float],
+    before: GainResult,
+    after: GainResult,
+    starts: list[SearchStart],
+    runs: int,
 ) -> Tuned:
     """Return what a search came to as data, with the verdict and the remarks in words."""
     bounds = {gain.path: gain.bound_reached(after.gains[gain.path]) for gain in problem.searched}
@@ -185,16 +201,6 @@ def _tuned(
         remarks=_remarks(problem, after, starts, runs, reached),
         problem=problem,
     )
-
-
-def _gains_part(tuned: Tuned) -> Part:
-    """Return the gains with their bounds, as people write them."""
-    rows = []
-    for gain in tuned.problem.searched:
-        numbers = (gain.before, tuned.after.gains[gain.path], gain.minimum, gain.maximum)
-        end = f"at its {tuned.bounds_reached[gain.path]}" if gain.path in tuned.bounds_reached else ""
-        rows.append((gain.path, *map(gain.place.quote, numbers), end))
-    return Part("Gains", columns_of(("gain", "before", "after", "minimum", "maximum", ""), rows))
 
 
 def _options(tuned: Tuned) -> str:
@@ -222,7 +228,7 @@ def _pasted(tuned: Tuned) -> str:
     )
 
 
-def verdict(problem: Problem, before: Setting, after: Setting) -> str:
+def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
     """Return the result of a search for gains in a sentence."""
     name = problem.name
     if after.share_without_value:
@@ -243,7 +249,7 @@ def verdict(problem: Problem, before: Setting, after: Setting) -> str:
     return f"{name}: {_change(before, after)}"
 
 
-def _change(before: Setting, after: Setting) -> str:
+def _change(before: GainResult, after: GainResult) -> str:
     """Return by how much gains that satisfy all constraints are better than the ones before."""
     if not before.is_feasible:
         return (
@@ -260,7 +266,7 @@ def _change(before: Setting, after: Setting) -> str:
     return f"{words} ({without_exponent(change, '+.3g')} %)"
 
 
-def _by_ceiling(problem: Problem, after: Setting) -> str:
+def _by_ceiling(problem: Problem, after: GainResult) -> str:
     """Return that the torque ceiling is why, where the draws below it are what breaks the constraints."""
     ceiling = after.torque_ceiling
     if not ceiling.explains:
@@ -272,7 +278,7 @@ def _by_ceiling(problem: Problem, after: Setting) -> str:
     )
 
 
-def _metric_columns(problem: Problem, before: Setting, after: Setting) -> list[Column]:
+def _metric_columns(problem: Problem, before: GainResult, after: GainResult) -> list[Column]:
     """Return a row for each metric of the goals and constraints."""
     names, spread = problem.metrics, problem.spread
     limits = [
@@ -301,7 +307,7 @@ def _metric_columns(problem: Problem, before: Setting, after: Setting) -> list[C
 
 
 def _remarks(
-    problem: Problem, after: Setting, starts: Sequence[Start], runs: int, reached: Mapping[str, str]
+    problem: Problem, after: GainResult, starts: Sequence[SearchStart], runs: int, reached: Mapping[str, str]
 ) -> list[str]:
     """Return how the search went and what it leaves open."""
     settled = sum(start.is_settled for start in starts)

@@ -20,7 +20,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats, LogUniformBetween, UniformBetween
 from ppafo.studies.draws import (
-    Limit,
+    MetricLimit,
     Uncertainty,
     atmosphere_of,
     check_metrics,
@@ -30,7 +30,7 @@ from ppafo.studies.draws import (
 )
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.varying import VariedPath, in_its_unit, value_at, varied_path
+from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096
@@ -48,7 +48,7 @@ class SearchRange(StrictTable):
     spacing: Annotated[Literal["linear", "logarithmic"], Field(description="default: linear")] = "linear"
 
 
-class Goal(StrictTable):
+class GoalSection(StrictTable):
     """A term of the objective: weight times metric over scale; less is better, with a weight below 0 more is."""
 
     metric: _Metric
@@ -79,7 +79,7 @@ class Robust(StrictTable):
     draws: Annotated[int, Field(ge=8, le=MAXIMUM_DRAWS)] = 64
 
 
-class Effort(StrictTable):
+class SearchEffort(StrictTable):
     """Effort of the search: independent starts, most generations of each, candidates of a generation per gain."""
 
     starts: Annotated[int, Field(ge=1, le=100)] = 3
@@ -97,12 +97,12 @@ class TuningFile(StrictTable):
     scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
     overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
     search: Annotated[tuple[SearchRange, ...], Field(strict=False, min_length=1)]
-    objective: Annotated[tuple[Goal, ...], Field(strict=False, min_length=1)]
+    objective: Annotated[tuple[GoalSection, ...], Field(strict=False, min_length=1)]
     constraints: Annotated[tuple[Constraint, ...], Field(strict=False)] = ()
     robust: Annotated[
         Robust | None, Field(description="uncertainty to be robust against; default: the nominal device")
     ] = None
-    effort: Effort = Effort()
+    effort: SearchEffort = SearchEffort()
 
 
 def json_schema() -> dict[str, Any]:
@@ -146,7 +146,7 @@ class Searched:
 
 
 @dataclass(frozen=True, slots=True)
-class Term:
+class ObjectiveTerm:
     """A term of the objective: weight times metric over scale [SI]; by default the value before tuning."""
 
     metric: str
@@ -200,10 +200,10 @@ class Problem:
     scenario: Scenario
     overrides: tuple[str, ...]
     searched: tuple[Searched, ...]
-    goals: tuple[Term, ...]
-    constraints: tuple[Limit, ...]
+    goals: tuple[ObjectiveTerm, ...]
+    constraints: tuple[MetricLimit, ...]
     spread: Spread | None
-    effort: Effort
+    effort: SearchEffort
 
     def __repr__(self) -> str:
         """Return name, scenario and what is searched."""
@@ -300,7 +300,8 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
 def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError):
         varied = varied_path(gain.path, scenario)
-        varied = in_its_unit(varied, (gain.minimum, gain.maximum)) if atmosphere_varies else varied
+        ends = (gain.minimum, gain.maximum)
+        varied = given_in(in_its_unit(varied, ends) if atmosphere_varies else varied, ends)
         minimum, maximum = varied.level(gain.minimum), varied.level(gain.maximum)
         before = value_at(gain.path, scenario)
         if before is None:
@@ -319,25 +320,25 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
     return Searched(gain.path, minimum, maximum, is_logarithmic, before, varied)
 
 
-def _goal(goal: Goal) -> Term:
+def _goal(goal: GoalSection) -> ObjectiveTerm:
     if goal.weight == 0.0:
         raise StudyError(f"objective '{goal.metric}': weight = 0 has no effect; omit it")
     if goal.scale is None:
-        return Term(goal.metric, goal.weight, None)
+        return ObjectiveTerm(goal.metric, goal.weight, None)
     where = f"objective '{goal.metric}': scale = '{goal.scale}'"
     scale = difference_of(goal.scale, goal.metric, where)
     if scale <= 0.0:
         raise StudyError(f"{where} must be more than 0")
-    return Term(goal.metric, goal.weight, scale)
+    return ObjectiveTerm(goal.metric, goal.weight, scale)
 
 
-def _constraint(constraint: Constraint, atmosphere: float | None) -> Limit:
+def _constraint(constraint: Constraint, atmosphere: float | None) -> MetricLimit:
     bounds = [text for text in (constraint.at_most, constraint.at_least) if text is not None]
     if len(bounds) != 1:
         has = "both" if bounds else "none"
         raise StudyError(f"constraint '{constraint.metric}': needs either at_most or at_least, it has {has}")
     limit = level_of(bounds[0], constraint.metric, f"constraint '{constraint.metric}' = '{bounds[0]}'", atmosphere)
-    return Limit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
+    return MetricLimit(constraint.metric, limit, constraint.at_most is not None, bounds[0])
 
 
 def _spread(parsed: TuningFile, folder: Path, searched: Sequence[str], scenario: Scenario) -> Spread | None:

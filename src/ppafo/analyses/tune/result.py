@@ -6,11 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ppafo.analyses.tune.problem import Gains, Problem, Term
+from ppafo.analyses.tune.problem import Gains, ObjectiveTerm, Problem
 from ppafo.metrics import Metric
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.simulate import Result
-from ppafo.studies.draws import Limit
+from ppafo.studies.draws import MetricLimit
 
 INFEASIBLE = 1.0e6
 """Lowest cost of a candidate that violates a constraint."""
@@ -21,7 +21,7 @@ _AS_GOOD = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class SearchStart:
     """End of one start: fractions of the bounds (gains,), cost, candidates tried, best cost of each generation.
 
     ``is_settled`` says whether its candidates had come together, or whether it ran out of generations.
@@ -34,7 +34,7 @@ class Start:
     is_settled: bool
 
 
-def agreement(starts: Sequence[Start]) -> float:
+def agreement(starts: Sequence[SearchStart]) -> float:
     """Return the largest difference of a fraction of the way between the best start and those as good as it.
 
     As good is a cost within a hundredth; large where very different gains do as well, which the goal then leaves open.
@@ -60,7 +60,7 @@ class Ceiling:
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class GainResult:
     """Gains [SI] and what they give.
 
     ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
@@ -79,7 +79,7 @@ class Setting:
     fresh_violation: float
     fresh_share_without_value: float
     torque_ceiling: Ceiling
-    share_of_noise: Mapping[str, Interval]
+    share_of_noise: Mapping[str, ConfidenceInterval]
     metrics: Mapping[str, Metric]
     result: Result = field(compare=False, repr=False)
 
@@ -115,13 +115,13 @@ class Tuned:
     overrides: list[str]
     bounds_reached: dict[str, Literal["minimum", "maximum"]]
     scales: dict[str, float]
-    goals: list[Term]
-    constraints: list[Limit]
+    goals: list[ObjectiveTerm]
+    constraints: list[MetricLimit]
     robust: dict[str, str | None] | None
     effort: dict[str, Any]
-    before: Setting
-    after: Setting
-    starts: list[Start]
+    before: GainResult
+    after: GainResult
+    starts: list[SearchStart]
     runs: int
     remarks: list[str]
     problem: Problem = field(compare=False, repr=False)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.tune.problem import Effort, Gains, Problem, Spread
-from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, Setting, Start
+from ppafo.analyses.tune.problem import Gains, Problem, SearchEffort, Spread
+from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, GainResult, SearchStart
 from ppafo.engine.scheme.actuators import torque_of
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
@@ -20,7 +20,7 @@ from ppafo.metrics import METRICS
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import plant_parameters
-from ppafo.report.kind import Interval
+from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import with_numbers
@@ -123,7 +123,7 @@ _REACH = (0.01, 0.1)
 
 
 @on_one_thread
-def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]:
+def search(costs: Costs, before: Sequence[float], effort: SearchEffort) -> list[SearchStart]:
     """Return what came of each start, the best first; the same every time for a seed.
 
     ``before`` are the fractions of the values before tuning; they are among the first candidates where they lie within
@@ -135,7 +135,7 @@ def search(costs: Costs, before: Sequence[float], effort: Effort) -> list[Start]
     return sorted(finished, key=lambda start: start.cost)
 
 
-def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.random.Generator) -> Start:
+def _start(costs: Costs, before: Sequence[float], effort: SearchEffort, random: np.random.Generator) -> SearchStart:
     from scipy.optimize import differential_evolution, minimize
 
     course: list[float] = []
@@ -194,7 +194,7 @@ def _start(costs: Costs, before: Sequence[float], effort: Effort, random: np.ran
     )
     # The course has the generations, and where the simplex ended.
     course[generations:] = course[-1:]
-    return Start(tuple(map(float, refined.x)), float(refined.fun), tried, tuple(course), is_settled)
+    return SearchStart(tuple(map(float, refined.x)), float(refined.fun), tried, tuple(course), is_settled)
 
 
 def have_come_together(costs: Floats) -> bool:
@@ -248,12 +248,12 @@ def scales_of(problem: Problem, before: Crossed) -> dict[str, float]:
 
 def setting_of(
     runs: Runs, problem: Problem, scales: Mapping[str, float], gains: Gains, draws: Mapping[str, Floats]
-) -> Setting:
+) -> GainResult:
     """Return gains with what they come to over the draws."""
     spread = problem.spread
     again = seen = rows_of_gains(runs, problem, gains, draws)
     fresh: dict[str, Floats] = {}
-    noise: dict[str, Interval] = {}
+    noise: dict[str, ConfidenceInterval] = {}
     if spread is not None:
         # Draws that follow those of the search: the gains were not chosen on them.
         fresh = spread.uncertainty.random_columns(spread.draws, FRESH_DRAWS, spread.seed)
@@ -264,7 +264,7 @@ def setting_of(
             noise = {name: share for name, share in shares.items() if share is not None}
     judged, rejudged = (judge(each, problem, scales) for each in (seen, again))
     result = simulate(scenario_with(problem, gains))
-    return Setting(
+    return GainResult(
         gains=gains,
         values=_values(seen, problem),
         fresh={} if spread is None else _values(again, problem),

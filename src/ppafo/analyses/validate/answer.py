@@ -1,7 +1,6 @@
 """A validation as a finding: verdict, errors of each recording in a table, its panels, and the replayed recordings."""
 
 import re
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 
@@ -10,10 +9,10 @@ import numpy as np
 from ppafo.analyses.validate.result import Validation, kind_of_channel, verdict
 from ppafo.errors import count_of
 from ppafo.report.display_units import display_value
-from ppafo.report.finding import Finding, Part, columns_of, facts
+from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Panel
-from ppafo.report.residuals import Course, course_panels
+from ppafo.report.residuals import FittedCurve, course_panels
 from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units.shown import in_units
@@ -58,7 +57,7 @@ def _channel_panels(agreement: RecordingAgreement, channel: ChannelAgreement) ->
     time, scale = (Kind("Time", "ms"), MILLISECONDS) if is_short else (TIME, 1.0)
     shown, limit = COMPARED[name], channel.limit * channel.full_range
     is_first = channel is agreement.channels[0]
-    course = Course(
+    course = FittedCurve(
         time=time,
         level=Kind(shown.title, "", "pressure" if is_chamber else shown.quantity),
         change=Kind(f"Measured - model, RMS {100 * channel.fraction:.2g} %", "", shown.quantity),
@@ -84,7 +83,12 @@ _WRITTEN_AS_ZERO = 5.0e-4
 @in_units(lambda validation: validation.device.shown)
 def finding_of(validation: Validation) -> Finding[Validation]:
     """Return a validation in words, tables and panels; it has passed where every error is within its limit."""
-    names = recording_names([agreement.file for agreement in validation.recordings])
+    stems = [
+        _UNUSUAL.sub("-", Path(agreement.file).stem).strip("-.") or "recording" for agreement in validation.recordings
+    ]
+    names = [
+        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
+    ]
     kinds = {agreement.measured.kind for agreement in validation.recordings}
     pairs = list(zip(names, validation.recordings, strict=True))
     said, unmeasured = [verdict(validation)], sorted(kinds - {"measured"})
@@ -103,9 +107,9 @@ def finding_of(validation: Validation) -> Finding[Validation]:
         title=f"{validation.device.name} against {count_of(len(validation.recordings), 'recording')}",
         said=said,
         parts=(
-            Part(said=[_method(validation)], is_detail=True),
+            Section(said=[_method(validation)], is_detail=True),
             *(_part(name, agreement) for name, agreement in pairs),
-            Part("Files" if hashes else "", facts(hashes), is_detail=True),
+            Section("Files" if hashes else "", facts(hashes), is_detail=True),
         ),
         found=validation,
         passed=validation.passes,
@@ -127,15 +131,7 @@ def _method(validation: Validation) -> str:
     )
 
 
-def recording_names(files: Sequence[str]) -> list[str]:
-    """Return a name for the files of each recording: its file's or folder's, with a number where two are alike."""
-    stems = [_UNUSUAL.sub("-", Path(file).stem).strip("-.") or "recording" for file in files]
-    return [
-        f"{stem}-{1 + stems[:index].count(stem)}" if stems.count(stem) > 1 else stem for index, stem in enumerate(stems)
-    ]
-
-
-def _part(name: str, agreement: RecordingAgreement) -> Part:
+def _part(name: str, agreement: RecordingAgreement) -> Section:
     """Section with the errors of one recording in a table, and its panels; ``name`` is the stem of its files."""
     measured, kind = agreement.measured, KIND_WORDS[agreement.measured.kind]
     late = f"{MILLISECONDS * agreement.delay.correction:.3g} ms" if agreement.delay.correction else "none found"
@@ -144,7 +140,7 @@ def _part(name: str, agreement: RecordingAgreement) -> Part:
         f"{', '.join(agreement.inputs)}; delay of the measurement: {late}"
     )
     across = panels_across(agreement)
-    return Part(
+    return Section(
         f"{agreement.file} ({kind})",
         columns_of(_HEAD, map(channel_cells, agreement.channels)),
         [replayed],

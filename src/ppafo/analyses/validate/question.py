@@ -94,7 +94,7 @@ def validate(
     from ppafo.validation.causes import causes_of
     from ppafo.validation.compared import parse_thresholds
     from ppafo.validation.initial import parse_initial
-    from ppafo.validation.measured import Measured, read_measured
+    from ppafo.validation.measured import MeasuredRecording, read_measured
     from ppafo.validation.replay import MOTIONS
 
     report = progress or report_nothing
@@ -118,7 +118,7 @@ def validate(
     if not recordings:
         raise DataError("no recording was given; name at least one .csv or .nc file or result folder")
     column_map, map_name = (None, "") if columns is None else column_map_of(columns)
-    read: list[Measured] = []
+    read: list[MeasuredRecording] = []
     for path in recordings:
         measured = read_measured(path, device, column_map, map_name)
         # Given twice, under two names too, a recording would count twice as evidence.

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from ppafo.parameters.device import Device
-from ppafo.report.display_units import display_value, quantity_of_unit
+from ppafo.report.display_units import display_value
 from ppafo.report.kind import Kind
+from ppafo.units.shown import quantity_of_unit
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import RecordingAgreement, ReplaySettings
-from ppafo.validation.causes import Cause, Causes
+from ppafo.validation.causes import Causes, ResidualCause
 from ppafo.validation.compared import COMPARED
 from ppafo.version import __version__
 
@@ -103,7 +104,7 @@ def _times(size: float) -> str:
     return f"{size:.2g}" if size < 100.0 else f"{size:.0f}"
 
 
-def in_words(cause: Cause) -> str:
+def in_words(cause: ResidualCause) -> str:
     """Return a cause in words, numbers of the set in the unit in which people see them."""
     if len(cause.numbers) != 1:
         return cause.in_words
@@ -115,7 +116,7 @@ def in_words(cause: Cause) -> str:
     return f"{cause.in_words} ({shown})"
 
 
-def _cause_data(cause: Cause | None) -> dict[str, Any] | None:
+def _cause_data(cause: ResidualCause | None) -> dict[str, Any] | None:
     """Return a cause as plain data in SI, None for none."""
     if cause is None:
         return None

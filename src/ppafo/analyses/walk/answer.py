@@ -23,7 +23,7 @@ from ppafo.metrics import Metric
 from ppafo.metrics.strides import PER_STRIDE
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
 from ppafo.report.display_units import quantity_text
-from ppafo.report.finding import Column, Finding, Part, columns_of
+from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import Kind
 from ppafo.report.live_parts import live_part
 from ppafo.running import tried
@@ -41,7 +41,7 @@ from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
 from ppafo.walking.strides import PHASES
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 # What is said of a walk's safety: what is fitted, pressures far above the supply, less help over time.
 
@@ -95,13 +95,13 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     return remarks
 
 
-def over_time_parts(worn: WalkResult) -> tuple[Part, ...]:
+def over_time_parts(worn: WalkResult) -> tuple[Section, ...]:
     """Return the walk over time, where something happened in it."""
     # A figure of an even walk shows nothing that the mean stride does not.
     if not worn.events and not failure_times(worn.scenario):
         return ()
     draw = partial(whole_walk_figure, worn)
-    return (Part("The walk over time", name="over-time", caption=_OVER_TIME, draw=draw, is_detail=True),)
+    return (Section("The walk over time", name="over-time", caption=_OVER_TIME, draw=draw, is_detail=True),)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,7 +111,7 @@ class WalkPair:
     ``tracking`` is the verdict where the torque does not follow what the controller requests, with tried remedies.
     """
 
-    comparison: Comparison
+    comparison: WalkComparison
     tracking: Tracking | None
 
     def json_document(self) -> dict[str, Any]:
@@ -187,7 +187,7 @@ _LIMITS = (
 
 
 @in_units(lambda comparison: comparison.with_device.scenario.device.shown)
-def finding_of(comparison: Comparison) -> Finding[WalkPair]:
+def finding_of(comparison: WalkComparison) -> Finding[WalkPair]:
     """Return a walk with and without the device; one that diverged has numbers, no pictures, and has not passed."""
     worn, bare = comparison.with_device, comparison.without_device
     configuration, motion = worn.scenario, walk_of(worn.scenario)
@@ -202,13 +202,15 @@ def finding_of(comparison: Comparison) -> Finding[WalkPair]:
         title=f"Walking with {configuration.name}",
         said=(ended, *first_lines(worn, verdict)),
         parts=(
-            Part(said=_set_up(configuration), is_detail=True),
+            Section(said=_set_up(configuration), is_detail=True),
             *task_sequence_parts(comparison),
-            Part(columns=comparison_table(comparison), remarks=_remarks(comparison)),
+            Section(columns=comparison_table(comparison), remarks=_remarks(comparison)),
             *bottle_parts(worn),
-            Part("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
+            Section("How to read it", said=(_EXPLAINED, _LIMITS), is_detail=True),
             *_pictures(comparison),
-            Part("What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True),
+            Section(
+                "What is assumed" if assumed else "", columns_of(("value", "why"), assumed), left=2, is_detail=True
+            ),
         ),
         found=WalkPair(comparison, verdict),
         passed=comparison.is_completed and worn.is_helped,
@@ -240,7 +242,7 @@ def _set_up(configuration: Scenario) -> list[str]:
     return [sentence for sentence in sentences if sentence]
 
 
-def _remarks(comparison: Comparison) -> list[str]:
+def _remarks(comparison: WalkComparison) -> list[str]:
     """Return who walks, how long a bottle lasts, what was unsafe, how far to trust the walk, and what diverged."""
     worn, bare = comparison.with_device, comparison.without_device
     bottle = "" if worn.supply is None else bottle_remark(worn)
@@ -261,7 +263,7 @@ def _remarks(comparison: Comparison) -> list[str]:
     return [remark for remark in remarks if remark]
 
 
-def _pictures(comparison: Comparison) -> Sequence[Part]:
+def _pictures(comparison: WalkComparison) -> Sequence[Section]:
     """Return the figures of a task sequence, or of equal strides: over time, and the mean stride where there is one."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is not None:
@@ -279,13 +281,13 @@ def _pictures(comparison: Comparison) -> Sequence[Part]:
     return (
         *over_time,
         *(
-            Part(heading, name=name, caption=caption, draw=draw, is_detail=True)
+            Section(heading, name=name, caption=caption, draw=draw, is_detail=True)
             for heading, name, caption, draw in of_mean_stride
         ),
     )
 
 
-def comparison_table(comparison: Comparison) -> list[Column]:
+def comparison_table(comparison: WalkComparison) -> list[Column]:
     """Return a row for each number: with the device, without it, and of a healthy ankle.
 
     Strides with less help have a column of their own, where there are any.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.report.finding import Part, facts
+from ppafo.report.finding import Section, facts
 from ppafo.report.kind import Kind
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.walking.bottle.course import SupplyCourse, lasted, minutes_text, strides_text
@@ -30,16 +30,16 @@ _DURATION, _TORQUE, _GAS = (Kind(quantity=name, form=".3g") for name in ("durati
 _SHARE, _WARMTH, _PRESSURE = (Kind(quantity=name, form=".0f") for name in ("fraction", "temperature", "pressure"))
 
 
-def bottle_parts(worn: WalkResult) -> tuple[Part, ...]:
+def bottle_parts(worn: WalkResult) -> tuple[Section, ...]:
     """Return the facts of the bottle of a walk, its figure and how to read them; nothing without a bottle."""
     supply = worn.supply
     if supply is None:
         return ()
     draw, caption = partial(bottle_figure, worn), _CAPTION
     return (
-        Part("On the bottle", facts(_facts(worn, supply))),
-        Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
-        Part("How to read the bottle", said=_EXPLAINED, is_detail=True),
+        Section("On the bottle", facts(_facts(worn, supply))),
+        Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+        Section("How to read the bottle", said=_EXPLAINED, is_detail=True),
     )
 
 

@@ -13,10 +13,10 @@ from ppafo.simulation.scenario import UNITS, Scenario
 from ppafo.version import __version__
 from ppafo.walking.motion import walk_of
 from ppafo.walking.planning import sensor_numbers
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 
-def walk_data(name: str, version: int, comparison: Comparison) -> dict[str, Any]:
+def walk_data(name: str, version: int, comparison: WalkComparison) -> dict[str, Any]:
     """Return what the file of every walk says, of a format with this name and version."""
     worn, bare = comparison.with_device, comparison.without_device
     return {

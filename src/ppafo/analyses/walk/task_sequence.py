@@ -9,7 +9,7 @@ from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
 from ppafo.gait.gait import Gait, speed_range
 from ppafo.report.display_units import si_unit
-from ppafo.report.finding import Column, Part
+from ppafo.report.finding import Column, Section
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.task_sequence import task_sequence_figure
@@ -17,7 +17,7 @@ from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import SegmentResult
 from ppafo.walking.task_sequence import TaskSequence
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 _NUMBERS = (
     ShownNumber(name="start", title="from", quantity="time", digits=1),
@@ -54,7 +54,7 @@ _MEAN_CAPTION = (
 )
 
 
-def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
+def task_sequence_parts(comparison: WalkComparison) -> tuple[Section, ...]:
     """Return the table of the segments, and how to read it; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
@@ -74,9 +74,9 @@ def task_sequence_parts(comparison: Comparison) -> tuple[Part, ...]:
         "level ground."
     )
     return (
-        Part(columns=table, marked=(len(rows) - 1,)),
-        Part("How to read the task sequence", said=_EXPLAINED, is_detail=True),
-        Part(said=(means,)),
+        Section(columns=table, marked=(len(rows) - 1,)),
+        Section("How to read the task sequence", said=_EXPLAINED, is_detail=True),
+        Section(said=(means,)),
     )
 
 
@@ -100,24 +100,24 @@ def _whole(worn: WalkResult, bare: WalkResult) -> dict[str, Any]:
     }
 
 
-def task_sequence_pictures(comparison: Comparison) -> tuple[Part, ...]:
+def task_sequence_pictures(comparison: WalkComparison) -> tuple[Section, ...]:
     """Return the task sequence over time, and the mean of its even strides where there are any."""
     worn, bare = comparison.with_device, comparison.without_device
     mean = partial(walk_figure, {"with the device": worn, "without": bare})
     pictures = (
-        Part(
+        Section(
             "The task sequence",
             name="task-sequence",
             caption=_CAPTION,
             draw=partial(task_sequence_figure, worn, bare),
             is_detail=True,
         ),
-        Part("The mean stride", name="mean-stride", caption=_MEAN_CAPTION, draw=mean, is_detail=True),
+        Section("The mean stride", name="mean-stride", caption=_MEAN_CAPTION, draw=mean, is_detail=True),
     )
     return pictures if worn.averages and bare.averages else pictures[:1]
 
 
-def task_sequence_files(comparison: Comparison) -> dict[str, Callable[[], bytes]]:
+def task_sequence_files(comparison: WalkComparison) -> dict[str, Callable[[], bytes]]:
     """Return the files of the segments with and without the device, by name; nothing without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     if walk_of(worn.scenario).task_sequence is None:
@@ -136,7 +136,7 @@ def segments_csv(segments: Sequence[SegmentResult]) -> bytes:
     return csv_of({head: [getattr(segment, name) for segment in segments] for name, head in heads.items()})
 
 
-def task_sequence_data(comparison: Comparison) -> dict[str, Any]:
+def task_sequence_data(comparison: WalkComparison) -> dict[str, Any]:
     """Return the segments as data, in SI units; nothing for a walk without a task sequence."""
     worn, bare = comparison.with_device, comparison.without_device
     sequence = walk_of(worn.scenario).task_sequence

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, versions, walk_document
-from ppafo.report.finding import Finding, Part, columns_of
+from ppafo.report.finding import Finding, Section, columns_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import UNITS
 from ppafo.units.shown import in_units
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.motion import person_remarks
 from ppafo.walking.person import START_VARIATION, THRESHOLD_VARIATION
-from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Number, Population
+from ppafo.walking.walk import OUTCOMES, SHOWN, TRAITS, Population, WearerQuantity
 from ppafo.walking.wearer import CORRELATION, MASS_VARIATION, MAXIMUM_DEVIATIONS, STATURE_VARIATION
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -84,14 +84,16 @@ def wearers_finding(population: Population) -> Finding[Wearers]:
     if population.diverged:
         remarks.append(population.message)
     draw = partial(population_figure, population)
-    figure = Part("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
+    figure = Section("The wearers", name="wearers", caption=_WEARERS_CAPTION, draw=draw, is_detail=True)
     return Finding(
         name="wearers",
         kicker="Walks of many wearers",
         title=f"{population.count} wearers with {configuration.name}",
         said=(f"{configuration.name}: {population.count} wearers, {population.minutes:.3g} min each",),
         parts=(
-            Part(columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks),
+            Section(
+                columns=columns_of(("", *(f"{100.0 * share:.0f} %" for share in QUANTILES)), rows), remarks=remarks
+            ),
             *([figure] if population.count else []),
         ),
         found=Wearers(population),
@@ -108,7 +110,7 @@ def wearers_csv(population: Population) -> bytes:
     return csv_of(columns)
 
 
-def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, Number]) -> dict[str, dict[str, object]]:
+def quantiles(table: Mapping[str, Floats], numbers: Mapping[str, WearerQuantity]) -> dict[str, dict[str, object]]:
     """Return the quantiles of every number in SI units, with unit and meaning."""
     return {
         name: {

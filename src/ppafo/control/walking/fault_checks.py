@@ -120,7 +120,7 @@ class LastReadings(NamedTuple):
     slow_angle: float
 
 
-class Landing(NamedTuple):
+class LandingCheck(NamedTuple):
     """Lowest ankle angle of this swing, or since the strike [rad]; highest after it, which fades; strikes in doubt.
 
     ``in_doubt`` is the angle of a strike [rad], 0 where the foot lands in time; ``late`` are late ones in a row, and
@@ -142,7 +142,7 @@ class Emptying(NamedTuple):
     rising: float
 
 
-AIRBORNE = Landing(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
+AIRBORNE = LandingCheck(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
 NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
 NOTHING_READ = LastReadings(
     heel_force=0.0,
@@ -339,13 +339,13 @@ def still_flag(rules: SafetyRules, readings: LastReadings, before: PhaseState, p
 
 def next_landing(
     rules: SafetyRules,
-    last: Landing,
+    last: LandingCheck,
     readings: LastReadings,
     before: PhaseState,
     phase: PhaseState,
     steady: float,
     period: float,
-) -> Landing:
+) -> LandingCheck:
     """The landing after a sample of ``period`` [s].
 
     A strike is in doubt where the foot has turned up already, in a ``steady`` walk (1).
@@ -368,7 +368,7 @@ def next_landing(
     # Late by more than the limit counts, clearly in time resets, between both nothing is known.
     counted = last.late_toes + 1.0 if angle > rules.highest_toe_off_angle else last.late_toes
     counted = 0.0 if angle < rules.highest_toe_off_angle - IN_TIME else counted
-    return Landing(
+    return LandingCheck(
         lowest=angle if lower else last.lowest,
         highest=angle if lower else highest,
         in_doubt=0.0 if lands else in_doubt,

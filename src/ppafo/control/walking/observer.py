@@ -124,7 +124,7 @@ NOMINAL_QUANTITIES = (
 """Fields of ``NominalDevice``, in order."""
 
 
-class Coil(NamedTuple):
+class ObservedValve(NamedTuple):
     """On/off valve: present flow (0 or 1), commanded flow, time since the command, and switching time [s]."""
 
     position: float
@@ -141,7 +141,7 @@ class OnTheWay(NamedTuple):
     third: float
 
 
-class Chamber(NamedTuple):
+class ObservedChamber(NamedTuple):
     """Content p V [J], pressure expected of its sensor [Pa], gas that passed lately [J], time of an alarm [s].
 
     ``least`` [J] is the content measured when the chamber was connected to its supply, or the lowest one since it is no
@@ -161,11 +161,11 @@ class Observer(NamedTuple):
     ``lines`` are the gas contents [J] of the lines behind regulators.
     """
 
-    chamber_1: Chamber
-    chamber_2: Chamber
+    chamber_1: ObservedChamber
+    chamber_2: ObservedChamber
     command: float
-    coil_1: Coil
-    coil_2: Coil
+    coil_1: ObservedValve
+    coil_2: ObservedValve
     on_the_way: OnTheWay
     venting: OnTheWay
     spool: float
@@ -174,8 +174,8 @@ class Observer(NamedTuple):
 
 
 LONG_AGO = 1.0e9
-_EMPTY = Chamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
-_OFF = Coil(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
+_EMPTY = ObservedChamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
+_OFF = ObservedValve(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
 _FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
 START = Observer(
     _EMPTY,
@@ -242,7 +242,7 @@ def flow_into(nominal: NominalDevice, pressure: float, node: float, is_relieving
     return nominal.nominal_flow * upstream * share * (1.0 if node >= pressure else -is_relieving)
 
 
-def next_coil(nominal: NominalDevice, coil: Coil, wanted: float, period: float) -> tuple[Coil, float]:
+def next_coil(nominal: NominalDevice, coil: ObservedValve, wanted: float, period: float) -> tuple[ObservedValve, float]:
     """A coil after a sample [s] in which it was ordered to be at ``wanted``, and its mean position [-] in that time."""
     accepts = (wanted != coil.target) & (coil.since >= nominal.nominal_switching_interval - SAME)
     delay = nominal.nominal_opening_delay if wanted > 0.5 else nominal.nominal_closing_delay
@@ -250,7 +250,7 @@ def next_coil(nominal: NominalDevice, coil: Coil, wanted: float, period: float) 
     waits = delay if accepts else coil.waits
     # Share of the sample before the change: the mean position is that far between both.
     before = min(waits, period) / period
-    return Coil(
+    return ObservedValve(
         position=target if waits <= period + SAME else coil.position,
         target=target,
         since=(0.0 if accepts else coil.since) + period,
@@ -282,7 +282,7 @@ def next_spool(nominal: NominalDevice, spool: float, target: float, period: floa
 
 def passed_chamber(
     nominal: NominalDevice,
-    chamber: Chamber,
+    chamber: ObservedChamber,
     volume: float,
     measured: float,
     source: float,
@@ -290,7 +290,7 @@ def passed_chamber(
     supply: float,
     was_fed: bool,
     period: float,
-) -> tuple[Chamber, float]:
+) -> tuple[ObservedChamber, float]:
     """A chamber after a sample [s] in which it had a volume [m^3] and a reading [Pa], and was open to two nodes.
 
     ``source`` and ``vent`` [-] are the openings to a supply [Pa] and to the atmosphere; ``was_fed`` before. And what it
@@ -309,7 +309,7 @@ def passed_chamber(
     # What was before a change of the connection belongs to another cause.
     turns = (source > vent) != was_fed
     lowest = chamber.least if was_fed else min(chamber.least, measured * volume)
-    return Chamber(
+    return ObservedChamber(
         content=chamber.content + added,
         pressure=chamber.pressure,
         passed=chamber.passed + abs(added) - share * chamber.passed,
@@ -344,7 +344,7 @@ def contradiction(
 
 def met_chamber(
     nominal: NominalDevice,
-    chamber: Chamber,
+    chamber: ObservedChamber,
     volume: float,
     mean_volume: float,
     measured: float,
@@ -352,7 +352,7 @@ def met_chamber(
     supply: float,
     blind: bool,
     period: float,
-) -> Chamber:
+) -> ObservedChamber:
     """A chamber after a reading [Pa] in its volume [m^3]: residual, how long it has contradicted, what it teaches.
 
     ``supply`` [Pa] is the pressure that feeds it where it is ``fed``.
@@ -365,7 +365,7 @@ def met_chamber(
     # As gas content: what no movement of the ankle changes.
     residual = (measured - expected) * volume
     share = contradiction(nominal, chamber.passed, volume, mean_volume, measured, expected, fed, supply)
-    return Chamber(
+    return ObservedChamber(
         content=max(content + residual * min(period / FORGETS, 1.0), 0.0),
         pressure=expected,
         passed=0.0 if blind else chamber.passed,
@@ -509,12 +509,12 @@ def next_lines(nominal: NominalDevice, lines: LineState, taken_1: float, taken_2
     )
 
 
-def is_fed(nominal: NominalDevice, coil: Coil, spool: float) -> bool:
+def is_fed(nominal: NominalDevice, coil: ObservedValve, spool: float) -> bool:
     """True where a valve is believed to feed its chamber; ``spool`` [-] is above 0 towards it."""
     return (coil.position > 0.5) if nominal.nominal_pair > 0.5 else (spool > 0.0)
 
 
-def is_vented(nominal: NominalDevice, coil: Coil, spool: float, venting: float) -> bool:
+def is_vented(nominal: NominalDevice, coil: ObservedValve, spool: float, venting: float) -> bool:
     """True where a valve is believed to vent its chamber; ``spool`` [-] is above 0 towards it.
 
     ``venting`` [-] is how far the vent valve is believed to be open.
@@ -530,7 +530,7 @@ NEARLY_FULL = 0.8
 """Part of the supply's pressure above which a chamber that is vented stays open to it."""
 
 
-def has_gas(chamber: Chamber, volume: float, measured: float) -> bool:
+def has_gas(chamber: ObservedChamber, volume: float, measured: float) -> bool:
     """True where a chamber with a reading [Pa] in its volume [m^3] shows that some gas came since it is fed."""
     # Against the content when the feeding began: an offset of the sensor is in both.
     return measured * volume - chamber.least > SHOWS_GAS * chamber.passed
@@ -538,7 +538,7 @@ def has_gas(chamber: Chamber, volume: float, measured: float) -> bool:
 
 def cause_of(
     nominal: NominalDevice,
-    chamber: Chamber,
+    chamber: ObservedChamber,
     volume: float,
     measured: float,
     supply: float,

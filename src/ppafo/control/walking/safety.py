@@ -50,7 +50,7 @@ class Stance(NamedTuple):
     rolled: float = 0.0
 
 
-class Finding(NamedTuple):
+class VentingFault(NamedTuple):
     """The last fault flag that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
     fault_flag: float
@@ -72,9 +72,9 @@ class SafetyState(NamedTuple):
     level: float
     good_strides: float
     ventings: float
-    finding: Finding
+    finding: VentingFault
     readings: fault_checks.LastReadings
-    landing: fault_checks.Landing
+    landing: fault_checks.LandingCheck
     stance: Stance
     toe_strides: float
     steady: float
@@ -90,7 +90,7 @@ START = SafetyState(
     level=HELPS,
     good_strides=0.0,
     ventings=0.0,
-    finding=Finding(
+    finding=VentingFault(
         fault_flag=fault_flags.NO_FLAG, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0
     ),
     readings=fault_checks.NOTHING_READ,
@@ -341,7 +341,7 @@ def monitor(
         level=level,
         good_strides=good_strides,
         ventings=state.ventings + (1.0 if vents else 0.0),
-        finding=Finding(
+        finding=VentingFault(
             fault_flag=flag if vents else state.finding.fault_flag,
             heel_force=measurement.heel_force if vents else state.finding.heel_force,
             toe_force=measurement.toe_force if vents else state.finding.toe_force,

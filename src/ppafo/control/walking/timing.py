@@ -161,7 +161,7 @@ class Events(NamedTuple):
     toes_off: float
 
 
-class Strides(NamedTuple):
+class StrideTiming(NamedTuple):
     """The mean of recent stride times [s], how many count, the last [s], 1 where that was even, time of this one [s].
 
     ``this_time`` is what the stride will take that has begun, by when its heel and its toes have left the ground.
@@ -183,7 +183,7 @@ class GaitClock(NamedTuple):
     fraction: float
     event: float
     come: Events
-    strides: Strides
+    strides: StrideTiming
 
 
 NOT_KNOWN = Events(strike=0.0, toes_on=0.0, heel_off=0.0, toes_off=0.0)
@@ -191,7 +191,7 @@ CLOCK_START = GaitClock(
     fraction=0.0,
     event=TOES_OFF,
     come=NOT_KNOWN,
-    strides=Strides(mean_time=0.0, counted=0.0, last=0.0, even=0.0, this_time=0.0),
+    strides=StrideTiming(mean_time=0.0, counted=0.0, last=0.0, even=0.0, this_time=0.0),
 )
 
 
@@ -298,8 +298,8 @@ def chosen_events(some: Events, others: Events, takes_some: bool) -> Events:
 
 
 def next_strides(
-    strides: Strides, struck: bool, ends: bool, on_heel: bool, taken: float, first_time: float, weight: float
-) -> Strides:
+    strides: StrideTiming, struck: bool, ends: bool, on_heel: bool, taken: float, first_time: float, weight: float
+) -> StrideTiming:
     """The mean of recent stride times after a sample at which a stride that has ``taken`` [s] may end.
 
     The first strides count evenly, then a new one with its ``weight``. An odd one does not count, until a second one
@@ -318,7 +318,7 @@ def next_strides(
     counts = ends & (first | near | repeats)
     mean_time = moved if counts else known
     even = counts & on_heel & (not first)
-    return Strides(
+    return StrideTiming(
         mean_time=mean_time,
         counted=strides.counted + 1.0 if counts else strides.counted,
         last=taken if ends else strides.last,
@@ -327,7 +327,7 @@ def next_strides(
     )
 
 
-def paced(strides: Strides, seen: Events, found: Events, come: Events, weight: float) -> Strides:
+def paced(strides: StrideTiming, seen: Events, found: Events, come: Events, weight: float) -> StrideTiming:
     """Predicted duration of the present stride, corrected by an early or late heel-off or toe-off.
 
     ``found`` are the fractions of the mean stride at which they did, ``come`` the fractions of recent strides.

@@ -39,7 +39,7 @@ MAXIMUM_ERROR = 20.25
 """Errors over what is allowed at which the length of a part changes by the largest factors, 2 and 0.2."""
 
 
-class Pace(NamedTuple):
+class StepControl(NamedTuple):
     """Length [s] that the error of the last part allows the next one."""
 
     length: float
@@ -53,7 +53,7 @@ def until_jump(jump: float, remaining: float) -> float:
     return jump if jump < remaining - SAME_INSTANT else remaining
 
 
-def part_length(pace: Pace, remaining: float) -> float:
+def part_length(pace: StepControl, remaining: float) -> float:
     """Length [s] of a part: what the error allows, in equal parts where two of them reach the end."""
     # Two equal parts rather than a long one and a stub.
     halves = 0.5 * remaining if remaining < 2.0 * pace.length else pace.length
@@ -66,13 +66,13 @@ def is_refused(error: float, length: float) -> bool:
     return not error <= 1.0 and length > SHORTEST_PART
 
 
-def next_pace(pace: Pace, error: float, length: float, refused: bool, longest: float) -> Pace:
+def next_pace(pace: StepControl, error: float, length: float, refused: bool, longest: float) -> StepControl:
     """Length of the next part after one of ``length`` [s] with an error [-]; one that an event cut says little."""
     factor = math.sqrt(SAFETY / max(MINIMUM_ERROR, min(MAXIMUM_ERROR, error)))
     wanted = length * factor
     # A part that an event cut short had little error for that reason: the next may be as long as before.
     kept = max(pace.length, wanted) if factor >= 1.0 and not refused else wanted
-    return Pace(max(min(kept, longest), SHORTEST_PART))
+    return StepControl(max(min(kept, longest), SHORTEST_PART))
 
 
 ALLOWED_OF_ANGLE = 2.0e-6

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:  # a lane is of these, and makes none of them
-    from ppafo.engine.scheme.motion import FreePart, Pace, PartEnd, PartSlide, PrescribedStep
+    from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
     from ppafo.engine.scheme.pneumatics import (
         Flows,
         GasChange,
@@ -129,7 +129,7 @@ class Lane:
 
     # Where it stands: states.
     result: LaneResult
-    pace: "Pace"  # the length that the error of the last part allows the next one
+    pace: "StepControl"  # the length that the error of the last part allows the next one
     state: "PlantState"
     masses: Any  # true masses, of gas that is not isothermal and ideal
     valve_state: Any

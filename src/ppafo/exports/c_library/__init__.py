@@ -12,7 +12,7 @@ from ppafo.exports.c_library.exported import exported
 from ppafo.exports.c_library.files import (
     RULES_OF_TIMES,
     Library,
-    Switch,
+    SwitchedSettings,
     c_identifier,
     choosing,
     library_files,
@@ -137,7 +137,7 @@ def library_of(scenario: Scenario) -> Library:
     return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 
 
-def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:
+def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[SwitchedSettings, ...]:
     """Settings that choose the program by being 0 or not: of the valve, and others."""
     settings = device.valve.settings
     of_valve = [((f"valve_{name}",), settings[name] > 0.0) for name in choosing(device)]
@@ -146,4 +146,4 @@ def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> t
         for effect in effects_of(device)
         if effect.switch
     ]
-    return tuple(Switch(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))
+    return tuple(SwitchedSettings(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))

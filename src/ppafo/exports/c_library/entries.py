@@ -8,16 +8,16 @@ from ppafo.engine.generator import StepText
 from ppafo.engine.source_text import SourceCollector
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS
-from ppafo.exports.c_library.files import Setting, c_identifier
+from ppafo.exports.c_library.files import ExportParameter, c_identifier
 from ppafo.exports.c_library.preparation import Preparation
 from ppafo.model.declaration import PlainFunction, quantities_of
-from ppafo.parameters.graph import Graph, Term
+from ppafo.parameters.graph import Graph, LinkFunction
 
 
 def prepare_entry(
     preparation: Preparation,
     functions: Sequence[PlainFunction],
-    settings: Sequence[Setting],
+    settings: Sequence[ExportParameter],
     collector: SourceCollector,
     boundary: Boundary,
 ) -> str:
@@ -58,7 +58,9 @@ def prepare_entry(
     return "\n".join([head, *indent(body)])
 
 
-def follow_entry(settings: Sequence[Setting], links: Graph, collector: SourceCollector, boundary: Boundary) -> str:
+def follow_entry(
+    settings: Sequence[ExportParameter], links: Graph, collector: SourceCollector, boundary: Boundary
+) -> str:
     """The composed function ``follow``: settings that still have their default follow others; see ``Graph``."""
     places = {setting.path: index for index, setting in enumerate(settings)}
 
@@ -84,7 +86,7 @@ def follow_entry(settings: Sequence[Setting], links: Graph, collector: SourceCol
     return "\n".join([*rows, head, *indent(lines)])
 
 
-def _term(term: Term, rows: list[str], collector: SourceCollector) -> str:
+def _term(term: LinkFunction, rows: list[str], collector: SourceCollector) -> str:
     """A term of what is followed; structs that only it has are added to ``rows``."""
 
     def filled(row: type, numbers: Sequence[str]) -> str:

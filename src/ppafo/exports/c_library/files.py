@@ -86,7 +86,7 @@ _TAKEN = _OWN_FILES | _OWN_TARGETS | _OF_BOARDS | _OF_CMAKE | _OF_WINDOWS | _OF_
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class ExportParameter:
     """Something that can be chosen before a run: its name in C and in ppafo, what it is, and what the scenario has."""
 
     name: str
@@ -114,7 +114,7 @@ Rule = tuple[str, str, tuple[str, ...]]
 
 
 @dataclass(frozen=True, slots=True)
-class Switch:
+class SwitchedSettings:
     """Settings of which any ``is_above`` 0, or none: the other case is another program."""
 
     names: tuple[str, ...]
@@ -155,9 +155,9 @@ class Library:
     title: str
     description: str
     program: ExportedProgram
-    settings: tuple[Setting, ...]
+    settings: tuple[ExportParameter, ...]
     relations: tuple[Relation, ...]
-    switches: tuple[Switch, ...]
+    switches: tuple[SwitchedSettings, ...]
     other_program: tuple[tuple[str, str], ...]
     words: Mapping[str, str]
     further: Further | None = None
@@ -263,7 +263,7 @@ def _struct_words(library: Library) -> dict[str, str]:
     }
 
 
-def _table_line(setting: Setting, follows: bool) -> str:
+def _table_line(setting: ExportParameter, follows: bool) -> str:
     """Line of the table in C: name, value, range, whether its lower end is allowed, whether the default ``follows``."""
     low, high = _limits(setting.quantity)
     flags = ", ".join("true" if flag else "false" for flag in (setting.quantity.minimum_allowed, follows))

@@ -9,7 +9,7 @@ from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
-from ppafo.exports.c_library.files import Library, Setting, Surface, c_identifier, library_files
+from ppafo.exports.c_library.files import ExportParameter, Library, Surface, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
@@ -84,7 +84,7 @@ class Drive:
 class PlantAlone:
     """A plant that is driven from outside: its library, its drive, and the step [s] of the inputs.
 
-    ``clock`` is the path of the setting that is this step: that of the engine, or where the plant has parts that go by
+    ``clock`` is the path of the setting that is this step: the engine step, or where the plant has parts that go by
     the samples of a controller, the time between these. ``hidden`` are the paths of the settings without effect,
     because inputs replace them.
     """
@@ -144,8 +144,8 @@ def plant_of(scenario: Scenario) -> PlantAlone:
 
 
 @singledispatch
-def _drive_of(motion: Motion, _settings: Mapping[str, Setting]) -> Drive:
-    """Return how a plant that moves so is driven, within the ranges of its settings by path: here that of a walk."""
+def _drive_of(motion: Motion, _settings: Mapping[str, ExportParameter]) -> Drive:
+    """External drive of a plant with this motion, within the ranges of its settings by path: here a walk."""
     walks = Drive(motion="The leg walks on by its gait.", command=WALKING_COMMAND)
     if not (isinstance(motion, WalkMotion) and motion.shut_off):
         return walks
@@ -158,7 +158,7 @@ _FIRST_RAMP = 0.0078125
 
 
 @_drive_of.register
-def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> Drive:
+def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a joint: one that is locked is led by angle and rate, one on a path goes along that."""
     if motion.locked_angle is None:
         return Drive(motion="The ankle goes along the path that the scenario has.")
@@ -192,7 +192,7 @@ def _angle_drive(motion: PrescribedMotion, settings: Mapping[str, Setting]) -> D
 
 
 @_drive_of.register
-def _torque_drive(motion: FreeMotion, settings: Mapping[str, Setting]) -> Drive:
+def _torque_drive(motion: FreeMotion, settings: Mapping[str, ExportParameter]) -> Drive:
     """Return the drive of a free joint: T_ex on a vane alone, or T_2 on the ankle of a leg, which T_ex opposes."""
     if motion.leg is None:
         name, summary, start, load = (

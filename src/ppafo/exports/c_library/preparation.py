@@ -14,7 +14,7 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
-from ppafo.engine.scheme.motion import Pace
+from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.step.lane import Lane, LaneResult, LaneTiming
 from ppafo.exports.c_library.files import c_identifier
@@ -390,7 +390,7 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     """Set all other states at the start."""
     program = parts.program
     lane.result = LaneResult(0.0, NEVER_FAILED, 0.0)
-    lane.pace = Pace(lane.step)
+    lane.pace = StepControl(lane.step)
     if program.gas.START is not None:
         lane.masses = program.gas.START(lane.plant, lane.state)
     lane.valve_state = parts.constant(program.valve.initial())

@@ -90,7 +90,7 @@ def c_text_of_run(
     ``name`` begins the names of the structs of settings and metrics, which the file ``around`` it declares; ``further``
     may add functions that take ``settings``.
     """
-    from ppafo.translation.c99 import Reading, c_source, documents_of, is_free
+    from ppafo.translation.c99 import ReadableUnit, c_source, documents_of, is_free
     from ppafo.translation.walk import walk_module
 
     collector = _collector()
@@ -126,7 +126,9 @@ def c_text_of_run(
         walk_module(composed, types),
         documents,
         title,
-        reading=Reading(short, {kind.row.name: kind.row.name for kind in (settings_row, outputs, metrics_row)}, around),
+        reading=ReadableUnit(
+            short, {kind.row.name: kind.row.name for kind in (settings_row, outputs, metrics_row)}, around
+        ),
     )
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from ppafo.exports.c_library.files import Relation, Setting, c_identifier
+from ppafo.exports.c_library.files import ExportParameter, Relation, c_identifier
 from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency
@@ -22,7 +22,7 @@ SAID = {
 """Meanings of some settings outside a file."""
 
 
-def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
+def settings_of(scenario: Scenario) -> tuple[ExportParameter, ...]:
     """Every number of a scenario in SI units, under the path that overrides know it by."""
     # The file's step, from which the engine makes one that divides a sample.
     texts = time_texts(scenario)
@@ -41,7 +41,7 @@ def settings_of(scenario: Scenario) -> tuple[Setting, ...]:
         "controller.period": period,
     }
     return tuple(
-        Setting(
+        ExportParameter(
             c_identifier(path),
             path,
             replace(quantity, summary=SAID.get(path, quantity.summary)),

@@ -10,7 +10,7 @@ from typing import Any
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
-from ppafo.exports.c_library.files import Relation, Setting, c_identifier
+from ppafo.exports.c_library.files import ExportParameter, Relation, c_identifier
 from ppafo.exports.c_library.preparation import (
     Preparation,
     PreparedLane,
@@ -27,7 +27,7 @@ from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
-from ppafo.parameters.graph import Follows, Graph, Term, holding
+from ppafo.parameters.graph import Follows, Graph, LinkFunction, holding
 from ppafo.simulation.declaration import RUN
 from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.profiles import profile_parameters
@@ -90,7 +90,7 @@ def check_can_leave(configuration: Scenario) -> None:
         )
 
 
-def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
+def settings_of_walk(configuration: Scenario) -> tuple[ExportParameter, ...]:
     """Every number of a walk in SI units, under the path that overrides know it by."""
     run, control = configuration.run, _control(configuration)
     of_run = {"run.duration": run.duration, "run.step": run.step, "run.output_interval": record_interval(run.duration)}
@@ -104,7 +104,7 @@ def settings_of_walk(configuration: Scenario) -> tuple[Setting, ...]:
     wearer = (f"wearer.{quantity.name}" for quantity in (*WEARER, PERSON))
     paths = dict.fromkeys((*device_numbers(configuration.device), *of_run, *wearer, *times, *control, *declared))
     return tuple(
-        Setting(
+        ExportParameter(
             c_identifier(path),
             path,
             replace(declared[path], summary=SAID.get(path, declared[path].summary)),
@@ -129,7 +129,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 def links_of_walk(configuration: Scenario) -> Graph:
     """Settings of a walk that follow others as long as nobody changes them."""
     known = {setting.path: setting.value for setting in settings_of_walk(configuration)}
-    recorded = {"run.output_interval": (Follows((Term(("run.duration",), record_interval),)),)}
+    recorded = {"run.output_interval": (Follows((LinkFunction(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, known)

@@ -5,7 +5,7 @@ from typing import Any
 from xml.etree import ElementTree as Xml
 
 from ppafo.exports.fmu.interface import Interface
-from ppafo.exports.fmu.variables import Variable, variables_of
+from ppafo.exports.fmu.variables import FmuVariable, variables_of
 from ppafo.units import base_value, dimension
 from ppafo.version import __version__
 
@@ -122,7 +122,7 @@ def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
     }
 
 
-def _attributes(variable: Variable) -> tuple[dict[str, str], dict[str, str]]:
+def _attributes(variable: FmuVariable) -> tuple[dict[str, str], dict[str, str]]:
     """Return the attributes of a variable, and those of the number that it is."""
     initial = {"parameter": {"initial": "exact"}, "input": {}}.get(variable.causality, {"initial": "calculated"})
     of_variable = {
@@ -148,7 +148,7 @@ def _shown(unit: str) -> str:
     return "" if bare in ("", "-", "1") else bare
 
 
-def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables: Iterable[Variable]) -> None:
+def _add_units_and_experiment(root: Xml.Element, interface: Interface, variables: Iterable[FmuVariable]) -> None:
     """Add what stands between the kind of a unit and its variables, in FMI 2 and 3 alike."""
     table = Xml.SubElement(root, "UnitDefinitions")
     for name in sorted({_shown(variable.unit) for variable in variables} - {""}):

@@ -4,7 +4,7 @@ import hashlib
 import html
 import io
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib.resources import files
 
 from ppafo.errors import ScenarioError, nearest_name
@@ -67,7 +67,15 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
         if name == host_platform():
             check_unit(interface, fmi, token, library)
         contents[f"binaries/{folder}/{identifier}{platform.suffix}"] = library
-    return {f"{identifier}.fmu": _archive(contents)}
+    target = io.BytesIO()
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, _FIRST_DAY)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            # Permissions of Unix in the upper half; a library must be executable for some tools.
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            archive.writestr(entry, content)
+    return {f"{identifier}.fmu": target.getvalue()}
 
 
 def _platform(name: str, fmi: int) -> Platform:
@@ -111,16 +119,3 @@ def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:
         f"fmi{fmi}.c": "".join(filled(template("ppafo.exports.fmu", file), words) for file in _CALLS[fmi]).encode(),
         **{file: headers.joinpath(file).read_bytes() for file in _HEADERS[fmi]},
     }
-
-
-def _archive(contents: Mapping[str, bytes]) -> bytes:
-    """Return a zip file of these files, the same bytes on every day."""
-    target = io.BytesIO()
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in contents.items():
-            entry = zipfile.ZipInfo(name, _FIRST_DAY)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            # Permissions of Unix in the upper half; a library must be executable for some tools.
-            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            archive.writestr(entry, content)
-    return target.getvalue()

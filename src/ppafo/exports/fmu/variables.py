@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ppafo.exports.c_library.files import OUTPUTS, Setting
+from ppafo.exports.c_library.files import OUTPUTS, ExportParameter
 from ppafo.exports.fmu.interface import Interface
 from ppafo.model.controlled import CONTROLLED
 
@@ -33,7 +33,7 @@ _LARGEST_LIMIT = 1.0e308
 
 
 @dataclass(frozen=True, slots=True)
-class Variable:
+class FmuVariable:
     """Variable of a unit: name, number, unit and meaning; ``causality`` and ``variability`` in terms of FMI.
 
     A ``start`` of None is calculated, limits of None are none; all three are in ``unit``.
@@ -50,7 +50,7 @@ class Variable:
     maximum: float | None = None
 
 
-def tuning_of(interface: Interface, setting: Setting) -> Tuning:
+def tuning_of(interface: Interface, setting: ExportParameter) -> Tuning:
     """Return whether a setting is a variable of a unit, and if so whether it may change under way."""
     if setting.path in interface.hidden:
         return "hidden"
@@ -65,7 +65,7 @@ def variability_of(output: str) -> Variability:
     return "discrete" if output in STEPPED else "continuous"
 
 
-def variables_of(interface: Interface) -> tuple[Variable, ...]:
+def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
     """Return all variables, in the order of their numbers: settings, outputs, metrics, inputs.
 
     The numbers are also those of the C, which counts what is no variable of the unit too.
@@ -82,11 +82,11 @@ def variables_of(interface: Interface) -> tuple[Variable, ...]:
     )
 
 
-def _parameters(interface: Interface) -> Iterator[Variable]:
+def _parameters(interface: Interface) -> Iterator[FmuVariable]:
     for number, setting in enumerate(interface.library.settings):
         tuning, quantity = tuning_of(interface, setting), setting.quantity
         if tuning != "hidden":
-            yield Variable(
+            yield FmuVariable(
                 setting.path,
                 number,
                 quantity.unit,
@@ -103,21 +103,21 @@ def _shown_limit(limit: float) -> float | None:
     return limit if abs(limit) < _LARGEST_LIMIT else None
 
 
-def _outputs(interface: Interface, first: int) -> Iterator[Variable]:
+def _outputs(interface: Interface, first: int) -> Iterator[FmuVariable]:
     for number, name in enumerate(interface.library.program.outputs, start=first):
         if name in interface.outputs:
             unit, summary = OUTPUTS[name]
-            yield Variable(name, number, unit, summary, "output", variability_of(name))
+            yield FmuVariable(name, number, unit, summary, "output", variability_of(name))
 
 
-def _metrics(interface: Interface, first: int) -> Iterator[Variable]:
+def _metrics(interface: Interface, first: int) -> Iterator[FmuVariable]:
     for number, metric in enumerate(interface.library.program.metrics, start=first):
-        yield Variable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
+        yield FmuVariable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
 
 
-def _inputs(interface: Interface, first: int) -> Iterator[Variable]:
+def _inputs(interface: Interface, first: int) -> Iterator[FmuVariable]:
     for number, given in enumerate(interface.inputs, start=first):
-        yield Variable(
+        yield FmuVariable(
             given.name,
             number,
             given.unit,

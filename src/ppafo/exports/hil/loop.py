@@ -193,7 +193,7 @@ SILENT, NOT_SOUND, STOPPED, BROKEN = (
 """Why a plant is vented."""
 
 
-class Row(NamedTuple):
+class LogRow(NamedTuple):
     """A sample in the log: when it was due [s], how late it was sent [s], after how long it was answered [s].
 
     None stands for a sample that was not sent, or not answered; ``controller_time`` [us] is the time stamp of the
@@ -261,7 +261,7 @@ class Judge:
 
 
 @dataclass(frozen=True, slots=True)
-class Exchange:
+class LinkTraffic:
     """The traffic of a run: the log, packets accepted and counted, and the end.
 
     ``refused`` are bytes that were no good packet, ``ignored`` good packets that were no answer to a sample that
@@ -269,7 +269,7 @@ class Exchange:
     vented, at ``vented_at`` [s]; it is empty, and None, where it was not.
     """
 
-    rows: tuple[Row, ...]
+    rows: tuple[LogRow, ...]
     taken: int
     refused: Counter[str]
     ignored: Counter[str]
@@ -294,12 +294,12 @@ class Bench:
         self.judge = Judge(run, period)
         self.reader = wire.Reader(port.is_stream)
         self.taken = 0
-        self.rows: list[Row] = []
+        self.rows: list[LogRow] = []
         self._answered_at = 0.0
         self._has_diverged = False
         self._show(0)
 
-    def run(self, patience: float, is_stopped: Callable[[], bool]) -> Exchange:
+    def run(self, patience: float, is_stopped: Callable[[], bool]) -> LinkTraffic:
         """Call the controller, at most for ``patience`` [s], and run the plant to its end or until it is stopped.
 
         ScenarioError where nobody answers.
@@ -336,7 +336,7 @@ class Bench:
             self._vent_to_the_end()
         self._say_over()
         vented = next((row.due for row in self.rows if row.is_vented), None)
-        return Exchange(
+        return LinkTraffic(
             rows=tuple(self.rows),
             taken=self.taken,
             refused=self.reader.refused,
@@ -364,7 +364,7 @@ class Bench:
             self.judge.vent(BROKEN)
         command = self.judge.decide()
         self.rows.append(
-            Row(
+            LogRow(
                 sequence=sequence,
                 due=sequence * self.period,
                 sent_late=late,
@@ -408,7 +408,7 @@ class Bench:
             "pressure_2": seen.pressure_2,
             "torque": seen.torque,
         }
-        self._shown = wire.Sample(
+        self._shown = wire.WireSample(
             flags=flags | (wire.VENTED if self.judge.vented else 0) | wire.COMPUTED,
             run=self.judge.run,
             sequence=plant.taken,
@@ -424,7 +424,7 @@ class Bench:
         while self.plant.taken < until:
             sequence = self.plant.taken
             self.rows.append(
-                Row(
+                LogRow(
                     sequence=sequence,
                     due=sequence * self.period,
                     sent_late=None,

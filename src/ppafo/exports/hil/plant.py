@@ -16,7 +16,7 @@ CHANNELS_SENT = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Plant:
+class CompiledPlant:
     """A scenario without its controller: how it is run, and what compiled it."""
 
     scenario: Scenario
@@ -26,7 +26,7 @@ class Plant:
     period: float
 
 
-def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
+def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
     """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
         raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
@@ -47,7 +47,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> Plant:
     # A controller at the wire may vent both chambers.
     run = replace(run, program=replace(run.program, valve=venting_valve(chosen.device.valve)))
     module = load_program(batch_of(run).program)
-    return Plant(chosen, run, module, backend_described(), period)
+    return CompiledPlant(chosen, run, module, backend_described(), period)
 
 
 def check_forces(scenario: Scenario) -> None:

@@ -28,7 +28,7 @@ _HALF = wire.WRAP // 2
 
 
 @dataclass(frozen=True, slots=True)
-class Recorded:
+class CollectedRecording:
     """A recording of a bench, and what was counted beside it.
 
     ``lost`` are samples whose numbers never came. ``ended`` says what ended it, ``is_stopped`` whether a person did.
@@ -82,8 +82,8 @@ class Collector:
     def __init__(self) -> None:
         self.ignored: Counter[str] = Counter()
         self.is_over = False
-        self._newest: wire.Sample | None = None
-        self._stray: wire.Sample | None = None
+        self._newest: wire.WireSample | None = None
+        self._stray: wire.WireSample | None = None
         self._number = 0
         self._elapsed = 0
         self._names: list[str] = []
@@ -99,7 +99,7 @@ class Collector:
 
     def take(self, packet: wire.Packet) -> bool:
         """Look at a good packet; true where it is a new sample."""
-        if not isinstance(packet, wire.Sample):
+        if not isinstance(packet, wire.WireSample):
             self.ignored["no sample"] += 1
             return False
         if self._newest is None and not packet.counts:
@@ -114,7 +114,7 @@ class Collector:
             return False
         return self._decide(packet)
 
-    def _decide(self, packet: wire.Sample) -> bool:
+    def _decide(self, packet: wire.WireSample) -> bool:
         """Keep a sample that goes on from the stray alone, with that one; any other is the next stray."""
         stray, newest = self._stray, self._newest
         if stray is None or newest is None or _why_not(stray, packet):
@@ -133,7 +133,7 @@ class Collector:
         self._keep(stray)
         return self._keep(packet)
 
-    def _keep(self, packet: wire.Sample) -> bool:
+    def _keep(self, packet: wire.WireSample) -> bool:
         """Add a sample of the run, unless its number came before."""
         if self._newest is None:
             self._newest = packet
@@ -233,7 +233,7 @@ _FURTHEST = 10_000
 """Samples that may be lost in a row before the next one waits for another that goes on from it: ten seconds."""
 
 
-def _why_not(before: wire.Sample, packet: wire.Sample) -> str:
+def _why_not(before: wire.WireSample, packet: wire.WireSample) -> str:
     """Return why a sample does not go on from another one, or comes a little before it; empty where it does."""
     if packet.run != before.run:
         return _OF_OTHERS[0]
@@ -261,7 +261,7 @@ def record(
     is_stopped: Callable[[], bool] = lambda: False,
     clock: Callable[[], float] = time.perf_counter,
     keep: Callable[[str], None] = lambda _lines: None,
-) -> Recorded:
+) -> CollectedRecording:
     """Record what a bench sends: for a time of the bench [s], until it says that it is over, or until it is silent.
 
     ``patience`` [s] is how long silence lasts. Once a second ``keep`` gets what came as lines of a CSV file, so that
@@ -285,7 +285,7 @@ def record(
         came = wire.described_refusals(reader.refused, others)
         raise DataError(f"no sample received within {patience:g} s; received: {came}")
     recording, lost = collector.recording(label)
-    return Recorded(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())
+    return CollectedRecording(recording, lost, reader.refused, collector.ignored, port.strangers, ended, is_stopped())
 
 
 @contextlib.contextmanager

@@ -12,10 +12,10 @@ import numpy as np
 
 from ppafo.documents.json_text import json_text, plain
 from ppafo.exports.hil import wire
-from ppafo.exports.hil.loop import Exchange, Row
-from ppafo.exports.hil.plant import Plant
+from ppafo.exports.hil.loop import LinkTraffic, LogRow
+from ppafo.exports.hil.plant import CompiledPlant
 from ppafo.report.recording_figure import recording_figure
-from ppafo.report.style import ACTUAL, VERMILION, Margins, figure_of_free_panels, house_style, render_figure
+from ppafo.report.style import ACTUAL, VERMILION, FigureMargins, figure_of_free_panels, house_style, render_figure
 from ppafo.simulation.simulate import Result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.units.shown import shown_in
@@ -36,7 +36,7 @@ _SHORTEST_SHOWN, _LONGEST_SHOWN = 1.0e-2, 1.0e1
 
 
 @dataclass(frozen=True, slots=True)
-class Machine:
+class HostComputer:
     """Computer of the plant: system, cores, Python, and load (mean number of running processes, 1 min).
 
     The load is None where the system does not tell it.
@@ -60,7 +60,7 @@ class Timing(NamedTuple):
     missed: int
 
 
-def timing_of(rows: Sequence[Row]) -> Timing:
+def timing_of(rows: Sequence[LogRow]) -> Timing:
     """Return the timing of the samples of a log."""
     sent = [row for row in rows if row.sent_late is not None]
     answered = [row.answered_after for row in sent if row.answered_after is not None]
@@ -72,11 +72,11 @@ def timing_of(rows: Sequence[Row]) -> Timing:
 class HardwareRun:
     """A run at the wire: the result, what went over the wire and when, and the machine."""
 
-    plant: Plant
+    plant: CompiledPlant
     result: Result
-    exchange: Exchange
+    exchange: LinkTraffic
     timing: Timing
-    machine: Machine
+    machine: HostComputer
 
     @property
     def is_good(self) -> bool:
@@ -105,7 +105,7 @@ class HardwareRun:
             "is_stopped": exchange.is_stopped,
             "failure": exchange.failure or None,
             "plant": self.plant.compiled_by,
-            "machine": {name: getattr(self.machine, name) for name in Machine.__slots__},
+            "machine": {name: getattr(self.machine, name) for name in HostComputer.__slots__},
         }
 
     def outcome(self, port: str) -> dict[str, Any]:
@@ -190,7 +190,9 @@ class HardwareRun:
         period, load, timing = self.plant.period * _PER_THOUSAND, self.machine.load_after, self.timing
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         with house_style():
-            figure, ((late, after),) = figure_of_free_panels((7.2, 3.3), Margins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2)
+            figure, ((late, after),) = figure_of_free_panels(
+                (7.2, 3.3), FigureMargins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2
+            )
             figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
             said = (
                 f"Dashed: one sample, {period:g} ms. {timing.missed} of {len(timing.sent_late)} samples missed{beside}"
@@ -228,7 +230,7 @@ def described_spread(values: Sequence[float]) -> str:
     return f"median {shown['median']}, 99 % within {shown['percentile_99']}, at most {shown['largest']}"
 
 
-def longest_silence(rows: Sequence[Row]) -> int:
+def longest_silence(rows: Sequence[LogRow]) -> int:
     """Most samples one after the other that were sent and not answered."""
     longest = current = 0
     for row in rows:

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from ppafo.engine.run import batch_of
 from ppafo.exports.hil import wire
 from ppafo.exports.hil.loop import Bench, LockStep, Pace, RealTime, without_collections
-from ppafo.exports.hil.plant import Plant, check_baud, plant_of
-from ppafo.exports.hil.result import HardwareRun, Machine, timing_of
+from ppafo.exports.hil.plant import CompiledPlant, check_baud, plant_of
+from ppafo.exports.hil.result import HardwareRun, HostComputer, timing_of
 from ppafo.simulation.sampled import SampledRun
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import result_of
@@ -26,7 +26,7 @@ _SAME_PERIOD = 1.0e-9
 
 
 def run_plant(
-    plant: Plant,
+    plant: CompiledPlant,
     port: wire.Port,
     pace: Callable[[float], Pace],
     patience: float = PATIENCE,
@@ -45,7 +45,7 @@ def run_plant(
     sampled = SampledRun(batch_of(plant.run), plant.module)
     with without_collections():
         exchange = Bench(sampled, plant.period, port, pace(plant.period), number).run(patience, is_stopped)
-    machine = Machine(
+    machine = HostComputer(
         system=f"{platform.system()} {platform.machine()}",
         cores=os.cpu_count() or 1,
         python=platform.python_version(),

@@ -76,7 +76,7 @@ LONGEST = _SHORTEST + _WORD.size * len(CHANNELS)
 """Bytes of the longest packet."""
 
 
-class Sample(NamedTuple):
+class WireSample(NamedTuple):
     """A sample of a plant or a bench: flags, run, sequence number, time stamp [us], counts by channel."""
 
     flags: int
@@ -96,7 +96,7 @@ class Answer(NamedTuple):
     command: int
 
 
-Packet = Sample | Answer
+Packet = WireSample | Answer
 
 
 def count_of(name: str, value: float) -> int:
@@ -115,7 +115,7 @@ def counts_per_unit(name: str) -> int:
     return round(1.0 / CHANNELS[_NUMBERS[name]].scale)
 
 
-def sample_bytes(sample: Sample) -> bytes:
+def sample_bytes(sample: WireSample) -> bytes:
     """Return the packet that carries a sample to the processor."""
     # In order of bits, whatever the order of the mapping: the receiver has only the mask.
     numbers = sorted(_NUMBERS[name] for name in sample.counts)
@@ -237,7 +237,7 @@ def _read(data: bytes) -> Packet | str:
     # Little-endian and signed, as the protocol says, whatever this computer is.
     values = struct.unpack_from(f"<{len(names)}i", data, _HEADER.size + _MASK.size)
     counts = dict(zip(names, values, strict=True))
-    return Sample(flags=flags, run=run, sequence=sequence, time=time, counts=counts)
+    return WireSample(flags=flags, run=run, sequence=sequence, time=time, counts=counts)
 
 
 def described_refusals(refused: Mapping[str, int], others: Iterable[tuple[str, int]] = ()) -> str:

@@ -26,7 +26,7 @@ class Cells(NamedTuple):
     units: Sequence[str]
 
 
-class Block(NamedTuple):
+class NumberBlock(NamedTuple):
     """Rows of numbers in a text file.
 
     ``first`` is the index of the first row among the lines, ``decimal`` the decimal mark. With ``is_ragged`` cells may
@@ -55,7 +55,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     return [cell.strip().strip('"').strip() for cell in line.split(delimiter)]
 
 
-def rows_of(block: Block, cells: Cells, clock: Sequence[int] = ()) -> tuple[Floats, list[int]]:
+def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tuple[Floats, list[int]]:
     """Numbers of a block, shape (rows, named columns), NaN for a sample that was not recorded, and lines from 1.
 
     ``clock`` are the named columns in which every row needs a number. Raises DataError, with line and column, for a
@@ -109,7 +109,7 @@ Clock = str | PerFrame | PerRow
 
 def table_of(
     path: str | Path,
-    block: Block,
+    block: NumberBlock,
     cells: Cells,
     clock: Clock,
     *,

@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.errors import DataError, PpafoError, count_of, noted_in, raise_noted
 from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
 from ppafo.gait.document import load_gait
-from ppafo.gait.gait import HARMONICS, REQUIRED, Curve, FitError, Gait, Origin, fit_curve
+from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
 from ppafo.gait.plausible import (
     MeanStride,
     check_force_scale,
@@ -38,8 +38,8 @@ from ppafo.gait.recorded.footfalls import (
     usable_strides,
 )
 from ppafo.gait.recorded.mapping import ImportSettings, KneeMap, check_settings
-from ppafo.gait.recorded.source import Source, of_largest_one, read_source
-from ppafo.gait.recorded.strides import Strides, of_usual_time, without_drop_outs, without_odd_shapes
+from ppafo.gait.recorded.source import GaitSource, of_largest_one, read_source
+from ppafo.gait.recorded.strides import StrideSelection, of_usual_time, without_drop_outs, without_odd_shapes
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
 from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, lost_span, low_pass
 
@@ -100,7 +100,7 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks, wrong)
 
 
-def _with_sound_force(source: Source, wrong: list[PpafoError]) -> Mapping[str, Signal]:
+def _with_sound_force(source: GaitSource, wrong: list[PpafoError]) -> Mapping[str, Signal]:
     """Return the signals; a force in a wrong unit is noted, and scaled to 1 so that its events are still found."""
     force = source.walk.get(FORCE)
     if force is None:
@@ -113,7 +113,7 @@ def _with_sound_force(source: Source, wrong: list[PpafoError]) -> Mapping[str, S
     return source.walk
 
 
-def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[PpafoError]) -> Strides:
+def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[PpafoError]) -> StrideSelection:
     """Return the strides within angles and events that take the usual time; DataError where there is none."""
     walk, events = footfalls.walk, footfalls.events
     least = settings.least_strides or (1 if footfalls.is_one_cycle or footfalls.is_overground else LEAST_STRIDES)
@@ -129,7 +129,7 @@ def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[
 
 
 def _curves(
-    walk: Mapping[str, Signal], covered: Mapping[str, Sequence[Stride]], strides: Strides, cut_off: float | None
+    walk: Mapping[str, Signal], covered: Mapping[str, Sequence[Stride]], strides: StrideSelection, cut_off: float | None
 ) -> dict[str, CurveStatistics]:
     """Return the curves of all signals over the strides taken that they cover, below a frequency [Hz] if any."""
     # Footfalls come from the unfiltered force, whose edges a low pass would move.
@@ -141,7 +141,7 @@ def _curves(
 
 
 def _over_taken_strides(
-    curves: Mapping[str, CurveStatistics], walk: Mapping[str, Signal], strides: Strides, wrong: list[PpafoError]
+    curves: Mapping[str, CurveStatistics], walk: Mapping[str, Signal], strides: StrideSelection, wrong: list[PpafoError]
 ) -> dict[str, CurveStatistics]:
     """Return the curves over the strides taken alone; one that covers none of them is noted and left out."""
     kept = {}
@@ -163,10 +163,10 @@ def _over_taken_strides(
 
 
 def _finish(
-    source: Source,
+    source: GaitSource,
     footfalls: Footfalls,
     curves: Mapping[str, CurveStatistics],
-    strides: Strides,
+    strides: StrideSelection,
     remarks: Sequence[str],
     wrong: list[PpafoError],
 ) -> ImportedGait:
@@ -225,7 +225,7 @@ def _is_one_marker(knee: KneeMap | None) -> bool:
     return forward == up != ""
 
 
-def _check_enough(strides: Strides, usable: list[Stride], walk: Mapping[str, Signal]) -> None:
+def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[str, Signal]) -> None:
     """Raise DataError for fewer strides than are needed; ``usable`` are all that the events show."""
     taken, least = len(strides.taken), strides.least
     if taken >= least:
@@ -270,7 +270,7 @@ def _gait(
     settings: ImportSettings,
     tables: Sequence[MotionTable],
     strides: Sequence[Stride],
-    curves: Mapping[str, Curve],
+    curves: Mapping[str, GaitCurve],
     events: str,
 ) -> Gait:
     """Return the gait of mean strides and their series, with where it comes from."""
@@ -333,7 +333,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     return said
 
 
-def _remarks(curves: Mapping[str, CurveStatistics], strides: Strides, events: str) -> list[str]:
+def _remarks(curves: Mapping[str, CurveStatistics], strides: StrideSelection, events: str) -> list[str]:
     """Return which strides were left out or are not covered, and what the force shows, or that there is none."""
     remarks = [
         f"stride from {stride.start:.4g} to {stride.end:.4g} s left out: {why}" for stride, why in strides.left_out

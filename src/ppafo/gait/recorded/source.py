@@ -13,8 +13,9 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
 from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names
 from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
-from ppafo.gait.recorded.walk import LOADS, Person, Signal, walk_signals
+from ppafo.gait.recorded.walk import LOADS, Signal, Subject, walk_signals
 from ppafo.kinds import Kinds
+from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
@@ -28,6 +29,7 @@ FORMS: Kinds[GaitForm] = Kinds(
         "nexus": "ppafo.gait.recorded.forms.motion_capture:NEXUS",
         "qualisys": "ppafo.gait.recorded.forms.motion_capture:QUALISYS",
         "motive": "ppafo.gait.recorded.forms.motion_capture:MOTIVE",
+        "bts": "ppafo.gait.recorded.forms.motion_capture:BTS",
         "dflow": "ppafo.gait.recorded.forms.motion_capture:DFLOW",
         "csv": "ppafo.gait.recorded.forms.comma_separated:FORM",
         "c3d": "ppafo.gait.recorded.forms.c3d:FORM",
@@ -55,7 +57,7 @@ def form_of(path: str | Path, name: str = "") -> GaitForm:
         if suffix in form.suffixes and form.recognises(path):
             return form
     *others, last = dict.fromkeys(suffix for form in FORMS.loaded().values() for suffix in form.suffixes)
-    raise DataError(f"{path}: is not a {', '.join(others)} or {last} file")
+    raise DataError(f"{path}: is not a {', '.join(others)} or {last} file{written_as_csv(path)}")
 
 
 def read_table(
@@ -107,7 +109,7 @@ _SAME = 0.02
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Source:
+class GaitSource:
     """Tables, map and signals of a recording, settings with what the files say, and remarks on what was mended."""
 
     tables: Sequence[MotionTable]
@@ -118,7 +120,7 @@ class Source:
     remarks: tuple[str, ...]
 
 
-def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: list[PpafoError]) -> Source:
+def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: list[PpafoError]) -> GaitSource:
     """Return the signals in recorded files; what is wrong but leaves both angles usable is added to ``wrong``.
 
     DataError for what ends the import, with everything in ``wrong``.
@@ -136,7 +138,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         tables = [FORMS[table.form].arrange(table) for table in tables]
     settings, said = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
-    person = Person(settings.body_mass or 1.0, settings.stature)
+    person = Subject(settings.body_mass or 1.0, settings.stature)
     convention = (
         find_convention(tables, settings.side, person.body_mass)
         if settings.columns is None
@@ -163,7 +165,7 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
     mended += _ends(walk, tables)
     signs_from: SignSource = "columns" if settings.columns is None else "map"
-    return Source(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
+    return GaitSource(tables, columns, walk, settings, signs_from, (*said, *convention.remarks, *mended))
 
 
 def of_largest_one(signal: Signal, is_upwards: bool = False) -> Signal:

@@ -38,32 +38,32 @@ _MOST_ODD = 0.4
 
 
 @dataclass(frozen=True, slots=True)
-class Strides:
+class StrideSelection:
     """Strides taken, strides left out, each with the reason, and the least number to take."""
 
     taken: tuple[Stride, ...]
     left_out: tuple[tuple[Stride, str], ...]
     least: int
 
-    def without(self, odd: Sequence[Stride], why: str, else_refused: str = "") -> "Strides":
+    def without(self, odd: Sequence[Stride], why: str, else_refused: str = "") -> "StrideSelection":
         """Return these without some; where too few remain all stay, or DataError with the words for that case."""
         kept = tuple(stride for stride in self.taken if stride not in odd)
         if len(kept) >= self.least:
-            return Strides(kept, (*self.left_out, *((stride, why) for stride in odd)), self.least)
+            return StrideSelection(kept, (*self.left_out, *((stride, why) for stride in odd)), self.least)
         if else_refused:
             raise DataError(else_refused)
         return self
 
 
-def of_usual_time(strides: Sequence[Stride], least: int) -> Strides:
+def of_usual_time(strides: Sequence[Stride], least: int) -> StrideSelection:
     """Return strides without those whose time differs from the median by more than LARGEST_STRIDE_CHANGE of it."""
     if not strides:
-        return Strides((), (), least)
+        return StrideSelection((), (), least)
     # The median: one stop among ten strides would move a mean.
     median = float(np.median([stride.time for stride in strides]))
     kept = [stride for stride in strides if abs(stride.time - median) <= LARGEST_STRIDE_CHANGE * median]
     why = "{:.3g} s long, the others are about " + f"{np.mean([stride.time for stride in kept]):.3g} s"
-    return Strides(
+    return StrideSelection(
         tuple(kept), tuple((stride, why.format(stride.time)) for stride in strides if stride not in kept), least
     )
 
@@ -72,9 +72,9 @@ def without_drop_outs(
     walk: Mapping[str, Signal],
     tables: Sequence[MotionTable],
     covered: Mapping[str, Sequence[Stride]],
-    strides: Strides,
+    strides: StrideSelection,
     wrong: list[PpafoError],
-) -> Strides:
+) -> StrideSelection:
     """Leave out strides in which a column keeps one value for more than 0.1 s; a load may in swing.
 
     Loads are looked at in the strides that they cover. A column that never moves is no drop-out, and a stretch that a
@@ -135,7 +135,7 @@ def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
     )
 
 
-def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: Strides) -> Strides:
+def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: StrideSelection) -> StrideSelection:
     """Leave out strides whose curve is unlike all others: a stumble, a turn, markers that were exchanged."""
     for name, curve in curves.items():
         if len(curve.strides) < _FEWEST_TO_COMPARE or name == "centre_of_pressure":

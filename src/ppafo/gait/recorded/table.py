@@ -21,7 +21,7 @@ Events = dict[tuple[str, str], list[float]]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trial:
+class TrialData:
     """Data of a file beside its columns: subject (kg, m; None where not stated), events [s] by side and kind.
 
     ``remarks`` say how its events were read, or why they were not.
@@ -48,7 +48,7 @@ class MotionTable:
     form: str = ""
     kind: str = "measured"
     remarks: tuple[str, ...] = ()
-    trial: Trial | None = None
+    trial: TrialData | None = None
 
 
 _LARGEST_JUMP = 3.0

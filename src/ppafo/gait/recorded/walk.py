@@ -191,14 +191,6 @@ def find_columns(
     raise DataError(f"{_why_missing(curve, bare, tables)} {_said_of_columns(tables)}")
 
 
-def _check_angles(columns: GaitMap, tables: Sequence[MotionTable]) -> None:
-    """Raise DataError where neither angle has its columns: what the files have is said once for both."""
-    named = {name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED}
-    if not any(all(name in table.columns for name in bare) for table in tables for bare in named.values()):
-        why = "; ".join(_why_missing(curve, bare, tables) for curve, bare in named.items())
-        raise DataError(f"{why} {_said_of_columns(tables)}")
-
-
 def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable]) -> str:
     """Return which column of a curve no table has, and the nearest; DataError where several have its name."""
     known = [name for table in tables for name in table.columns]
@@ -407,7 +399,7 @@ _RIGHT_ANGLE = 0.5 * np.pi
 
 
 @dataclass(frozen=True, slots=True)
-class Person:
+class Subject:
     """Body mass [kg], by which moments and forces are divided, and stature [m], which gives the length of the thigh."""
 
     body_mass: float
@@ -415,7 +407,7 @@ class Person:
 
 
 def walk_signals(
-    tables: Sequence[MotionTable], columns: GaitMap, person: Person, is_default: bool, wrong: list[PpafoError]
+    tables: Sequence[MotionTable], columns: GaitMap, person: Subject, is_default: bool, wrong: list[PpafoError]
 ) -> dict[str, Signal]:
     """Return the signals that a map finds in tables; all that is wrong with their columns is added to ``wrong``.
 
@@ -424,7 +416,12 @@ def walk_signals(
     where an angle cannot be used, with everything in ``wrong``.
     """
     try:
-        _check_angles(columns, tables)
+        named = {
+            name: [column.removeprefix("-") for column in column_names(getattr(columns, name))] for name in REQUIRED
+        }
+        if not any(all(name in table.columns for name in bare) for table in tables for bare in named.values()):
+            why = "; ".join(_why_missing(curve, bare, tables) for curve, bare in named.items())
+            raise DataError(f"{why} {_said_of_columns(tables)}")
     except DataError as error:
         raise_noted([*wrong, error])
     walk: dict[str, Signal] = {}

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.source import Source, check_moves, check_no_gap, window
+from ppafo.identification.source import RecordingSource, check_moves, check_no_gap, window
 from ppafo.signals import Recording
 from ppafo.signals.faults import is_at_limit, noise_of, plateaus
 from ppafo.signals.recording import Floats
@@ -28,7 +28,7 @@ _MINIMUM_OVER_NOISE = 20.0
 """Range of the angle over its noise from which something moves."""
 
 
-class Decay(NamedTuple):
+class FreeDecay(NamedTuple):
     """Free decay: times from its start [s], angle [rad], its direction (1 or -1), and its velocity [rad/s] if known."""
 
     time: Floats
@@ -37,7 +37,7 @@ class Decay(NamedTuple):
     velocity: Floats | None
 
 
-def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
+def decay_of(source: RecordingSource, start: float | None, end: float | None) -> FreeDecay:
     """Return the decay in a recording between two times [s]; without a start it begins where the speed is largest.
 
     IdentificationError, with the file, the sample and the remedy, where too few samples are left, where nothing moves,
@@ -58,15 +58,23 @@ def decay_of(source: Source, start: float | None, end: float | None) -> Decay:
         )
     skipped = check_no_gap(source, PROCEDURE, part)
     rows, sign = _falling_part(source, part, start is not None)
-    _check_not_saturated(source, part[ANGLE][rows], skipped + rows.start)
+    angle = part[ANGLE][rows]
+    before = skipped + rows.start
+    for plateau in plateaus(angle):
+        if is_at_limit(angle, plateau):
+            raise IdentificationError(
+                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
+                f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
+                f"before: the sensor is saturated or the vane is at a stop; give end"
+            )
     if VELOCITY in part:
         _check_velocity(source, part, rows)
     velocity = part[VELOCITY][rows] if VELOCITY in part else None
     time = part.time[rows]
-    return Decay(time=time - time[0], angle=part[ANGLE][rows], sign=sign, velocity=velocity)
+    return FreeDecay(time=time - time[0], angle=part[ANGLE][rows], sign=sign, velocity=velocity)
 
 
-def _falling_part(source: Source, part: Recording, starts_here: bool) -> tuple[slice, float]:
+def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -> tuple[slice, float]:
     """Return the samples from the end of the push to the first reversal, and the direction of the push, 1 or -1.
 
     Where the caller said where the decay starts, the push is over by then.
@@ -86,18 +94,7 @@ def _falling_part(source: Source, part: Recording, starts_here: bool) -> tuple[s
     return slice(first, last), sign
 
 
-def _check_not_saturated(source: Source, angle: Floats, before: int) -> None:
-    """Raise IdentificationError for an angle [rad] that stops at a limit; ``before`` samples of the file precede it."""
-    for plateau in plateaus(angle):
-        if is_at_limit(angle, plateau):
-            raise IdentificationError(
-                f"{source.name}: {PROCEDURE}: channel 'angle' stays at exactly {plateau.value:g} rad for "
-                f"{plateau.count} samples, from sample {before + plateau.first + 1}, and was still moving "
-                f"before: the sensor is saturated or the vane is at a stop; give end"
-            )
-
-
-def _check_velocity(source: Source, part: Recording, rows: slice) -> None:
+def _check_velocity(source: RecordingSource, part: Recording, rows: slice) -> None:
     """Raise IdentificationError for a velocity that is not how fast the angle changes, by the area under it."""
     time, angle, velocity = part.time[rows], part[ANGLE][rows], part[VELOCITY][rows]
     moved = np.concatenate(([0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * np.diff(time))))

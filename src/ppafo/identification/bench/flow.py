@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
-from ppafo.identification.bench.law import Readings, Values, solve, sought, tolerance, within
+from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
 from ppafo.identification.fit import Fit
 from ppafo.identification.residuals import Free
 from ppafo.identification.tolerances import Tolerances
@@ -126,7 +126,7 @@ def _shape(first: Floats, second: Floats, curve: Callable[[Floats], Floats]) -> 
     return np.asarray(np.sign(first - second) * flow * np.minimum((1.0 - ratio) / (1.0 - LINEAR_RATIO), 1.0))
 
 
-class Sizes(NamedTuple):
+class OpeningSizes(NamedTuple):
     """Unknowns of an opening: Cd, A or Cd A, C [m^3/(s Pa)], or c [kg/(s Pa^2)]; b [-]; c of a parallel gap."""
 
     size: float
@@ -148,7 +148,7 @@ class Opening:
     known: float = 1.0
     critical_ratio: float | None = None
 
-    def flow(self, sizes: Sizes, first: Floats, second: Floats) -> Floats:
+    def flow(self, sizes: OpeningSizes, first: Floats, second: Floats) -> Floats:
         """Return the mass flow [kg/s], positive from first to second [Pa]."""
         laminar = np.asarray(first**2 - second**2)
         if self.law == "laminar":
@@ -161,18 +161,18 @@ class Opening:
             through = sizes.size * per_size * orifice_shape(first, second, self.gas.heat_capacity_ratio)
         return through + sizes.beside * laminar if self.law == "both" else through
 
-    def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[Sizes, Sizes]:
+    def rough_sizes(self, first: Floats, second: Floats, flow: Floats) -> tuple[OpeningSizes, OpeningSizes]:
         """Return sizes that leave least of a flow [kg/s], none below 0, and those of each part if it were all of it.
 
         The flow is linear in them, but for a critical ratio, which is taken as usual.
         """
         ratio = CRITICAL_RATIOS[0]
-        parts = [self.flow(Sizes(1.0, ratio), first, second)]
-        parts += [self.flow(Sizes(0.0, ratio, 1.0), first, second)] if self.law == "both" else []
+        parts = [self.flow(OpeningSizes(1.0, ratio), first, second)]
+        parts += [self.flow(OpeningSizes(0.0, ratio, 1.0), first, second)] if self.law == "both" else []
         columns = np.stack(parts, axis=1)
         alone = np.linalg.norm(flow) / np.linalg.norm(columns, axis=0)
         size, *beside = (nnls(columns * alone, flow)[0] * alone).tolist()
-        return Sizes(size, ratio, *beside), Sizes(float(alone[0]), ratio, *alone[1:].tolist())
+        return OpeningSizes(size, ratio, *beside), OpeningSizes(float(alone[0]), ratio, *alone[1:].tolist())
 
 
 CRITICAL_RATIOS = 0.2, 0.01, 0.95
@@ -186,11 +186,11 @@ class Paths(NamedTuple):
     critical_ratio: str = ""
     beside: str = ""
 
-    def sizes(self, at: Values) -> Sizes:
+    def sizes(self, at: Values) -> OpeningSizes:
         """Return the sizes among the numbers of a law."""
-        return Sizes(at[self.size], at[self.critical_ratio], at[self.beside])
+        return OpeningSizes(at[self.size], at[self.critical_ratio], at[self.beside])
 
-    def sought(self, start: Sizes, alone: Sizes) -> tuple[Free, ...]:
+    def sought(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[Free, ...]:
         """Return the numbers that are sought; a part of which nothing may be seen has the scale of all of the flow."""
         scale = alone.size if self.beside else 0.0
         return (
@@ -204,7 +204,7 @@ def solve_flow(
     opening: Opening,
     paths: Paths,
     pressures: Mapping[str, Floats],
-    readings: Readings,
+    readings: PooledReadings,
     tolerances: Tolerances,
     confidence: float,
 ) -> tuple[Fit, Floats]:

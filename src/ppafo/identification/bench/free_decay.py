@@ -25,15 +25,15 @@ from ppafo.identification.bench.decay import (
     MINIMUM_SAMPLES,
     PROCEDURE,
     VELOCITY,
-    Decay,
+    FreeDecay,
     decay_of,
     smoothed_rates,
     smoothing_width,
 )
-from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
+from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.residuals import Free
-from ppafo.identification.source import Source, check_sources, without_wrong_samples
+from ppafo.identification.source import RecordingSource, check_sources, without_wrong_samples
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
@@ -72,7 +72,7 @@ class Slowing(NamedTuple):
         return self.damping_rate * speed + self.deceleration * (1.0 + grip)
 
 
-class Course(NamedTuple):
+class DecayCurve(NamedTuple):
     """Times [s], angle swept [rad] and speed [rad/s] from the start to standstill."""
 
     time: Floats
@@ -80,7 +80,7 @@ class Course(NamedTuple):
     speed: Floats
 
 
-def course_to_standstill(speed: float, slowing: Slowing) -> Course:
+def course_to_standstill(speed: float, slowing: Slowing) -> DecayCurve:
     """Return the course from a speed [rad/s] to standstill, of dt = -dw / deceleration by Gauss's rule over w."""
     # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
@@ -91,10 +91,10 @@ def course_to_standstill(speed: float, slowing: Slowing) -> Course:
     decelerations = np.maximum(decelerations, _SLOWEST * float(decelerations.max()) + 1e-300)
     times = half * ((1.0 / decelerations) @ _WEIGHTS)
     swept = half * ((nodes / decelerations) @ _WEIGHTS)
-    return Course(np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds)
+    return DecayCurve(np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds)
 
 
-def course(times: Floats, speed: float, slowing: Slowing) -> Course:
+def course(times: Floats, speed: float, slowing: Slowing) -> DecayCurve:
     """Return the course at times [s] after a start at a speed [rad/s]; after standstill the vane stays."""
     from scipy.interpolate import CubicHermiteSpline
 
@@ -102,7 +102,7 @@ def course(times: Floats, speed: float, slowing: Slowing) -> Course:
     rising = np.concatenate(([True], np.diff(known.time) > 0.0))
     inside = np.minimum(times, known.time[-1])
     angle = CubicHermiteSpline(known.time[rising], known.swept[rising], known.speed[rising])
-    return Course(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
+    return DecayCurve(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
 
 
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"
@@ -116,7 +116,7 @@ _MOVING = 0.03
 
 
 def free_decay(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     start: float | None = None,
     end: float | None = None,
     inertia: float | None = None,
@@ -167,12 +167,12 @@ def free_decay(
 
 
 _OF_THE_DEVICE = (
-    Reported("friction.viscous_damping", "N m s/rad", "Viscous damping"),
-    Reported("friction.dynamic_torque", "N m", "Dynamic friction"),
+    ReportedNumber("friction.viscous_damping", "N m s/rad", "Viscous damping"),
+    ReportedNumber("friction.dynamic_torque", "N m", "Dynamic friction"),
 )
 _OVER_INERTIA = (
-    Reported("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
-    Reported("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
+    ReportedNumber("free_decay.damping_over_inertia", "1/s", "Viscous damping over the inertia"),
+    ReportedNumber("free_decay.friction_over_inertia", "rad/s^2", "Dynamic friction over the inertia"),
 )
 
 
@@ -184,7 +184,7 @@ class _Push(NamedTuple):
     swept: float
 
 
-def _push_of(decay: Decay) -> _Push:
+def _push_of(decay: FreeDecay) -> _Push:
     velocity, _ = smoothed_rates(decay.time, decay.angle)
     speed = max(float(np.abs(velocity[:FEWEST_SMOOTHED]).max()), _LEAST_SPEED)
     swept = max(abs(float(decay.angle[-1] - decay.angle[0])), _LEAST_SWEPT)
@@ -214,10 +214,10 @@ def _start_numbers(place: int, push: _Push) -> tuple[Free, Free]:
 class _Law:
     """Equation (1) of some decays with one damping and one friction; an ``inertia`` of 1 kg m^2 stands for none."""
 
-    decays: tuple[Decay, ...]
+    decays: tuple[FreeDecay, ...]
     inertia: float
-    damping: Reported
-    friction: Reported
+    damping: ReportedNumber
+    friction: ReportedNumber
 
     def __call__(self, at: Values) -> Floats:
         """Return the angles [rad] of all decays at some numbers, each with its velocity [rad/s] where it has one."""
@@ -270,7 +270,7 @@ def _near_rest(rise: float) -> tuple[Free, ...]:
     )
 
 
-def _readings(sources: tuple[Source, ...], decays: tuple[Decay, ...]) -> Readings:
+def _readings(sources: tuple[RecordingSource, ...], decays: tuple[FreeDecay, ...]) -> PooledReadings:
     """Return the samples of all decays in the order of the law, told apart by sensor and half of the way."""
     series, sensors, halves = list[Floats](), list[str](), list[str]()
     for decay in decays:
@@ -283,10 +283,10 @@ def _readings(sources: tuple[Source, ...], decays: tuple[Decay, ...]) -> Reading
                 # A law that is wrong parts the fast from the slow.
                 halves += ["the first half of the way"] * half + ["the second half of the way"] * (values.size - half)
     counts = [decay.time.size * (1 if decay.velocity is None else 2) for decay in decays]
-    return Readings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
+    return PooledReadings(np.concatenate(series), sensors, recordings_of(sources, counts), (halves,))
 
 
-def _panels(decays: tuple[Decay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
+def _panels(decays: tuple[FreeDecay, ...], model: Floats, slowing: Slowing) -> tuple[Panel, Panel]:
     """Return the angles over time, and the accelerations over the velocity with the straight line of equation (1)."""
     angles, rates, place = list[Mark](), list[Mark](), 0
     measured, fitted, fastest = "measured", "fitted", 0.0

@@ -9,8 +9,8 @@ import numpy as np
 
 from ppafo.identification.fit import Fit, fit
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
-from ppafo.identification.residuals import Block, Free
-from ppafo.identification.source import Source
+from ppafo.identification.residuals import Free, ResidualBlock
+from ppafo.identification.source import RecordingSource
 from ppafo.signals.faults import resolution_of, rounding_of
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
@@ -49,7 +49,7 @@ def sought(name: str, start: float, low: float = -math.inf, high: float = math.i
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
+class PooledReadings:
     """Readings by their sensor, whose noise is one, by recording or repetition, and by groups: a label for each.
 
     Numbers of a recording, of a sensor and of a group are compared with the numbers of all.
@@ -61,7 +61,7 @@ class Readings:
     groups: tuple[Sequence[str], ...] = ()
 
 
-def recordings_of(sources: tuple[Source, ...], counts: Iterable[int] = ()) -> list[str]:
+def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = ()) -> list[str]:
     """Return what a recording is called, with its file, for each of its readings, of which there are ``counts``."""
     sizes = tuple(counts) or [len(source.recording) for source in sources]
     pairs = enumerate(zip(sources, sizes, strict=True), start=1)
@@ -69,7 +69,7 @@ def recordings_of(sources: tuple[Source, ...], counts: Iterable[int] = ()) -> li
 
 
 def solve(
-    law: Callable[[Values], Floats], readings: Readings, numbers: Sequence[Free], confidence: float
+    law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[Free], confidence: float
 ) -> tuple[Fit, Floats]:
     """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured."""
     names, measured = [number.name for number in numbers], readings.measured
@@ -87,7 +87,7 @@ def solve(
     for (recording, sensor, *groups), rank in ranks.items():
         rows = slice(int(ends[rank]), int(ends[rank + 1]))
         floor = np.maximum(least, rounding_of(measured[order][rows], resolutions[sensor]))
-        blocks.append(Block(recording, sensor, rows, floor, groups=tuple(groups)))
+        blocks.append(ResidualBlock(recording, sensor, rows, floor, groups=tuple(groups)))
 
     def at(point: Floats) -> Values:
         return defaultdict(float, zip(names, point.tolist(), strict=True))

@@ -13,10 +13,10 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import NEXT_LAW, GasAt, Law, Opening, Paths, orifice_shape, solve_flow
-from ppafo.identification.bench.law import Readings, recordings_of
-from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.law import PooledReadings, recordings_of
+from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.source import (
-    Source,
+    RecordingSource,
     check_moves,
     check_no_wrong_reading,
     check_not_clipped,
@@ -45,7 +45,7 @@ _SPAN, _SUBSONIC = 0.15, 0.6
 
 
 def open_valve_flow(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     gas: GasAt,
     law: Law = "orifice",
     area: float | None = None,
@@ -74,7 +74,7 @@ def open_valve_flow(
         )
     reported = [size]
     if is_standard:
-        reported.append(Reported(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
+        reported.append(ReportedNumber(f"{path}.critical_ratio", "", "Critical ratio b of ISO 6358"))
     paths = Paths(size.path, critical_ratio=reported[-1].path if is_standard else "")
     if law == "both":
         paths = Paths(size.path, beside=_BESIDE.path)
@@ -88,7 +88,7 @@ def open_valve_flow(
         opening,
         paths,
         dict(zip(CHANNELS, (upstream, downstream), strict=False)),
-        Readings(flow, levels, labels),
+        PooledReadings(flow, levels, labels),
         tolerances,
         confidence,
     )
@@ -110,7 +110,7 @@ def open_valve_flow(
 
 
 _MOST = 1.0
-"""Discharge coefficient [-] that no opening exceeds: the flow would be more than that of a loss-free nozzle."""
+"""Discharge coefficient [-] that no opening exceeds: the flow would exceed a loss-free nozzle."""
 
 
 def _doubted(result: BenchResult, path: str, area: float) -> BenchResult:
@@ -129,23 +129,25 @@ def _doubted(result: BenchResult, path: str, area: float) -> BenchResult:
     return replace(result, estimates=estimates, remarks=(doubt, *result.remarks))
 
 
-_BESIDE = Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
+_BESIDE = ReportedNumber("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of a gap beside it")
 
 
-def _size(opening: Opening, area: float | None, path: str) -> Reported:
+def _size(opening: Opening, area: float | None, path: str) -> ReportedNumber:
     """Return the number that is sought: where a set has it, its unit, and what it is."""
     if opening.law == "laminar":
-        return Reported("open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve")
+        return ReportedNumber(
+            "open_valve_flow.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the open valve"
+        )
     if opening.law == "iso6358" or opening.critical_ratio is not None:
-        return Reported(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
+        return ReportedNumber(f"{path}.sonic_conductance", "m^3/(s Pa)", "Sonic conductance C of ISO 6358")
     if area:
         text = f"Discharge coefficient with the set's area of {area * 1e6:.4g} mm^2; only Cd A sets the flow"
-        return Reported(f"{path}.discharge_coefficient", "", text)
-    return Reported("open_valve_flow.effective_area", "m^2", "Effective area Cd A")
+        return ReportedNumber(f"{path}.discharge_coefficient", "", text)
+    return ReportedNumber("open_valve_flow.effective_area", "m^2", "Effective area Cd A")
 
 
 def open_readings(
-    sources: tuple[Source, ...], gas: GasAt, tolerances: Tolerances
+    sources: tuple[RecordingSource, ...], gas: GasAt, tolerances: Tolerances
 ) -> tuple[Floats, Floats, Floats, list[str], tuple[str, ...]]:
     """Absolute pressures [Pa], flow [kg/s] and recording of readings with an open valve; remarks on those left out.
 

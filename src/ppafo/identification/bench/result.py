@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
-from ppafo.identification.source import Source, kind_of, told_of_readings
+from ppafo.identification.source import RecordingSource, kind_of, told_of_readings
 from ppafo.identification.wording import conflict_in_words, widened_by
 from ppafo.report.panels import Panel, draw_panels
 from ppafo.signals import RecordingKind
@@ -42,7 +42,7 @@ class BenchResult:
 
 
 @dataclass(frozen=True, slots=True)
-class Reported:
+class ReportedNumber:
     """A number of a fit that is reported: its name there, which is its path, SI unit, and what it is in a sentence.
 
     ``size`` stands in for the size of a value that may be zero, in that unit: zero is then an answer, and no bound.
@@ -60,9 +60,9 @@ _AT_BOUND = 1.0e-6
 
 def result_of(
     procedure: str,
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     fitted: Fit,
-    reported: Sequence[Reported],
+    reported: Sequence[ReportedNumber],
     summary: str,
     panels: tuple[Panel, ...],
     remedy: str,
@@ -84,7 +84,7 @@ def result_of(
     )
 
 
-def _estimate(fitted: Fit, reported: Reported, origin: tuple[str, ...]) -> Estimate:
+def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) -> Estimate:
     """Return a number of a fit with its verdict and sentence; ``origin`` are the recordings that it comes from."""
     index = [*fitted.by_name].index(reported.path)
     value, low, high = (float(column[index]) for column in (fitted.values, fitted.low, fitted.high))

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import IdentificationError, count_of
-from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, within
-from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, within
+from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.source import (
-    Source,
+    RecordingSource,
     check_moves,
     check_no_wrong_reading,
     check_not_alone,
@@ -61,7 +61,7 @@ _SIGMAS = 4.0
 
 
 def static_torque(
-    sources: tuple[Source, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
+    sources: tuple[RecordingSource, ...], confidence: float = 0.95, tolerances: Tolerances = DEFAULTS
 ) -> BenchResult:
     """Return torque constant [m^3], friction without pressure [N m], its growth [m^3], zero of the scale [N m]; (2).
 
@@ -123,7 +123,7 @@ def static_torque(
     )
 
 
-def _weighted(readings: "Sweeps") -> Readings:
+def _weighted(readings: "Sweeps") -> PooledReadings:
     """Return the loads over their noise, in groups whose own numbers are compared with those of all."""
     pressure = readings.pressure
     middle = 0.5 * float(pressure.max() + pressure.min())
@@ -132,17 +132,21 @@ def _weighted(readings: "Sweeps") -> Readings:
         np.where(pressure > middle, "readings at higher pressures", "readings at lower pressures").tolist(),
     )
     sensors = [readings.names.load] * pressure.size
-    return Readings(readings.weight * readings.torque, sensors, readings.recordings, groups)
+    return PooledReadings(readings.weight * readings.torque, sensors, readings.recordings, groups)
 
 
-def _reported(readings: "Sweeps") -> tuple[Reported, ...]:
+def _reported(readings: "Sweeps") -> tuple[ReportedNumber, ...]:
     """Return the numbers to report; a zero of the scale may be an answer."""
     names = readings.names
     return (
-        Reported(names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"),
-        Reported(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
-        Reported(names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"),
-        Reported(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(readings.torque))),
+        ReportedNumber(
+            names.slope_path, names.slope_unit, f"{names.slope.capitalize()}, the common slope of both branches"
+        ),
+        ReportedNumber(names.friction_path, names.unit, f"{names.friction.capitalize()} without a pressure difference"),
+        ReportedNumber(
+            names.growth_path, f"{names.unit}/Pa", f"Growth of the {names.friction} with the pressure difference"
+        ),
+        ReportedNumber(names.zero_path, names.unit, f"Zero of the {names.load} sensor", float(np.ptp(readings.torque))),
     )
 
 
@@ -201,7 +205,7 @@ def _straight_line(readings: "Sweeps", files: str) -> _Rough:
 
 
 @dataclass(frozen=True, slots=True)
-class Names:
+class LoadNames:
     """Unknowns of a load in one unit, by path, unit and word: the slope, and static or kinetic friction.
 
     Only what a set has a place for has a path of a set.
@@ -219,12 +223,12 @@ class Names:
     is_in_motion: bool = False
 
 
-def names_of(load: str, slides: bool) -> Names:
+def names_of(load: str, slides: bool) -> LoadNames:
     """Return what the numbers of a torque or a force are called, of an actuator that slides or is held."""
     word, key = ("friction in motion", "dynamic") if slides else ("static friction", "static")
     if load == _FORCE:
         growth = "static_torque.friction_per_pressure"
-        return Names(
+        return LoadNames(
             load,
             "N",
             "area",
@@ -236,7 +240,7 @@ def names_of(load: str, slides: bool) -> Names:
             is_in_motion=slides,
         )
     growth, slope = f"effects.seal_friction.{key}_per_pressure", "actuator.torque_constant"
-    return Names(
+    return LoadNames(
         load, "N m", "torque constant", slope, "m^3", word, f"friction.{key}_torque", growth, is_in_motion=slides
     )
 
@@ -256,10 +260,10 @@ class Sweeps:
     recordings: list[str]
     files: Labels
     repetitions: int
-    names: Names
+    names: LoadNames
 
 
-def slides(sources: tuple[Source, ...]) -> bool:
+def slides(sources: tuple[RecordingSource, ...]) -> bool:
     """Tell whether a position or an angle moves with the direction and the pressure does not."""
     pressure = float(np.ptp(pool(sources, "pressure_difference")))
     moving = [
@@ -272,7 +276,7 @@ def slides(sources: tuple[Source, ...]) -> bool:
     return bool(moving) and min(moving) > _MOVES_WITH_DIRECTION > max(branches)
 
 
-def _swept(source: Source, name: str) -> float:
+def _swept(source: RecordingSource, name: str) -> float:
     """Mean change of a channel with the direction of a sweep, over all sweeps."""
     direction = source.recording["direction"]
     within = (direction[1:] == direction[:-1]) & (direction[1:] != 0.0)
@@ -281,7 +285,7 @@ def _swept(source: Source, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[within]))) / sweeps
 
 
-def readings_of(sources: tuple[Source, ...]) -> Sweeps:
+def readings_of(sources: tuple[RecordingSource, ...]) -> Sweeps:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
     is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
     load = _FORCE if is_force else _TORQUE
@@ -335,12 +339,12 @@ def readings_of(sources: tuple[Source, ...]) -> Sweeps:
 
 
 def _one_a_stroke(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     used: NDArray[np.bool_],
     pressure: Floats,
     torque: Floats,
     direction: Floats,
-    names: Names,
+    names: LoadNames,
 ) -> Sweeps:
     """Return one reading for the samples of a stroke; ``used`` says which samples of all recordings the others are."""
     # A repetition of a recording is one cluster; so is a recording without repetitions.

@@ -15,10 +15,10 @@ import numpy as np
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
-from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought
-from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought
+from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.residuals import Free
-from ppafo.identification.source import Source, check_no_wrong_reading, check_sources, meter_readings, pool
+from ppafo.identification.source import RecordingSource, check_no_wrong_reading, check_sources, meter_readings, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
 from ppafo.report.kind import Kind
@@ -71,7 +71,7 @@ class Sweep:
 
 
 def valve_map(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     gas: GasAt,
     path: str = "valve",
     confidence: float = 0.95,
@@ -125,7 +125,7 @@ def valve_map(
     )
 
 
-def _sweep_of(sources: tuple[Source, ...], flow: Floats) -> Sweep:
+def _sweep_of(sources: tuple[RecordingSource, ...], flow: Floats) -> Sweep:
     command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
     return Sweep(
         commands=tuple(source.recording["command"] for source in sources),
@@ -137,7 +137,7 @@ def _sweep_of(sources: tuple[Source, ...], flow: Floats) -> Sweep:
     )
 
 
-def _sought(sources: tuple[Source, ...], sweep: Sweep, areas: Floats, band: str) -> tuple[Free, ...]:
+def _sought(sources: tuple[RecordingSource, ...], sweep: Sweep, areas: Floats, band: str) -> tuple[Free, ...]:
     """Return what is sought, with first guesses from the effective areas [m^2] of the readings; ``band`` is a path."""
     size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
     half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
@@ -158,26 +158,26 @@ def _sought(sources: tuple[Source, ...], sweep: Sweep, areas: Floats, band: str)
     )
 
 
-def _readings(sources: tuple[Source, ...], sweep: Sweep) -> Readings:
+def _readings(sources: tuple[RecordingSource, ...], sweep: Sweep) -> PooledReadings:
     """Return the flow to fit, in groups whose own numbers are compared with those of all."""
     groups = (
         np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
         np.where(sweep.command > 0.0, "commands to chamber 1", "commands to chamber 2").tolist(),
         np.where(np.abs(sweep.command) > 0.5 * sweep.highest_command, "large commands", "small commands").tolist(),
     )
-    return Readings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
+    return PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
 
 
-def _reported(sweep: Sweep, band: str, saturation: float) -> list[Reported]:
+def _reported(sweep: Sweep, band: str, saturation: float) -> list[ReportedNumber]:
     """Return the numbers to report: a saturation [-] below the highest command, a play where the command turned."""
     reported = [
-        Reported(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
-        Reported(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
+        ReportedNumber(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
+        ReportedNumber(_GAIN, "m^2", "Effective area Cd A per command beyond the dead band"),
     ]
     if saturation < sweep.highest_command - _SATURATES:
-        reported.append(Reported(_SATURATION, "", "Command from which the valve opens no further"))
+        reported.append(ReportedNumber(_SATURATION, "", "Command from which the valve opens no further"))
     if sweep.is_two_way:
-        reported.append(Reported(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
+        reported.append(ReportedNumber(_PLAY, "", "Width between a rising and a falling command", _SMALL_COMMAND))
     return reported
 
 
@@ -209,7 +209,7 @@ def spool_of(command: Floats, width: float) -> Floats:
     return np.array(positions)
 
 
-def _check_recordings(sources: tuple[Source, ...]) -> None:
+def _check_recordings(sources: tuple[RecordingSource, ...]) -> None:
     """Refuse recordings that lack a channel or samples, or whose command is no command of a valve."""
     check_sources(sources, PROCEDURE, CHANNELS, MINIMUM_SAMPLES, moving=("command", "mass_flow"), absolute=PRESSURES)
     for source in sources:
@@ -222,7 +222,7 @@ def _check_recordings(sources: tuple[Source, ...]) -> None:
             )
 
 
-def _areas(sources: tuple[Source, ...], sweep: Sweep, gas: GasAt) -> Floats:
+def _areas(sources: tuple[RecordingSource, ...], sweep: Sweep, gas: GasAt) -> Floats:
     """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it.
 
     It is the flow over what the pressures would let pass, so that a supply that sags is no valve that saturates.
@@ -247,7 +247,7 @@ def _areas(sources: tuple[Source, ...], sweep: Sweep, gas: GasAt) -> Floats:
     return np.asarray(areas)
 
 
-def _branch(source: Source) -> Floats:
+def _branch(source: RecordingSource) -> Floats:
     """Return the direction of the command (readings,), 1, -1 or 0 before it first changes.
 
     Taken from the recording's channel, else from the last change of the command.

@@ -27,16 +27,16 @@ from ppafo.identification.bench.flow import (
     GasAt,
     Law,
     Opening,
+    OpeningSizes,
     Paths,
-    Sizes,
     gas_tolerances,
     solve_flow,
 )
-from ppafo.identification.bench.law import Readings, Values, recordings_of, solve, sought, tolerance, within
-from ppafo.identification.bench.result import BenchResult, Reported, result_of
+from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
+from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.residuals import Free
 from ppafo.identification.source import (
-    Source,
+    RecordingSource,
     check_moves,
     check_no_gap,
     check_no_wrong_reading,
@@ -72,7 +72,7 @@ _REMEDY = "{}, or give start and end; gas may leak elsewhere, or relax with its 
 
 
 def vane_leak(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     gas: GasAt,
     volume_1: float | None = None,
     volume_2: float | None = None,
@@ -115,17 +115,17 @@ def vane_leak(
     return replace(found, remarks=(*said, *found.remarks))
 
 
-def _size(opening: Opening, discharge_coefficient: float | None) -> Reported:
+def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumber:
     """Return the number that is sought: where a set has it, its unit, and what it is."""
     if opening.law == "laminar":
-        return Reported("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
+        return ReportedNumber("vane_leak.laminar_coefficient", "kg/(s Pa^2)", "Laminar coefficient of the leak")
     if opening.critical_ratio is not None:
         text = f"Sonic conductance of the leak with the set's b = {opening.critical_ratio:g}"
-        return Reported("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
+        return ReportedNumber("actuator.leak.sonic_conductance", "m^3/(s Pa)", text)
     if discharge_coefficient:
         text = f"Area of the leak with Cd = {discharge_coefficient:g}, of which only the product counts"
-        return Reported("actuator.leak.area", "m^2", text)
-    return Reported("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
+        return ReportedNumber("actuator.leak.area", "m^2", text)
+    return ReportedNumber("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
 
 
 class ClosedChambers(NamedTuple):
@@ -162,7 +162,7 @@ class ClosedChambers(NamedTuple):
         return 1 if self.room == 0 else 0
 
 
-def closed_chambers(source: Source, start: float | None, end: float | None) -> ClosedChambers:
+def closed_chambers(source: RecordingSource, start: float | None, end: float | None) -> ClosedChambers:
     """Return the chambers of a recording between its start and equal pressures.
 
     IdentificationError where too few samples are left.
@@ -201,7 +201,7 @@ _LOWEST = 1.0e-3
 
 
 def pressures_of_fall(
-    opening: Opening, sizes: Sizes, first: float, second: float, ratio: float, rate: float, times: Floats
+    opening: Opening, sizes: OpeningSizes, first: float, second: float, ratio: float, rate: float, times: Floats
 ) -> tuple[Floats, Floats]:
     """Return both pressures [Pa] at times [s] as their difference falls; no gas is lost to the outside.
 
@@ -234,7 +234,7 @@ def _at_end(time: Floats, values: Floats, end: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Decay:
+class LeakDecay:
     """The closed chambers of one recording, with the names of the numbers that are sought of it alone."""
 
     chambers: ClosedChambers
@@ -302,7 +302,7 @@ class DecayLaw:
     opening: Opening
     paths: Paths
     volume: float
-    decays: tuple[Decay, ...]
+    decays: tuple[LeakDecay, ...]
 
     @property
     def longest(self) -> float:
@@ -318,7 +318,7 @@ class DecayLaw:
         relaxed = self.longest / _RELAXED * math.exp(at[_RELAXATION])
         return np.concatenate([part for decay in self.decays for part in self._pressures(decay, at, rate, relaxed)])
 
-    def _pressures(self, decay: Decay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
+    def _pressures(self, decay: LeakDecay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
         chambers = decay.chambers
         first, second = (at[decay.start_of(sensor)] for sensor in decay.sensors)
         ratio = at[_RATIO] if chambers.room is None else 0.0 if chambers.room == 1 else math.inf
@@ -331,10 +331,10 @@ class DecayLaw:
 
 
 def _decaying_leak(
-    sources: tuple[Source, ...],
+    sources: tuple[RecordingSource, ...],
     closed: tuple[ClosedChambers, ...],
     opening: Opening,
-    size: Reported,
+    size: ReportedNumber,
     volumes: tuple[float | None, float | None],
     volume_deviation: float,
     tolerances: Tolerances,
@@ -347,7 +347,7 @@ def _decaying_leak(
     if volume is None:
         size, opening = _over_volume(size, chamber), replace(opening, known=1.0)
     paths, reported, start, alone = _sought(size, volume is not None, closed, opening, volume or 1.0)
-    decays = tuple(Decay(chambers, number) for number, chambers in enumerate(closed, start=1))
+    decays = tuple(LeakDecay(chambers, number) for number, chambers in enumerate(closed, start=1))
     law = DecayLaw(opening, paths, volume or 1.0, decays)
     numbers = (
         *paths.sought(start, alone),
@@ -385,12 +385,12 @@ def _decaying_leak(
     )
 
 
-def _over_volume(size: Reported, fuller: int) -> Reported:
+def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
     """Return what is reported of a leak out of a chamber whose volume is not known."""
     text = f"{size.text.partition(' with')[0]} over the volume of chamber {fuller}, which is not known"
     if size.unit == "m^2":
-        return Reported("vane_leak.area_over_volume", "1/m", text)
-    return Reported(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
+        return ReportedNumber("vane_leak.area_over_volume", "1/m", text)
+    return ReportedNumber(f"vane_leak.{size.path.split('.')[-1]}_over_volume", f"{size.unit[:-1]} m^3)", text)
 
 
 def _ratio(
@@ -405,10 +405,10 @@ def _ratio(
     return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3), 1.0e-6),)
 
 
-def _readings(sources: tuple[Source, ...], decays: tuple[Decay, ...]) -> Readings:
+def _readings(sources: tuple[RecordingSource, ...], decays: tuple[LeakDecay, ...]) -> PooledReadings:
     """Return the fitted pressures with their sensors and recordings, early and late falls apart."""
     series = [(sensor, values, decay) for decay in decays for sensor, values in decay.fitted]
-    return Readings(
+    return PooledReadings(
         np.concatenate([values for _, values, _ in series]),
         [sensor for sensor, values, _ in series for _ in range(values.size)],
         recordings_of(sources, [decay.difference.size * len(decay.fitted) for decay in decays]),
@@ -417,34 +417,34 @@ def _readings(sources: tuple[Source, ...], decays: tuple[Decay, ...]) -> Reading
 
 
 def _sought(
-    size: Reported,
+    size: ReportedNumber,
     has_volume: bool,
     closed: tuple[ClosedChambers, ...],
     opening: Opening,
     emptied: float,
-) -> tuple[Paths, tuple[Reported, ...], Sizes, Sizes]:
+) -> tuple[Paths, tuple[ReportedNumber, ...], OpeningSizes, OpeningSizes]:
     """Return the numbers of a leak from closed chambers: paths, what is reported, the start, and each part alone."""
     gas = opening.gas
     rate = gas.specific_gas_constant * gas.temperature / emptied
-    rough = _rough_size(closed, opening, Sizes(1.0), rate)
+    rough = _rough_size(closed, opening, OpeningSizes(1.0), rate)
     if opening.law != "both":
-        return Paths(size.path), (size,), Sizes(rough), Sizes(rough)
-    laminar = _rough_size(closed, opening, Sizes(0.0, beside=1.0), rate)
+        return Paths(size.path), (size,), OpeningSizes(rough), OpeningSizes(rough)
+    laminar = _rough_size(closed, opening, OpeningSizes(0.0, beside=1.0), rate)
     beside = replace(_beside(has_volume), size=laminar)
     # Half of the fall each: the search finds how much of it is whose.
-    start, alone = Sizes(0.5 * rough, beside=0.5 * laminar), Sizes(rough, beside=laminar)
+    start, alone = OpeningSizes(0.5 * rough, beside=0.5 * laminar), OpeningSizes(rough, beside=laminar)
     return Paths(size.path, beside=beside.path), (replace(size, size=rough), beside), start, alone
 
 
-def _beside(has_volume: bool) -> Reported:
+def _beside(has_volume: bool) -> ReportedNumber:
     """Return the laminar gap beside an orifice; without the volume of the chamber only its ratio is known."""
     text = "Laminar coefficient of a gap beside the orifice"
     if has_volume:
-        return Reported(LAMINAR, "kg/(s Pa^2)", text)
-    return Reported("vane_leak.coefficient_over_volume", "kg/(s Pa^2 m^3)", f"{text}, over the volume")
+        return ReportedNumber(LAMINAR, "kg/(s Pa^2)", text)
+    return ReportedNumber("vane_leak.coefficient_over_volume", "kg/(s Pa^2 m^3)", f"{text}, over the volume")
 
 
-def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: Sizes, rate: float) -> float:
+def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
     """Return how many times a ``unit`` of the opening makes the first pressure fall as it does on average; above 0."""
     found = []
     for item in closed:
@@ -456,7 +456,11 @@ def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: Size
 
 
 def _steady_leak(
-    sources: tuple[Source, ...], opening: Opening, size: Reported, tolerances: Tolerances, confidence: float
+    sources: tuple[RecordingSource, ...],
+    opening: Opening,
+    size: ReportedNumber,
+    tolerances: Tolerances,
+    confidence: float,
 ) -> BenchResult:
     """Return the leak from flow over pressures; the zero of the flow meter shows where the pressures differ."""
     check_sources(sources, PROCEDURE, STEADY, _FEWEST_STEADY, moving=("mass_flow",), absolute=CHANNELS)
@@ -480,7 +484,7 @@ def _steady_leak(
         opening,
         paths,
         {"pressure_1": first, "pressure_2": second},
-        Readings(flow, ["mass_flow"] * flow.size, names, (halves,)),
+        PooledReadings(flow, ["mass_flow"] * flow.size, names, (halves,)),
         tolerances,
         confidence,
     )

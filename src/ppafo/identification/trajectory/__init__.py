@@ -6,18 +6,18 @@ Each file leans on those before it: ``problem`` says what is requested, ``tolera
 """
 
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
-from ppafo.identification.trajectory.experiment import Experiment
+from ppafo.identification.trajectory.expected import CandidateExperiment, Expected, expected_information
+from ppafo.identification.trajectory.experiment import FittedExperiment
 from ppafo.identification.trajectory.fitting import ChannelFit, TrajectoryFit, fit
 from ppafo.identification.trajectory.numbers import FreeParameter
 from ppafo.identification.trajectory.problem import TrajectoryProblem
 from ppafo.identification.trajectory.tolerances import tolerance_parameters
 
 __all__ = [
-    "Candidate",
+    "CandidateExperiment",
     "ChannelFit",
     "Expected",
-    "Experiment",
+    "FittedExperiment",
     "FreeParameter",
     "Tolerances",
     "TrajectoryFit",

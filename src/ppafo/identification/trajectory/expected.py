@@ -8,18 +8,18 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, refused_as
 from ppafo.identification.noise import Noise, whiten
-from ppafo.identification.residuals import Work
+from ppafo.identification.residuals import FitRuns
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS
 from ppafo.identification.trajectory.fitting import TrajectoryFit
 from ppafo.identification.trajectory.numbers import reach_of
-from ppafo.identification.trajectory.runs import Measured, columns_in, numbers_in, prepare_samples, signals_at
+from ppafo.identification.trajectory.runs import FitChannel, columns_in, numbers_in, prepare_samples, signals_at
 from ppafo.progress import report_nothing
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class CandidateExperiment:
     """An experiment that could be done: its scenario, the noise of each channel [rad], [Pa], time between samples [s].
 
     The devices of candidates come from their scenarios, with the fitted numbers put in. Channels without ``noise``
@@ -47,7 +47,7 @@ class Expected:
     most_helped: str
 
 
-def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) -> tuple[Expected, ...]:
+def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[Expected, ...]:
     """Return what each candidate would bring, the most informative first.
 
     IdentificationError for a candidate without noise in a channel that can be fitted.
@@ -55,7 +55,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[Candidate]) ->
     return tuple(sorted((_expect(fit, one) for one in candidates), key=lambda one: -one.gain))
 
 
-def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
+def _expect(fit: TrajectoryFit, candidate: CandidateExperiment) -> Expected:
     noise = dict(candidate.noise) or dict(fit.fit.noise)
     if not noise or any(name not in FITTED_CHANNELS or not one > 0.0 for name, one in noise.items()):
         raise IdentificationError(
@@ -67,7 +67,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
     point, scale = fit.fit.values[place], np.array([item.free.scale for item in acting])
     count = math.floor(candidate.scenario.run.duration / candidate.interval + 1.0e-6)
     times = candidate.interval * np.arange(count + 1, dtype=np.float64)
-    channels = [Measured(name, np.zeros(times.size)) for name in noise]
+    channels = [FitChannel(name, np.zeros(times.size)) for name in noise]
     given = numbers_in("", acting, point)
     prepared = prepare_samples(candidate.label, candidate.scenario, times, channels, reach_of(acting), given)
 
@@ -75,7 +75,7 @@ def _expect(fit: TrajectoryFit, candidate: Candidate) -> Expected:
         signals = signals_at(prepared, columns_in("", acting, points), points.shape[1])
         return np.concatenate([signals[name] for name in noise])
 
-    work = Work(samples, tuple(item.free for item in acting), (), report_nothing, 0, is_motion=True)
+    work = FitRuns(samples, tuple(item.free for item in acting), (), report_nothing, 0, is_motion=True)
     weight = 1.0 / np.repeat(list(noise.values()), times.size)
     with refused_as(IdentificationError, f"candidate '{candidate.label}'", IdentificationError):
         # As in the fit, the second differences are as long as changes the samples by three units of noise in all.

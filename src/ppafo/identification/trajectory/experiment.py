@@ -42,7 +42,7 @@ _FITS = 1.0e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Experiment:
+class FittedExperiment:
     """A recording and the scenario that is to explain it; time ``start`` [s] of the recording is time 0 of the run.
 
     ``noise`` is the least standard deviation by channel [rad], [Pa]; it is estimated from what the fit leaves.
@@ -64,7 +64,7 @@ class Experiment:
     source: str = ""
 
 
-def check_experiment(experiment: Experiment) -> None:
+def check_experiment(experiment: FittedExperiment) -> None:
     """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
     said, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
@@ -120,7 +120,7 @@ def refuse_first(said: str, *checks: tuple[bool, str]) -> None:
             raise IdentificationError(f"{said}: {why}")
 
 
-def scenario_of(experiment: Experiment) -> Scenario:
+def scenario_of(experiment: FittedExperiment) -> Scenario:
     """Return the scenario of an experiment with all that it takes from the recording, but for the samples of inputs.
 
     A state that is taken from the recording comes from the samples up to the start.
@@ -154,7 +154,7 @@ def scenario_of(experiment: Experiment) -> Scenario:
     return scenario
 
 
-def use_of(experiment: Experiment) -> Use:
+def use_of(experiment: FittedExperiment) -> Use:
     """Return what of its recording an experiment is compared with."""
     last = float(experiment.recording.time[-1])
     trace = experiment.source or experiment.recording.label

@@ -11,13 +11,13 @@ from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
-from ppafo.identification.residuals import Block
-from ppafo.identification.trajectory.experiment import Experiment
-from ppafo.identification.trajectory.numbers import ZERO_OF, Number, broken_rule, full_path, reach_of, with_numbers
+from ppafo.identification.residuals import ResidualBlock
+from ppafo.identification.trajectory.experiment import FittedExperiment
+from ppafo.identification.trajectory.numbers import ZERO_OF, FitNumber, broken_rule, full_path, reach_of, with_numbers
 from ppafo.identification.trajectory.problem import TrajectoryProblem, numbers_of
 from ppafo.identification.trajectory.runs import (
+    FitChannel,
     Floats,
-    Measured,
     PreparedExperiment,
     blocks_of,
     numbers_in,
@@ -83,7 +83,7 @@ class TrajectoryFit:
     """
 
     problem: TrajectoryProblem
-    numbers: tuple[Number, ...]
+    numbers: tuple[FitNumber, ...]
     fit: Fit
     estimates: tuple[Estimate, ...]
     covariance: Floats
@@ -161,7 +161,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
     )
 
 
-def _prepared(experiment: Experiment, numbers: tuple[Number, ...], start: Floats) -> PreparedExperiment:
+def _prepared(experiment: FittedExperiment, numbers: tuple[FitNumber, ...], start: Floats) -> PreparedExperiment:
     """Return an experiment with all that its runs have in common, at the numbers from which the search starts."""
     acting = [number for number in numbers if number.acts_in(experiment.label)]
     return prepare(experiment, numbers_in(experiment.label, numbers, start), reach_of(acting))
@@ -177,7 +177,7 @@ class _FittedRun(NamedTuple):
 
 
 def _fitted_runs(
-    problem: TrajectoryProblem, runs: tuple[PreparedExperiment, ...], numbers: tuple[Number, ...], fitted: Fit
+    problem: TrajectoryProblem, runs: tuple[PreparedExperiment, ...], numbers: tuple[FitNumber, ...], fitted: Fit
 ) -> list[_FittedRun]:
     """Return every experiment with the fitted numbers, in the order of the problem."""
     fitted_runs = []
@@ -226,7 +226,7 @@ def _at_edge(edge: Mapping[str, int], estimates: Sequence[Estimate]) -> str:
     )
 
 
-def _left_out(fitted: Fit, blocks: Sequence[Block], times: Mapping[str, Floats]) -> Iterator[str]:
+def _left_out(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, Floats]) -> Iterator[str]:
     """Return what is said of the outliers of each channel of each recording; ``times`` [s] are those of the samples."""
     for block in blocks:
         samples = [row - block.rows.start for row in fitted.outliers if block.rows.start <= row < block.rows.stop]
@@ -251,7 +251,7 @@ def _in_unit(value: float, estimate: Estimate) -> str:
     return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 
-def _known(fitted: Fit, number: Number, row: int, error: float, estimates: Sequence[Estimate]) -> Known:
+def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> Known:
     """Return what a fit says of a number that is known to a tolerance, and whose interval that widens most."""
     name, free = number.free.name, number.free
     shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
@@ -270,14 +270,14 @@ def _known(fitted: Fit, number: Number, row: int, error: float, estimates: Seque
     )
 
 
-def _in_its_unit(number: Number, value: float, error: float) -> tuple[float, float]:
+def _in_its_unit(number: FitNumber, value: float, error: float) -> tuple[float, float]:
     """Return a number and its standard error in its unit [SI]; the fit may have moved its logarithm."""
     if not number.is_logarithm:
         return value, error
     return math.exp(value), math.exp(value) * error
 
 
-def _wandering(fitted: Fit, numbers: tuple[Number, ...]) -> str:
+def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
     """Return which channel leaves noise that wanders by more than its zero may be off; empty where none does.
 
     A sensor whose zero is known within a limit does not leave it from sample to sample: what does is the model's.
@@ -304,7 +304,7 @@ _AT_BOUND = 1.0e-6
 """Distance to a bound, as a fraction of it, up to which a number has ended there."""
 
 
-def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int, conflict: str) -> Estimate:
+def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: int, conflict: str) -> Estimate:
     """Return one estimate with its verdict and sentence."""
     value, low, high = (float(column[row]) for column in (fitted.values, fitted.low, fitted.high))
     name, free = number.free.name, number.free
@@ -347,7 +347,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: Number, row: int,
     )
 
 
-def _channel(fitted: Fit, experiment: str, measured: Measured, model: Floats) -> ChannelFit:
+def _channel(fitted: Fit, experiment: str, measured: FitChannel, model: Floats) -> ChannelFit:
     """Return what a channel of an experiment leaves beside the model at its samples."""
     left = measured.values - model
     return ChannelFit(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.residuals import Free
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, Experiment, refuse_first, scenario_of
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, refuse_first, scenario_of
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
@@ -141,7 +141,7 @@ class FreeParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class Number:
+class FitNumber:
     """A number with everything settled: full path, SI unit, and what the estimator moves."""
 
     path: str
@@ -156,7 +156,7 @@ class Number:
         return not self.recordings or label in self.recordings
 
 
-def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Number:
+def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment]) -> FitNumber:
     """Return a parameter with all of it settled; ``experiments`` are those it acts in.
 
     IdentificationError for a contradiction.
@@ -182,10 +182,10 @@ def number_of(parameter: FreeParameter, experiments: Sequence[Experiment]) -> Nu
         scale = _SCALE * parameter.deviation
     free = Free(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
-    return Number(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
+    return FitNumber(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
 
 
-def _check_has_effect(parameter: FreeParameter, path: str, experiment: Experiment) -> None:
+def _check_has_effect(parameter: FreeParameter, path: str, experiment: FittedExperiment) -> None:
     """Raise IdentificationError for a number whose recording the run of an experiment follows in its place."""
     followed = dict.fromkeys(supply_paths(experiment.scenario.device), SUPPLY)
     if DORSIFLEXION_SUPPLY in experiment.inputs:
@@ -198,7 +198,7 @@ def _check_has_effect(parameter: FreeParameter, path: str, experiment: Experimen
         )
 
 
-def _start_in(path: str, experiment: Experiment) -> float:
+def _start_in(path: str, experiment: FittedExperiment) -> float:
     """Return the number [SI] from which a search starts that says none itself."""
     # Of how a run begins the recording may say more than the scenario.
     is_state = path.partition(".")[0] in _STATE
@@ -233,7 +233,7 @@ def _check_bounds(parameter: FreeParameter, start: float, low: float, high: floa
     )
 
 
-def reach_of(chosen: Sequence[Number]) -> float:
+def reach_of(chosen: Sequence[FitNumber]) -> float:
     """Return the largest time offset [s] among the bounds of numbers; 0 where none is fitted."""
     bounds = [bound for number in chosen if number.path == TIME_OFFSET for bound in (number.free.low, number.free.high)]
     return max(map(abs, bounds), default=0.0)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from ppafo.errors import IdentificationError, first_twice, nearest_name
 from ppafo.identification.source import double_use
-from ppafo.identification.trajectory.experiment import Experiment, check_experiment, use_of
-from ppafo.identification.trajectory.numbers import FreeParameter, Number, number_of
+from ppafo.identification.trajectory.experiment import FittedExperiment, check_experiment, use_of
+from ppafo.identification.trajectory.numbers import FitNumber, FreeParameter, number_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +13,7 @@ class TrajectoryProblem:
     """Numbers to be fitted to recordings. IdentificationError for a problem that makes no sense."""
 
     parameters: tuple[FreeParameter, ...]
-    experiments: tuple[Experiment, ...]
+    experiments: tuple[FittedExperiment, ...]
     confidence: float = 0.95
 
     def __post_init__(self) -> None:
@@ -34,7 +34,7 @@ class TrajectoryProblem:
         _refuse_twice("parameter", [number.free.name for number in numbers_of(self)])
 
 
-def numbers_of(problem: TrajectoryProblem) -> tuple[Number, ...]:
+def numbers_of(problem: TrajectoryProblem) -> tuple[FitNumber, ...]:
     """Return all parameters of a problem with start and bounds settled; refuses those that contradict."""
     return tuple(
         number_of(

@@ -23,9 +23,9 @@ from ppafo.engine.run import NEVER_FAILED, Run, batches_of
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.pneumatics import supply_range
 from ppafo.errors import IdentificationError
-from ppafo.identification.residuals import Block
-from ppafo.identification.trajectory.experiment import Experiment, scenario_of
-from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, Number, with_numbers
+from ppafo.identification.residuals import ResidualBlock
+from ppafo.identification.trajectory.experiment import FittedExperiment, scenario_of
+from ppafo.identification.trajectory.numbers import GAIN_OF, TIME_OFFSET, ZERO_OF, FitNumber, with_numbers
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
 from ppafo.parameters.plant import switches_of
@@ -55,7 +55,7 @@ _MAXIMUM_RECORDS = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class FitChannel:
     """Channel of an experiment: samples [rad] or [Pa], and the smallest noise assumed for them."""
 
     name: str
@@ -77,7 +77,7 @@ class PreparedExperiment:
     scenario: Scenario
     run: Run
     time: Floats
-    channels: tuple[Measured, ...]
+    channels: tuple[FitChannel, ...]
     reach: float
     place: Indices
     fraction: Floats
@@ -85,7 +85,7 @@ class PreparedExperiment:
     inputs: StepInputs | None = None
 
 
-def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
+def prepare(experiment: FittedExperiment, numbers: Mapping[str, float], reach: float = 0.0) -> PreparedExperiment:
     """Return the experiment made ready.
 
     ``numbers`` by path are the start values; ``reach`` [s] is the largest time offset that is tried.
@@ -101,7 +101,7 @@ def prepare(experiment: Experiment, numbers: Mapping[str, float], reach: float =
             f"at least {MINIMUM_SAMPLES} are needed"
         )
     channels = [
-        Measured(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
+        FitChannel(name, recording[name][inside], experiment.noise.get(name, 0.0)) for name in experiment.channels
     ]
     actuator = experiment.scenario.device.actuator
     stops = actuator.angle_min, actuator.angle_max
@@ -130,7 +130,7 @@ def prepare_samples(
     label: str,
     scenario: Scenario,
     time: Floats,
-    channels: Sequence[Measured],
+    channels: Sequence[FitChannel],
     reach: float,
     numbers: Mapping[str, float],
     recorded: RecordedInputs | None = None,
@@ -177,19 +177,19 @@ def _steps_between_samples(time: Floats, reach: float, step: float) -> float:
     return max(count for count in range(1, int(most) + 1) if every % count == 0) if is_aligned else int(most)
 
 
-def columns_in(label: str, numbers: Sequence[Number], points: Floats) -> dict[str, Floats]:
+def columns_in(label: str, numbers: Sequence[FitNumber], points: Floats) -> dict[str, Floats]:
     """Return the numbers [SI] by path that act in the experiment with a label, at points [SI] (numbers, points)."""
     acting = ((item, row) for item, row in zip(numbers, points, strict=True) if item.acts_in(label))
     return {item.path: np.exp(row) if item.is_logarithm else row for item, row in acting}
 
 
-def numbers_in(label: str, numbers: Sequence[Number], point: Floats) -> dict[str, float]:
+def numbers_in(label: str, numbers: Sequence[FitNumber], point: Floats) -> dict[str, float]:
     """Return the numbers [SI] by path that act in the experiment with a label, at one point [SI] (numbers,)."""
     return {path: float(row[0]) for path, row in columns_in(label, numbers, point[:, None]).items()}
 
 
 def signals_of(
-    experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], points: Floats
+    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats
 ) -> list[dict[str, Floats]]:
     """Return, for each experiment, its channels [SI] (samples, points) at many points [SI] (numbers, points).
 
@@ -207,7 +207,7 @@ def signals_of(
         return list(pool.map(one, experiments))
 
 
-def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], points: Floats) -> Floats:
+def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], points: Floats) -> Floats:
     """Return measured less model [SI] (samples of all channels, points) at points [SI] (numbers, points)."""
     signals = signals_of(experiments, numbers, points)
     return np.concatenate(
@@ -219,7 +219,9 @@ def residuals_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Nu
     )
 
 
-def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Number], point: Floats) -> tuple[Block, ...]:
+def blocks_of(
+    experiments: Sequence[PreparedExperiment], numbers: Sequence[FitNumber], point: Floats
+) -> tuple[ResidualBlock, ...]:
     """Return the place of each channel of each recording among the residuals.
 
     Its floor is the given noise, the size of the error of the engine, or what the converter of the sensor rounds. The
@@ -241,7 +243,7 @@ def blocks_of(experiments: Sequence[PreparedExperiment], numbers: Sequence[Numbe
             rounded = rounding_of(channel.values, resolution_of(channel.values))
             floor = np.maximum(max(channel.floor, float(np.sqrt(np.mean(np.square(error))))), rounded)
             last = first + len(channel.values)
-            blocks.append(Block(prepared.label, channel.name, slice(first, last), floor, error))
+            blocks.append(ResidualBlock(prepared.label, channel.name, slice(first, last), floor, error))
             first = last
     return tuple(blocks)
 

@@ -12,13 +12,13 @@ from typing import NamedTuple
 from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_name
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.keys import positive_in, quantity_in
-from ppafo.identification.source import Source, Use, double_use, told_of_readings
+from ppafo.identification.source import RecordingSource, Use, double_use, told_of_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
-from ppafo.identification.trajectory.expected import Candidate, Expected, expected_information
+from ppafo.identification.trajectory.expected import CandidateExperiment, Expected, expected_information
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     INPUTS,
-    Experiment,
+    FittedExperiment,
     refuse_first,
     use_of,
 )
@@ -45,7 +45,7 @@ _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 
 
 @dataclass(frozen=True, slots=True)
-class Setting:
+class SectionContext:
     """Context of a section: parameter set, recordings and earlier results.
 
     ``read`` gives the recording of an experiment, ``folder`` is where paths of scenarios begin, ``file`` what messages
@@ -54,7 +54,7 @@ class Setting:
     are those of the bench.
     """
 
-    read: Callable[[ExperimentSection], Source]
+    read: Callable[[ExperimentSection], RecordingSource]
     folder: Path
     file: str
     parameter_set: ParameterSet | None = None
@@ -82,7 +82,7 @@ SHORTEST_STEP = 1.0e-6
 """Seconds; a shorter step would only cost time."""
 
 
-def trajectory_problem(section: TrajectorySection, setting: Setting) -> TrajectoryProblem:
+def trajectory_problem(section: TrajectorySection, setting: SectionContext) -> TrajectoryProblem:
     """Return the problem of a section. IdentificationError where it repeats what the bench settles."""
     experiments = tuple(_experiment(entry, setting) for entry in section.experiments)
     scenarios = {experiment.label: experiment.scenario for experiment in experiments}
@@ -104,7 +104,7 @@ def trajectory_problem(section: TrajectorySection, setting: Setting) -> Trajecto
     return TrajectoryProblem((*parameters, *tolerances), experiments, section.confidence)
 
 
-def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candidate, ...]:
+def candidates_of(section: TrajectorySection, setting: SectionContext) -> tuple[CandidateExperiment, ...]:
     """Return the experiments that could be done next, with their scenarios, noise and interval of samples [s]."""
     candidates = []
     for entry in section.candidates:
@@ -112,7 +112,7 @@ def candidates_of(section: TrajectorySection, setting: Setting) -> tuple[Candida
         scenario = _scenario(entry.scenario, entry.overrides, setting)
         interval = quantity_in(entry, "interval", "s", said, SHORTEST_STEP, scenario.run.duration)
         assert interval is not None, "it has a default"
-        candidates.append(Candidate(entry.label, scenario, noise_of_channels(entry.noise, said), interval))
+        candidates.append(CandidateExperiment(entry.label, scenario, noise_of_channels(entry.noise, said), interval))
     return tuple(candidates)
 
 
@@ -124,7 +124,7 @@ class _Explained(NamedTuple):
     inputs: tuple[str, ...]
 
 
-def _experiment(entry: ExperimentSection, setting: Setting) -> Experiment:
+def _experiment(entry: ExperimentSection, setting: SectionContext) -> FittedExperiment:
     """Return an experiment of a section, with its recording and the scenario that is to explain it."""
     said = f"{setting.file}: experiment '{entry.label}'"
     source = setting.read(entry)
@@ -142,7 +142,7 @@ def _experiment(entry: ExperimentSection, setting: Setting) -> Experiment:
     scenario = scenario if step is None else replace(scenario, run=replace(scenario.run, step=step))
     # The scenario of a replay has the state of the samples already.
     is_read = entry.scenario is not None and entry.initial_state in ("recording", "fitted")
-    return Experiment(
+    return FittedExperiment(
         label=entry.label,
         scenario=scenario,
         recording=source.recording,
@@ -155,7 +155,7 @@ def _experiment(entry: ExperimentSection, setting: Setting) -> Experiment:
     )
 
 
-def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenario:
+def _scenario(name: str, overrides: tuple[str, ...], setting: SectionContext) -> Scenario:
     """Return a scenario of the package, or of a file in the folder of the problem, with the device of the problem."""
     name_or_file = name if name in list_scenarios() else str(setting.folder / name)
     # The valve of the problem goes before what the experiment changes of it.
@@ -163,7 +163,7 @@ def _scenario(name: str, overrides: tuple[str, ...], setting: Setting) -> Scenar
     return load_scenario(name_or_file, over(chosen, overrides, ScenarioError), setting.parameter_set)
 
 
-def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setting: Setting) -> FreeParameter:
+def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setting: SectionContext) -> FreeParameter:
     """Return a number to fit, in SI; ``scenarios`` are those of the experiments by label."""
     scenario = next((scenarios[label] for label in entry.recordings if label in scenarios), None)
     acting = scenario or next(iter(scenarios.values()))
@@ -188,7 +188,7 @@ def _parameter(entry: ParameterSection, scenarios: Mapping[str, Scenario], setti
     return FreeParameter(entry.path, start, low, high, deviation, entry.recordings)
 
 
-def _replay(entry: ExperimentSection, recording: Recording, setting: Setting, said: str) -> _Explained:
+def _replay(entry: ExperimentSection, recording: Recording, setting: SectionContext, said: str) -> _Explained:
     """Return the replay of a recording on the device of the set; it begins at the first sample unless a start is given.
 
     IdentificationError where a scenario is needed.
@@ -249,7 +249,7 @@ class TrajectoryOutcome:
         return not self.fit.conflict and not self.fit.remarks
 
 
-def solve_section(section: TrajectorySection, setting: Setting, report: Report) -> TrajectoryOutcome:
+def solve_section(section: TrajectorySection, setting: SectionContext, report: Report) -> TrajectoryOutcome:
     """Return the outcome of a section; everything that can be refused is refused before the search begins."""
     try:
         problem = trajectory_problem(section, setting)
@@ -260,7 +260,7 @@ def solve_section(section: TrajectorySection, setting: Setting, report: Report) 
         if str(error).startswith(setting.file):
             raise
         raise type(error)(f"{setting.file}: {error}") from error
-    sources = tuple(Source(experiment.recording, experiment.source) for experiment in problem.experiments)
+    sources = tuple(RecordingSource(experiment.recording, experiment.source) for experiment in problem.experiments)
     disagreeing = _against_bench(fitted.estimates, setting.bench)
     return TrajectoryOutcome(
         fitted, expected, (*told_of_readings(sources), *fitted.outliers, *fitted.remarks, *disagreeing)

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from ppafo.identification.new_set import fitting_unit, stated_half_width
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, Experiment, scenario_of
+from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, scenario_of
 from ppafo.identification.trajectory.numbers import (
     GAIN_OF,
     ZERO_OF,
@@ -52,7 +52,7 @@ def stated_by(parameter_set: ParameterSet, scenario: Scenario) -> dict[str, floa
 
 def tolerance_parameters(
     tolerances: Tolerances,
-    experiments: Sequence[Experiment],
+    experiments: Sequence[FittedExperiment],
     fitted: Sequence[FreeParameter],
     stated: Mapping[str, float] | None = None,
 ) -> tuple[FreeParameter, ...]:
@@ -90,7 +90,9 @@ def tolerance_parameters(
     return (*found, *_of_set(tolerances, experiments, given, stated or {}), *_stribeck(tolerances, experiments, given))
 
 
-def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: set[str]) -> Iterator[FreeParameter]:
+def _stribeck(
+    tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str]
+) -> Iterator[FreeParameter]:
     """Yield velocity and share of the fall from static to dynamic friction, where the set has none.
 
     With an abrupt fall static friction is traded for damping. What a step response says of static friction goes with
@@ -119,7 +121,7 @@ def _stribeck(tolerances: Tolerances, experiments: Sequence[Experiment], given: 
         yield _held(_SHARE, share, deviation, declared_numbers(scenario)[_SHARE])
 
 
-def _of_run(tolerances: Tolerances, experiment: Experiment) -> dict[str, tuple[float, float]]:
+def _of_run(tolerances: Tolerances, experiment: FittedExperiment) -> dict[str, tuple[float, float]]:
     """Return start and standard deviation of what one run is done with and how it begins, by path [SI]."""
     scenario, inputs, recording = scenario_of(experiment), experiment.inputs, experiment.recording
     free = scenario.motion if isinstance(scenario.motion, FreeMotion) and scenario.motion.leg is None else None
@@ -153,7 +155,7 @@ def _read_error(recording: Recording, name: str) -> float:
 
 
 def _of_set(
-    tolerances: Tolerances, experiments: Sequence[Experiment], given: set[str], stated: Mapping[str, float]
+    tolerances: Tolerances, experiments: Sequence[FittedExperiment], given: set[str], stated: Mapping[str, float]
 ) -> Iterator[FreeParameter]:
     """Return the numbers of the device that are held, each with its own uncertainty, as the fit moves them.
 

@@ -31,7 +31,7 @@ class Rise(NamedTuple):
     gain: Curve
 
 
-class Chamber(NamedTuple):
+class TabulatedChamber(NamedTuple):
     """A chamber: its volume [m^3] up to the lowest pressure measured, then stretch by stretch."""
 
     lowest: Curve
@@ -45,8 +45,8 @@ class Table(NamedTuple):
     last_angle: float
     per_angle: float
     bends: Annotated[tuple[float, ...], BENDS]
-    chamber_1: Chamber
-    chamber_2: Chamber
+    chamber_1: TabulatedChamber
+    chamber_2: TabulatedChamber
 
 
 class Measured(NamedTuple):
@@ -118,7 +118,7 @@ def level_of(curve: Curve, bases: Bases) -> Level:
     return Level(along(curve, bases.value), along(curve, bases.slope))
 
 
-def levels_of(chamber: Chamber, bases: Bases, dead_volume: float) -> Levels:
+def levels_of(chamber: TabulatedChamber, bases: Bases, dead_volume: float) -> Levels:
     """A chamber with a dead volume [m^3] at an angle."""
     lowest, rises = level_of(chamber.lowest, bases), chamber.rises
     return Levels(
@@ -149,7 +149,7 @@ def filled_from_vented(rise: Rise, gauge: float) -> float:
     return filled_share(rise, gauge) - filled_share(rise, 0.0)
 
 
-def volume_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
+def volume_at(chamber: TabulatedChamber, levels: Levels, gauge: float) -> float:
     """Volume of a chamber [m^3] at a gauge pressure [Pa]."""
     rises, gains = chamber.rises, levels.gains
     low = gains[0].volume * share_of(rises[0], gauge) + gains[1].volume * share_of(rises[1], gauge)
@@ -163,14 +163,14 @@ def compliance_in(rise: Rise, gain: Level, gauge: float) -> float:
     return gain.volume / rise.length if gauge >= rise.lower and gauge < rise.lower + rise.length else 0.0
 
 
-def compliance_at(chamber: Chamber, levels: Levels, gauge: float) -> float:
+def compliance_at(chamber: TabulatedChamber, levels: Levels, gauge: float) -> float:
     """Growth of the volume with the pressure [m^3/Pa] at a gauge pressure [Pa]."""
     rises, gains = chamber.rises, levels.gains
     low = compliance_in(rises[0], gains[0], gauge) + compliance_in(rises[1], gains[1], gauge)
     return low + (compliance_in(rises[2], gains[2], gauge) + compliance_in(rises[3], gains[3], gauge))
 
 
-def turning(chamber: Chamber, levels: Levels, gauge: float) -> float:
+def turning(chamber: TabulatedChamber, levels: Levels, gauge: float) -> float:
     """Torque [N m] at a gauge pressure [Pa]: the integral of the volume's slope over the pressure."""
     rises, gains = chamber.rises, levels.gains
     low = gains[0].slope * filled_from_vented(rises[0], gauge) + gains[1].slope * filled_from_vented(rises[1], gauge)
@@ -192,7 +192,7 @@ def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, 
     return own if content > begin * volume else found
 
 
-def pressure_at(chamber: Chamber, levels: Levels, content: float, atmosphere: float) -> float:
+def pressure_at(chamber: TabulatedChamber, levels: Levels, content: float, atmosphere: float) -> float:
     """Absolute pressure [Pa] at which p V is a gas content [J]."""
     rises, gains = chamber.rises, levels.gains
     volume = levels.lowest.volume

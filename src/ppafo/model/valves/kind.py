@@ -14,7 +14,7 @@ from ppafo.model.plant import BlendedPort, Openings, PlantParameters, PortFlow, 
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class JoiningPath:
     """A path of a valve from one chamber to the other: its opening over the valve's full area, 0 to 1, twice.
 
     ``opening(shown)`` holds during a step, from what the valve shows the plant; ``instant(parameters, state, command)``
@@ -63,7 +63,7 @@ class ValveModel:
     rates: Callable[[Any, Any, float], Any]
     next_event: Callable[[Any, Any, float, float], float]
     settle: Callable[[Any, Any, float, float], Any]
-    joint: Joint | None = None
+    joint: JoiningPath | None = None
 
 
 def valve_problem(valve: ValveModel) -> str:

@@ -12,7 +12,7 @@ from typing import Annotated, NamedTuple
 from ppafo.model.declaration import Number
 from ppafo.model.plant import Openings, PlantParameters, SinglePort, single_port_flow, single_port_flow_slopes
 from ppafo.model.valves import solenoid
-from ppafo.model.valves.kind import Joint, ValveKind, ValveModel
+from ppafo.model.valves.kind import JoiningPath, ValveKind, ValveModel
 from ppafo.model.valves.solenoid import NEVER, SAME_INSTANT, Coil, PairPositions, PairState, TimedSolenoid
 
 
@@ -176,7 +176,7 @@ MODEL = ValveModel(
     rates=rates,
     next_event=next_event,
     settle=settle,
-    joint=Joint(joined_opening, joined_at_instant),
+    joint=JoiningPath(joined_opening, joined_at_instant),
 )
 
 

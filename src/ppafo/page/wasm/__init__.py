@@ -82,8 +82,8 @@ from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
 from ppafo.exports.c_library.files import (
     OUTPUTS,
+    ExportParameter,
     Library,
-    Setting,
     c_identifier,
     conditions_of,
     conditions_of_program,
@@ -94,7 +94,7 @@ from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
 from ppafo.parameters.overrides import one_path, read_overrides
 from ppafo.parameters.parameter_set import SOURCE, atmospheric_pressure, entry_in_si
-from ppafo.report.display_units import display_unit, quantity_of_unit
+from ppafo.report.display_units import display_unit
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.declaration import LOCKED_ANGLE, SEED, value_at
 from ppafo.simulation.loading import parameter_set_of
@@ -104,6 +104,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked, complaint
 from ppafo.units import split_pressure_kind, to_si
+from ppafo.units.shown import quantity_of_unit
 from ppafo.version import __version__
 
 _KINDS = {VANE: "scenario", WALK: "walk"}
@@ -181,7 +182,7 @@ def _kept(library: Library) -> dict[str, str]:
     return kept
 
 
-def _setting(setting: Setting, atmosphere: float) -> dict[str, Any]:
+def _setting(setting: ExportParameter, atmosphere: float) -> dict[str, Any]:
     quantity = setting.quantity
     group, _, name = setting.path.rpartition(".")
     return {
@@ -248,7 +249,9 @@ def _origins(scenario: Scenario, library: Library) -> dict[str, dict[str, Any]]:
     return origins
 
 
-def _of_set(parameter_set: ParameterSet | None, device: Device, setting: Setting, *, follows: bool) -> dict[str, Any]:
+def _of_set(
+    parameter_set: ParameterSet | None, device: Device, setting: ExportParameter, *, follows: bool
+) -> dict[str, Any]:
     """Origin of a number of the device: the set's where it has this very value, the default's where it ``follows``."""
     if parameter_set is None:
         return _CHANGED

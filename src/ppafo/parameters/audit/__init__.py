@@ -17,7 +17,7 @@ from ppafo.parameters.audit.chambers import (
     check_volumes,
 )
 from ppafo.parameters.audit.changes import changes
-from ppafo.parameters.audit.evidence import Evidence, Finding, NamedValue, Severity, Side
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, NamedValue, Severity
 from ppafo.parameters.audit.flow import check_bores, check_choked_flow, check_flow, check_orifices, check_sonic_flow
 from ppafo.parameters.audit.torque import check_inertia, check_published_torque, check_torque_ceiling, check_vacuum
 from ppafo.parameters.audit.values import (
@@ -32,9 +32,9 @@ from ppafo.parameters.loading import load_parameter_set, set_or_load
 from ppafo.parameters.parameter_set import ParameterSet, overridden_paths, with_followers
 from ppafo.plugins import Plugins, name_plugins
 
-__all__ = ["Finding", "NamedValue", "Severity", "Side", "audit", "changed_paths"]
+__all__ = ["AuditFinding", "ComparedNumber", "NamedValue", "Severity", "audit", "changed_paths"]
 
-CHECKS: dict[str, Callable[[Evidence], Iterator[Finding]]] = {
+CHECKS: dict[str, Callable[[Evidence], Iterator[AuditFinding]]] = {
     "missing": check_missing,
     "statements": check_statements,
     "dimensions": check_dimensions,
@@ -62,7 +62,7 @@ _ORDER = {"error": 0, "warning": 1, "note": 2}
 @checked
 def audit(
     parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
-) -> list[Finding]:
+) -> list[AuditFinding]:
     """Return what contradicts, or deserves attention in, any parameter set; errors first.
 
     An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
@@ -85,7 +85,7 @@ def audit(
     # With overrides a finding may be gone for that reason alone: its acceptance is not idle.
     idle = {} if changed else {name: why for name, why in audited.accepted.items() if name not in ids}
     judged += [
-        Finding(
+        AuditFinding(
             id="idle-acceptance",
             severity="warning",
             title=f"the set accepts '{name}', which does not exist",
@@ -105,8 +105,8 @@ def changed_paths(parameter_set: ParameterSet, parent: ParameterSet | None) -> f
 
 
 def _judge(
-    finding: Finding, parameter_set: ParameterSet, overridden: frozenset[str], parent: ParameterSet | None
-) -> Finding:
+    finding: AuditFinding, parameter_set: ParameterSet, overridden: frozenset[str], parent: ParameterSet | None
+) -> AuditFinding:
     """Apply the set's reason, which holds for its author's values, not for overrides or changes in a copy."""
     reason = parameter_set.accepted.get(finding.id, "")
     is_copied = parent is not None and parent.accepted.get(finding.id) == reason

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from ppafo.parameters.audit.evidence import Evidence, Finding, Side, density_change
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, density_change
 
 # Does the torque constant equal the displacement per radian, as virtual work demands: T dtheta = (P1 - P2) dV?
 
@@ -17,7 +17,7 @@ _ID = "virtual-work"
 _TOLERANCE = 0.1
 
 
-def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
+def check_virtual_work(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a warning where the two differ by more than 10 %, a note where a stated efficiency explains it."""
     numbers, efficiency = evidence.numbers(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN), evidence.number(_EFFICIENCY)
     if numbers is None or min(numbers) <= 0.0:
@@ -25,12 +25,12 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
     if efficiency is not None and abs(numbers[1] * efficiency / numbers[0] - 1.0) <= _TOLERANCE:
         # The shaft's work is the gas's less the stated loss.
         ratio = numbers[0] / numbers[1]
-        yield Finding(
+        yield AuditFinding(
             id=_ID,
             severity="note",
             title="torque constant and displacement per radian agree, with the stated efficiency",
             values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY),
-            sides=(Side("torque constant over displacement per radian", ratio, ""),),
+            sides=(ComparedNumber("torque constant over displacement per radian", ratio, ""),),
             paragraph=(
                 f"Energy closes: the shaft gets {100.0 * ratio:.3g} % of the work p dV of the gas, and the other "
                 f"{100.0 * (1.0 - ratio):.3g} % are the stated loss. The model takes the same ratio where "
@@ -41,14 +41,14 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
     elif abs(numbers[1] / numbers[0] - 1.0) > _TOLERANCE:
         torque_constant, displacement_per_radian = numbers
         gas_paths, gas_sides, gas_text = _gas_use(evidence, torque_constant, displacement_per_radian)
-        yield Finding(
+        yield AuditFinding(
             id=_ID,
             severity="warning",
             title="torque constant and displacement per radian differ, against virtual work",
             values=evidence.values_of(_TORQUE_CONSTANT, _DISPLACEMENT_PER_RADIAN, _EFFICIENCY, *gas_paths),
             sides=(
-                Side("torque constant", torque_constant, "m^3"),
-                Side("displacement per radian", displacement_per_radian, "m^3/rad"),
+                ComparedNumber("torque constant", torque_constant, "m^3"),
+                ComparedNumber("displacement per radian", displacement_per_radian, "m^3/rad"),
                 *gas_sides,
             ),
             paragraph=(
@@ -67,7 +67,7 @@ def check_virtual_work(evidence: Evidence) -> Iterator[Finding]:
 
 def _gas_use(
     evidence: Evidence, torque_constant: float, displacement_per_radian: float
-) -> tuple[tuple[str, ...], tuple[Side, ...], str]:
+) -> tuple[tuple[str, ...], tuple[ComparedNumber, ...], str]:
     """Return paths, numbers and a sentence on the volume that the gas of one filling occupies."""
     gas, supply, angles = evidence.gas(), evidence.number(_SUPPLY), evidence.angle_range()
     path = evidence.single_fill_gas()
@@ -77,9 +77,9 @@ def _gas_use(
     used, turn = evidence.number(path) or 0.0, abs(angles[3] - angles[1])
     needed, by_torque, by_volume = used / density, torque_constant * turn, displacement_per_radian * turn
     sides = (
-        Side("volume that the gas use needs", needed, "m^3"),
-        Side("volume swept by the torque constant", by_torque, "m^3"),
-        Side("volume swept by the displacement per radian", by_volume, "m^3"),
+        ComparedNumber("volume that the gas use needs", needed, "m^3"),
+        ComparedNumber("volume swept by the torque constant", by_torque, "m^3"),
+        ComparedNumber("volume swept by the displacement per radian", by_volume, "m^3"),
     )
     text = (
         f" Filling 1 cm^3 from atmosphere to supply takes {density:.3g} mg of gas, so the "
@@ -99,7 +99,7 @@ _STOPS = ("actuator.angle_min", "actuator.angle_max")
 _DEAD = ("actuator.dead_volume_1", "actuator.dead_volume_2")
 
 
-def check_volumes(evidence: Evidence) -> Iterator[Finding]:
+def check_volumes(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each chamber that has no volume left at one end of the range."""
     numbers, angles = evidence.numbers(_SLOPE, *_STOPS), evidence.angle_range()
     if numbers is None or angles is None or numbers[0] <= 0.0:
@@ -110,7 +110,7 @@ def check_volumes(evidence: Evidence) -> Iterator[Finding]:
     yield from _chamber(evidence, 2, stop_high - high, high - low, high_path)
 
 
-def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[Finding]:
+def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_path: str) -> Iterator[AuditFinding]:
     """Yield an error where a chamber, with ``travel`` [rad] left to a swept volume of zero, has no volume."""
     slope = evidence.number(_SLOPE) or math.inf
     dead_path, stop_path = _DEAD[chamber - 1], _STOPS[chamber - 1]
@@ -120,15 +120,15 @@ def _chamber(evidence: Evidence, chamber: int, travel: float, turn: float, end_p
         return
     empty = min(-travel - dead / slope, turn)
     end = evidence.in_set_unit(end_path, evidence.number(end_path) or 0.0)
-    yield Finding(
+    yield AuditFinding(
         id=f"volume-{chamber}",
         severity="error",
         title=f"volume of chamber {chamber} is not positive over the range of angles",
         values=evidence.values_of(_SLOPE, stop_path, dead_path, end_path),
         sides=(
-            Side(f"V{chamber} at the end of the range", smallest, "m^3"),
-            Side("dead volume that is needed at least", -slope * travel, "m^3"),
-            Side("part of the range without volume", empty / turn if turn else 1.0, ""),
+            ComparedNumber(f"V{chamber} at the end of the range", smallest, "m^3"),
+            ComparedNumber("dead volume that is needed at least", -slope * travel, "m^3"),
+            ComparedNumber("part of the range without volume", empty / turn if turn else 1.0, ""),
         ),
         paragraph=(
             f"At {end} the volume of chamber {chamber} is {1e6 * smallest:.3g} cm^3; it is not positive over the last "
@@ -147,28 +147,34 @@ _RATED = "reported.rated_rotation"
 _SAME_TURN = 1.01
 
 
-def check_rotation(evidence: Evidence) -> Iterator[Finding]:
+def check_rotation(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error where the stops are the wrong way round; a warning for a range larger than by the designation."""
     rated, angles = evidence.number(_RATED), evidence.angle_range()
     stops = evidence.numbers("actuator.angle_min", "actuator.angle_max")
     if stops is not None and not stops[0] < stops[1]:
-        yield Finding(
+        yield AuditFinding(
             id="stops",
             severity="error",
             title="the lower stop is not below the upper one",
             values=evidence.values_of("actuator.angle_min", "actuator.angle_max"),
-            sides=(Side("actuator.angle_min", stops[0], "rad"), Side("actuator.angle_max", stops[1], "rad")),
+            sides=(
+                ComparedNumber("actuator.angle_min", stops[0], "rad"),
+                ComparedNumber("actuator.angle_max", stops[1], "rad"),
+            ),
             paragraph="No run can be made with these stops. Exchange them, or correct the wrong one.",
         )
     if rated is None or angles is None or angles[3] - angles[1] <= _SAME_TURN * rated:
         return
     turn = angles[3] - angles[1]
-    yield Finding(
+    yield AuditFinding(
         id="rotation",
         severity="warning",
         title="the vane turns further than the actuator does",
         values=evidence.values_of(_RATED, angles[0], angles[2]),
-        sides=(Side("range of angles", turn, "rad"), Side("rotation by the designation", rated, "rad")),
+        sides=(
+            ComparedNumber("range of angles", turn, "rad"),
+            ComparedNumber("rotation by the designation", rated, "rad"),
+        ),
         paragraph=(
             f"The range of angles is {math.degrees(turn):.3g} deg, the actuator turns by {math.degrees(rated):.3g} "
             "deg. Either another actuator or a gear was used, or the angle is not the vane's; volumes and torque "
@@ -184,7 +190,7 @@ _LEAST, _MOST = 0.6, 1.1
 """Fraction of the measured gas that a filling may hold: the rest leaks across the vane while the task lasts."""
 
 
-def check_filling(evidence: Evidence) -> Iterator[Finding]:
+def check_filling(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield the gas of a filling in the middle of the range: a note where the measured gas agrees, else a warning.
 
     Silent where the set reports no gas of a single filling.
@@ -199,15 +205,15 @@ def check_filling(evidence: Evidence) -> Iterator[Finding]:
     density, used = density_change(gas, supply - evidence.atmosphere()), evidence.number(path) or 0.0
     filled = density * volume
     agrees = _LEAST <= filled / used <= _MOST
-    yield Finding(
+    yield AuditFinding(
         id="gas-of-one-filling",
         severity="note" if agrees else "warning",
         title=f"the measured gas of one filling {'can be' if agrees else 'is not'} what chamber 1 holds",
         values=evidence.values_of(*_VOLUME, path, _SUPPLY),
         sides=(
-            Side("gas that fills chamber 1", filled, "kg"),
-            Side("measured gas", used, "kg"),
-            Side("volume of chamber 1 in the middle of the range", volume, "m^3"),
+            ComparedNumber("gas that fills chamber 1", filled, "kg"),
+            ComparedNumber("measured gas", used, "kg"),
+            ComparedNumber("volume of chamber 1 in the middle of the range", volume, "m^3"),
         ),
         paragraph=(
             f"In the middle of its range chamber 1 has {1e6 * volume:.3g} cm^3, dead volume included, and takes "
@@ -227,7 +233,7 @@ def check_filling(evidence: Evidence) -> Iterator[Finding]:
 # Were the numbers of a measured table moved within their last digit, so that its curves are those of a chamber?
 
 
-def check_rounded_table(evidence: Evidence) -> Iterator[Finding]:
+def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a note that says by how much the volumes of a rounded table were moved."""
     parameter_set = evidence.parameter_set
     path = Path(parameter_set.file).parent / parameter_set.actuator_file
@@ -237,12 +243,12 @@ def check_rounded_table(evidence: Evidence) -> Iterator[Finding]:
 
     moved, digit = largest_move(path)
     if moved > 0.0:
-        yield Finding(
+        yield AuditFinding(
             id="rounded-table",
             severity="note",
             title="the measured volumes are rounded",
             values=(),
-            sides=(Side("largest move", moved, "m^3"), Side("last digit", digit, "m^3")),
+            sides=(ComparedNumber("largest move", moved, "m^3"), ComparedNumber("last digit", digit, "m^3")),
             paragraph=(
                 f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would fit no "
                 f"chamber: negative, or falling with the pressure. They are moved by {1e6 * moved:.2g} mL at most, "

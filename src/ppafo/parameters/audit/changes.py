@@ -19,7 +19,7 @@ _SAME = 1e-12
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ValueChange:
     """A value that differs, as each set gives it; '' where a set has none. ``origin`` of the new value."""
 
     path: str
@@ -28,7 +28,7 @@ class Change:
     origin: str
 
 
-def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
+def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[ValueChange]:
     """Return the differences of a set from its parent: kinds and choices first, then values in the set's order.
 
     Numbers are compared in SI, so that a value in another unit is the same value; sources and notes do not count.
@@ -36,7 +36,7 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
     parameter_set, parent = with_followers(parameter_set), with_followers(parent)
     kinds, old_kinds = _chosen(parameter_set), _chosen(parent)
     changed = [
-        Change(path, old_kinds.get(path, ""), kinds.get(path, ""), "")
+        ValueChange(path, old_kinds.get(path, ""), kinds.get(path, ""), "")
         for path in dict.fromkeys((*kinds, *old_kinds))
         if kinds.get(path) != old_kinds.get(path)
     ]
@@ -48,7 +48,7 @@ def changes(parameter_set: ParameterSet, parent: ParameterSet) -> list[Change]:
             continue
         if new is None or old is None or not _is_same(path, parameter_set, parent):
             was = "" if old is None else entry_text(old)
-            changed.append(Change(path, was, *(("", "") if new is None else (entry_text(new), new.origin))))
+            changed.append(ValueChange(path, was, *(("", "") if new is None else (entry_text(new), new.origin))))
     return changed
 
 

@@ -17,6 +17,7 @@ from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.parameter_set import ParameterSet, atmospheric_pressure, number_in_si
 from ppafo.units import from_si
 from ppafo.units.definitions import DECIMALS
+from ppafo.units.shown import shown_in, shown_unit, shown_value
 
 Severity = Literal["error", "warning", "note"]
 
@@ -32,7 +33,7 @@ class NamedValue:
 
 
 @dataclass(frozen=True, slots=True)
-class Side:
+class ComparedNumber:
     """Operand of a comparison, in SI units, pressures absolute."""
 
     label: str
@@ -41,7 +42,7 @@ class Side:
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class AuditFinding:
     """A contradiction (error), something to know before trusting a result (warning), or a check that holds (note).
 
     ``paragraph`` says in words what was compared and what would be consistent. ``accepted`` is the reason why the
@@ -52,7 +53,7 @@ class Finding:
     severity: Severity
     title: str
     values: tuple[NamedValue, ...]
-    sides: tuple[Side, ...]
+    sides: tuple[ComparedNumber, ...]
     paragraph: str
     accepted: str = ""
 
@@ -70,21 +71,21 @@ _SMALLEST, _LARGEST = 1e-20, 1e20
 """SI magnitudes beyond which a number is a slip, and products of numbers leave the range of floating point."""
 
 
-class Interval(NamedTuple):
+class ReportedRange(NamedTuple):
     """The range of numbers that a reported number can stand for; SI, positive."""
 
     low: float
     high: float
 
-    def times(self, other: "Interval") -> "Interval":
+    def times(self, other: "ReportedRange") -> "ReportedRange":
         """Return the range of the product."""
-        return Interval(self.low * other.low, self.high * other.high)
+        return ReportedRange(self.low * other.low, self.high * other.high)
 
-    def over(self, other: "Interval") -> "Interval":
+    def over(self, other: "ReportedRange") -> "ReportedRange":
         """Return the range of the quotient."""
-        return Interval(self.low / other.high, self.high / other.low)
+        return ReportedRange(self.low / other.high, self.high / other.low)
 
-    def meets(self, other: "Interval") -> bool:
+    def meets(self, other: "ReportedRange") -> bool:
         """Return whether one number could be meant by both."""
         return self.low <= other.high and other.low <= self.high
 
@@ -112,7 +113,7 @@ class Evidence:
         entry = self.parameter_set.texts.get(path)
         return None if entry is None else entry.value
 
-    def magnitude(self, path: str) -> Interval | None:
+    def magnitude(self, path: str) -> ReportedRange | None:
         """Return the range that the reported digits at a path leave open, without sign, in SI."""
         value, entry = self.number(path), self.parameter_set.numbers.get(path)
         if value is None or entry is None or entry.value == 0.0:
@@ -120,7 +121,7 @@ class Evidence:
         # Below 1: the digits of "2" leave open 1.5 to 2.5, and never 0 or another sign.
         half_width = _half_digit(entry.value) if entry.uncertainty is None else entry.uncertainty
         relative = min(half_width / abs(entry.value), 0.99)
-        return Interval(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
+        return ReportedRange(abs(value) * (1.0 - relative), abs(value) * (1.0 + relative))
 
     def in_set_unit(self, path: str, value: float) -> str:
         """Return an SI value in the unit in which the set gives the quantity at a path, for example ``84 g m^2``."""
@@ -137,8 +138,8 @@ class Evidence:
 
     def torque(self, value: float, form: str = ".3g") -> str:
         """Return a torque [N m] as text in the unit in which the set writes torques, for example ``550 N cm``."""
-        unit = self.parameter_set.shown.get("N m", "N m")
-        number = f"{from_si(value, unit, 'N m'):{form}}"
+        with shown_in(self.parameter_set.shown):
+            number, unit = f"{shown_value(value, 'N m'):{form}}", shown_unit("N m")
         # A form that keeps zeros makes "550." of 550.
         return f"{number.removesuffix('.')} {unit}"
 
@@ -184,9 +185,9 @@ class Evidence:
         return None if values is None else chamber_1_volume(angle, values[1], values[0], dead_volume)
 
 
-def digits(value: float) -> Interval:
+def digits(value: float) -> ReportedRange:
     """Return the range that the digits of a reported positive number leave open."""
-    return Interval(value - _half_digit(value), value + _half_digit(value))
+    return ReportedRange(value - _half_digit(value), value + _half_digit(value))
 
 
 def _half_digit(value: float) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, subsonic_flow_constant
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function, sonic_conductance_mass
-from ppafo.parameters.audit.evidence import GAS_PATHS, Evidence, Finding, Interval, Side
+from ppafo.parameters.audit.evidence import GAS_PATHS, AuditFinding, ComparedNumber, Evidence, ReportedRange
 from ppafo.parameters.building import both_forms
 from ppafo.parameters.declaration import AREA_FORM, SONIC_FORM
 from ppafo.parameters.device import Gas, Orifice, SonicOrifice
@@ -20,13 +20,13 @@ _SUPPLY = "supply.pressure"
 _GRAMS = 1e3
 
 
-def check_orifices(evidence: Evidence) -> Iterator[Finding]:
+def check_orifices(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for an orifice in two forms, and a note with the flow of each valve in the set's gas."""
     valves = {name: f"valves.{name}" for name in evidence.parameter_set.valve_kinds}
     for section in ("actuator.leak", *valves.values()):
         names = both_forms(evidence.parameter_set, section)
         if names:
-            yield Finding(
+            yield AuditFinding(
                 id=f"forms-of-{section.rpartition('.')[2]}",
                 severity="error",
                 title=f"{section} is given in two forms",
@@ -59,7 +59,7 @@ _TUBES = {
 _SAME_BORE = 0.005
 
 
-def check_bores(evidence: Evidence) -> Iterator[Finding]:
+def check_bores(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a note for each valve whose area is a tube's: its coefficient is then no property of an orifice."""
     for valve in evidence.parameter_set.valve_kinds:
         path = f"valves.{valve}.area"
@@ -68,12 +68,12 @@ def check_bores(evidence: Evidence) -> Iterator[Finding]:
             bore = 0.25 * math.pi * diameter * diameter
             if abs(area / bore - 1.0) > _SAME_BORE:
                 continue
-            yield Finding(
+            yield AuditFinding(
                 id=f"bore-of-{valve}",
                 severity="note",
                 title=f"the area of valve '{valve}' is the bore of a {name} tube",
                 values=evidence.values_of(path, f"valves.{valve}.discharge_coefficient"),
-                sides=(Side("area", area, "m^2"), Side(f"bore of {name}", bore, "m^2")),
+                sides=(ComparedNumber("area", area, "m^2"), ComparedNumber(f"bore of {name}", bore, "m^2")),
                 paragraph=(
                     f"A bore of {name} has {1e6 * bore:.4g} mm^2, the valve {1e6 * area:.4g} mm^2. An orifice within a "
                     "valve is smaller than its ports: the discharge coefficient stands for everything between them, "
@@ -82,7 +82,7 @@ def check_bores(evidence: Evidence) -> Iterator[Finding]:
             )
 
 
-def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]:
+def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[AuditFinding]:
     gas, supply, atmosphere = evidence.gas(), evidence.number(_SUPPLY), evidence.atmosphere()
     if gas is None or supply is None or both_forms(evidence.parameter_set, section):
         return
@@ -113,12 +113,12 @@ def _open_flow(evidence: Evidence, name: str, section: str) -> Iterator[Finding]
     is_vacuum = supply < atmosphere
     way = "from atmosphere to vacuum" if is_vacuum else "from supply to atmosphere"
     ends = f"the atmosphere to {shown}" if is_vacuum else f"{shown} to the atmosphere"
-    yield Finding(
+    yield AuditFinding(
         id=f"open-flow-of-{name}",
         severity="note",
         title=f"valve '{name}' passes {_GRAMS * flow:#.3g} g/s of {gas.species}",
         values=evidence.values_of(*(f"{section}.{quantity.name}" for quantity in form), _SUPPLY),
-        sides=(Side(f"flow {way}", flow, "kg/s"), Side("conductance", conductance, "kg/(s Pa)")),
+        sides=(ComparedNumber(f"flow {way}", flow, "kg/s"), ComparedNumber("conductance", conductance, "kg/(s Pa)")),
         paragraph=(
             f"Fully open from {ends} it passes {_GRAMS * flow:#.3g} g/s {origin}. Compare this with the data sheet."
         ),
@@ -169,7 +169,7 @@ _ROUNDING = 1e-3
 """Relative room beside the reported digits: other values of R, M and 273 or 273.15."""
 
 
-def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
+def check_choked_flow(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a finding for each reported constant, a note where it holds, and one for the reported exponent."""
     gas = evidence.gas()
     if gas is None:
@@ -189,12 +189,15 @@ def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
         quantity = evidence.declared[path]
         verdict = "agree to the reported digits" if holds else f"differ by {100.0 * (reported / value - 1.0):+.2g} %"
         remedy = "" if holds else f" Would be consistent with {value:.5g}, or with other gas data."
-        yield Finding(
+        yield AuditFinding(
             id=path.rpartition(".")[2].replace("_", "-"),
             severity="note" if holds else "error",
             title=f"{quantity.summary} {'follows' if holds else 'does not follow'} from the gas data",
             values=evidence.values_of(path, *GAS_PATHS),
-            sides=(Side("reported", reported, quantity.unit), Side("from the gas data", value, quantity.unit)),
+            sides=(
+                ComparedNumber("reported", reported, quantity.unit),
+                ComparedNumber("from the gas data", value, quantity.unit),
+            ),
             paragraph=(
                 f"Reported is {evidence.in_set_unit(path, reported)}; the gas data give {value:.5g} "
                 f"{quantity.unit}".rstrip()
@@ -204,7 +207,7 @@ def check_choked_flow(evidence: Evidence) -> Iterator[Finding]:
     yield from _exponent(evidence, gas)
 
 
-def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
+def _exponent(evidence: Evidence, gas: Gas) -> Iterator[AuditFinding]:
     """Compare C1 with the reported exponent to C1 with (k + 1)/(k - 1)."""
     formula = evidence.text(_EXPONENT)
     k = gas.heat_capacity_ratio
@@ -217,7 +220,7 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
     title = "the reported exponent inside C1 is not the exponent of choked flow"
     if exponent is None:
         text = f"The formula '{formula}' cannot be read as arithmetic in k; the right exponent is (k + 1)/(k - 1)."
-        yield Finding("choked-flow-exponent", "warning", title, values, (), text)
+        yield AuditFinding("choked-flow-exponent", "warning", title, values, (), text)
         return
     # C1 is the root of a power: half the difference of exponents is left.
     literal = correct * (2.0 / (k + 1.0)) ** (0.5 * (exponent - right))
@@ -225,12 +228,15 @@ def _exponent(evidence: Evidence, gas: Gas) -> Iterator[Finding]:
     if reported is not None:
         nearer = "second" if abs(reported - correct) < abs(reported - literal) else "first"
         agreement = f", and the reported C1 of {reported:.4g} s/m is the {nearer} of the two"
-    yield Finding(
+    yield AuditFinding(
         id="choked-flow-exponent",
         severity="error",
         title=title,
         values=values,
-        sides=(Side("C1 with the reported exponent", literal, "s/m"), Side("C1 with (k+1)/(k-1)", correct, "s/m")),
+        sides=(
+            ComparedNumber("C1 with the reported exponent", literal, "s/m"),
+            ComparedNumber("C1 with (k+1)/(k-1)", correct, "s/m"),
+        ),
         paragraph=(
             f"The reported exponent {formula} is {exponent:.4g} and gives C1 = {literal:.4g} s/m; the exponent "
             f"(k + 1)/(k - 1) = {right:.4g} gives {correct:.4g} s/m{agreement}. "
@@ -258,7 +264,7 @@ class _ValveFlow:
     agrees: bool
 
 
-def check_flow(evidence: Evidence) -> Iterator[Finding]:
+def check_flow(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each valve whose reported flow its Cd A does not pass, and for a shared Cd that cannot be."""
     flows = [flow for name in evidence.parameter_set.valve_kinds if (flow := _flow(evidence, name)) is not None]
     for flow in flows:
@@ -267,15 +273,15 @@ def check_flow(evidence: Evidence) -> Iterator[Finding]:
             needed = flow.measured / flow.per_area
             reported = evidence.in_set_unit(flow_path, flow.measured)
             pressure = evidence.in_set_unit(pressure_path, evidence.number(pressure_path) or 0.0)
-            yield Finding(
+            yield AuditFinding(
                 id=f"flow-of-{flow.name}",
                 severity="error",
                 title=f"the reported flow of valve '{flow.name}' does not follow from Cd A",
                 values=evidence.values_of(*_paths(flow.name)),
                 sides=(
-                    Side("reported flow", flow.measured, "kg/s"),
-                    Side("Cd A C1 P", flow.predicted, "kg/s"),
-                    Side("Cd A that gives the reported flow", needed, "m^2"),
+                    ComparedNumber("reported flow", flow.measured, "kg/s"),
+                    ComparedNumber("Cd A C1 P", flow.predicted, "kg/s"),
+                    ComparedNumber("Cd A that gives the reported flow", needed, "m^2"),
                 ),
                 paragraph=(
                     f"Fully open at {pressure} the valve '{flow.name}' passes "
@@ -311,14 +317,14 @@ def _flow(evidence: Evidence, name: str) -> _ValveFlow | None:
     k = gas.heat_capacity_ratio
     psi = isentropic_flow_function(min(evidence.atmosphere() / pressure, 1.0), k)
     per_area = choked_flow_constant(k, gas.specific_gas_constant, gas.temperature) * pressure * psi
-    room = Interval(per_area * (1.0 - _MODEL), per_area * (1.0 + _MODEL))
+    room = ReportedRange(per_area * (1.0 - _MODEL), per_area * (1.0 + _MODEL))
     if per_area <= 0.0:
         return None
     agrees = ranges[0].times(ranges[1]).times(room).meets(ranges[2])
     return _ValveFlow(name, area, coefficient, measured, coefficient * area * per_area, per_area, agrees)
 
 
-def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[Finding]:
+def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> Iterator[AuditFinding]:
     """Compare the first valve with every other one that has the same Cd; then flows must be as areas."""
     for other in flows[1:]:
         first = flows[0]
@@ -326,12 +332,15 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
         measured = (first.measured / first.per_area) / (other.measured / other.per_area)
         if first.coefficient != other.coefficient or abs(areas / measured - 1.0) < 2.0 * _MODEL:
             continue
-        yield Finding(
+        yield AuditFinding(
             id=f"one-coefficient-{first.name}-{other.name}",
             severity="error",
             title=f"one Cd cannot give the reported flows of '{first.name}' and '{other.name}'",
             values=evidence.values_of(*_paths(first.name)[:3], *_paths(other.name)[:3]),
-            sides=(Side("ratio of the areas", areas, ""), Side("ratio of the reported flows", measured, "")),
+            sides=(
+                ComparedNumber("ratio of the areas", areas, ""),
+                ComparedNumber("ratio of the reported flows", measured, ""),
+            ),
             paragraph=(
                 f"With one discharge coefficient {first.coefficient:.4g} flow goes as area: '{first.name}' must pass "
                 f"{areas:.3g} times what '{other.name}' passes, the reported flows are as {measured:.3g} to 1. "
@@ -345,7 +354,7 @@ def _check_shared_coefficient(evidence: Evidence, flows: list[_ValveFlow]) -> It
 # Does the reported flow of a valve in the form of ISO 6358 follow from its sonic conductance?
 
 
-def check_sonic_flow(evidence: Evidence) -> Iterator[Finding]:
+def check_sonic_flow(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each valve whose reported flow its sonic conductance does not pass."""
     gas = evidence.gas()
     for name in evidence.parameter_set.valve_kinds:
@@ -365,19 +374,19 @@ def check_sonic_flow(evidence: Evidence) -> Iterator[Finding]:
         conductance, critical_ratio, measured, pressure = numbers
         psi = iso6358_flow_function(min(evidence.atmosphere() / pressure, 1.0), critical_ratio)
         per_size = sonic_conductance_mass(1.0, gas.specific_gas_constant, gas.temperature) * pressure * psi
-        room = Interval(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
+        room = ReportedRange(per_size * (1.0 - _MODEL), per_size * (1.0 + _MODEL))
         if per_size <= 0.0 or size_reported.times(room).meets(reported):
             continue
         predicted, needed = conductance * per_size, measured / per_size
-        yield Finding(
+        yield AuditFinding(
             id=f"flow-of-{name}",
             severity="error",
             title=f"the reported flow of valve '{name}' does not follow from its sonic conductance",
             values=evidence.values_of(*paths),
             sides=(
-                Side("reported flow", measured, "kg/s"),
-                Side("flow of the sonic conductance", predicted, "kg/s"),
-                Side("sonic conductance that gives the reported flow", needed, "m^3/(s Pa)"),
+                ComparedNumber("reported flow", measured, "kg/s"),
+                ComparedNumber("flow of the sonic conductance", predicted, "kg/s"),
+                ComparedNumber("sonic conductance that gives the reported flow", needed, "m^3/(s Pa)"),
             ),
             paragraph=(
                 f"Fully open the valve '{name}' passes {evidence.in_set_unit(flow, predicted)} by its sonic "

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from ppafo.errors import ParameterError, UnitError
 from ppafo.model.gas import choked_flow_constant
 from ppafo.model.orifice import isentropic_flow_function
-from ppafo.parameters.audit.evidence import Evidence, Finding, Interval, Severity, Side
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence, ReportedRange, Severity
 from ppafo.parameters.device import VANE, Gas
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.reach import torque_reach
 from ppafo.units import from_si, to_si
+from ppafo.units.shown import shown_in, shown_unit
 
 # Do damping and dynamic friction agree with the inertia and the reported ratios they were computed from?
 
@@ -24,7 +25,7 @@ _DECELERATION = "reported.stopping_deceleration"
 _SHIFTS = (-3, -2, -1, 1, 2, 3)
 
 
-def check_inertia(evidence: Evidence) -> Iterator[Finding]:
+def check_inertia(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each product that does not hold, and a note on one inertia that would make both hold."""
     inertia = evidence.magnitude(_INERTIA)
     decay_path, decay = _decay_rate(evidence)
@@ -42,15 +43,15 @@ def check_inertia(evidence: Evidence) -> Iterator[Finding]:
         given, number = evidence.number(_INERTIA) or 0.0, evidence.number(product) or 0.0
         expected, needed = given * _middle(rate), number / _middle(rate)
         ratio, unit = evidence.values_of(rate_path)[0], evidence.declared[product].unit
-        yield Finding(
+        yield AuditFinding(
             id=f"{name.replace(' ', '-')}-against-inertia",
             severity="error",
             title=f"{name} is not the product of inertia and the reported ratio",
             values=evidence.values_of(product, _INERTIA, rate_path),
             sides=(
-                Side(f"reported {name}", number, unit),
-                Side("inertia times ratio", expected, unit),
-                Side("inertia that would agree", needed, "kg m^2"),
+                ComparedNumber(f"reported {name}", number, unit),
+                ComparedNumber("inertia times ratio", expected, unit),
+                ComparedNumber("inertia that would agree", needed, "kg m^2"),
             ),
             paragraph=(
                 f"Inertia {evidence.in_set_unit(_INERTIA, given)} times {abs(float(ratio.value)):g} {ratio.unit} is "
@@ -65,7 +66,7 @@ def check_inertia(evidence: Evidence) -> Iterator[Finding]:
         yield from _one_inertia(evidence, agreeing[0], agreeing[1], decay_path)
 
 
-def _decay_rate(evidence: Evidence) -> tuple[str, Interval | None]:
+def _decay_rate(evidence: Evidence) -> tuple[str, ReportedRange | None]:
     """Return beta/I [1/s] and its path, from the ratio or its inverse; an inverse in 1/s is the ratio itself."""
     direct = evidence.magnitude(_DECAY)
     inverse = evidence.magnitude(_DECAY_INVERSE)
@@ -75,18 +76,20 @@ def _decay_rate(evidence: Evidence) -> tuple[str, Interval | None]:
         to_si(1.0, evidence.parameter_set.numbers[_DECAY_INVERSE].unit, "s")
     except UnitError:
         return _DECAY_INVERSE, inverse
-    return _DECAY_INVERSE, Interval(1.0, 1.0).over(inverse)
+    return _DECAY_INVERSE, ReportedRange(1.0, 1.0).over(inverse)
 
 
-def _middle(interval: Interval) -> float:
+def _middle(interval: ReportedRange) -> float:
     return 0.5 * (interval.low + interval.high)
 
 
-def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, decay_path: str) -> Iterator[Finding]:
+def _one_inertia(
+    evidence: Evidence, damping: ReportedRange, friction: ReportedRange, decay_path: str
+) -> Iterator[AuditFinding]:
     """Look for one inertia within the reported digits of both products, first the reported one with a moved point."""
     if not damping.meets(friction):
         return
-    common = Interval(max(damping.low, friction.low), min(damping.high, friction.high))
+    common = ReportedRange(max(damping.low, friction.low), min(damping.high, friction.high))
     reported = evidence.number(_INERTIA) or 0.0
     shifted = [reported * 10.0**shift for shift in _SHIFTS if common.low <= reported * 10.0**shift <= common.high]
     # A moved decimal point is the likeliest slip; else the middle of what both allow.
@@ -98,16 +101,16 @@ def _one_inertia(evidence: Evidence, damping: Interval, friction: Interval, deca
         if shifted
         else ""
     )
-    yield Finding(
+    yield AuditFinding(
         id="one-inertia-for-both",
         severity="note",
         title=f"damping and dynamic friction both agree with an inertia of {written}",
         values=evidence.values_of(_INERTIA, _DAMPING, _FRICTION, decay_path, _DECELERATION),
         sides=(
-            Side("reported inertia", reported, "kg m^2"),
-            Side("reconciling inertia", best, "kg m^2"),
-            Side("lowest that agrees", common.low, "kg m^2"),
-            Side("highest that agrees", common.high, "kg m^2"),
+            ComparedNumber("reported inertia", reported, "kg m^2"),
+            ComparedNumber("reconciling inertia", best, "kg m^2"),
+            ComparedNumber("lowest that agrees", common.low, "kg m^2"),
+            ComparedNumber("highest that agrees", common.high, "kg m^2"),
         ),
         paragraph=(
             f"Within the reported digits both products hold for any inertia from "
@@ -124,7 +127,7 @@ _STATIC = "friction.static_torque"
 _SUPPLIES = ("supply.pressure", "supply.dorsiflexion_pressure", "reported.other_supply_pressure")
 
 
-def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
+def check_torque_ceiling(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield the ceiling for each supply: a note, a warning below the demand, an error below static friction."""
     constant = evidence.number(_TORQUE_CONSTANT)
     supplies = {path: value for path in _SUPPLIES if (value := evidence.number(path)) is not None}
@@ -135,16 +138,17 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
     ceilings = {path: constant * abs(value - evidence.atmosphere()) for path, value in supplies.items()}
     severity, verdict = _verdict(evidence, max(ceilings.values()), constant)
     # Torque constants are quoted per psi in the field, or per bar where the set has bar.
-    unit = evidence.parameter_set.shown.get("Pa_d", "psi_d")
+    with shown_in(evidence.parameter_set.shown):
+        unit = shown_unit("Pa_d")
     per_unit = evidence.torque(constant * to_si(1.0, unit, "Pa_d"), "#.3g")
     pressures = {path: evidence.in_set_unit(path, value) for path, value in supplies.items()}
     held = (f"{evidence.torque(ceilings[path], '#.3g')} at {pressures[path]} ({path})" for path in supplies)
-    yield Finding(
+    yield AuditFinding(
         id="torque-ceiling",
         severity=severity,
         title=f"the supply allows at most {evidence.torque(max(ceilings.values()), '#.3g')}",
         values=evidence.values_of(_TORQUE_CONSTANT, *supplies, _DEMAND, _STATIC),
-        sides=tuple(Side(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
+        sides=tuple(ComparedNumber(f"ceiling at {path}", value, "N m") for path, value in ceilings.items()),
         paragraph=(
             f"The torque constant is {per_unit}/{unit.removesuffix('_d')}. With one chamber at supply and "
             f"the other at atmosphere the vane gives {', '.join(held)}, before friction.{verdict}"
@@ -152,7 +156,7 @@ def check_torque_ceiling(evidence: Evidence) -> Iterator[Finding]:
     )
 
 
-def check_vacuum(evidence: Evidence) -> Iterator[Finding]:
+def check_vacuum(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield for each supply below the atmosphere how deep it is: a warning where its unit is an absolute one."""
     for path in _SUPPLIES[:2]:
         entry, pressure = evidence.parameter_set.numbers.get(path), evidence.number(path)
@@ -161,12 +165,12 @@ def check_vacuum(evidence: Evidence) -> Iterator[Finding]:
         depth, chamber = evidence.atmosphere() - pressure, 1 if path == _SUPPLIES[0] else 2
         way = "lowers" if chamber == 1 else "raises"
         doubt = f" If {entry.value:g} {entry.unit} was read from a gauge, write '_g' for '_a'."
-        yield Finding(
+        yield AuditFinding(
             id=f"vacuum-{chamber}",
             severity="warning" if entry.unit.endswith("_a") else "note",
             title=f"{path} is a vacuum, {depth / 1e3:.3g} kPa below the atmosphere",
             values=evidence.values_of(path, ATMOSPHERE_PATH),
-            sides=(Side("depth of the vacuum", depth, "Pa"),),
+            sides=(ComparedNumber("depth of the vacuum", depth, "Pa"),),
             paragraph=(
                 f"A valve that joins chamber {chamber} to it draws its gas out, and the room fills it again: that "
                 f"{way} the torque.{doubt if entry.unit.endswith('_a') else ''}"
@@ -174,7 +178,7 @@ def check_vacuum(evidence: Evidence) -> Iterator[Finding]:
         )
 
 
-def _ceiling_by_angle(evidence: Evidence) -> Iterator[Finding]:
+def _ceiling_by_angle(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield the ceiling of a kind whose torque depends on the angle: the most between the stops, and the least."""
     from ppafo.parameters.building import build_device
 
@@ -193,11 +197,11 @@ def _ceiling_by_angle(evidence: Evidence) -> Iterator[Finding]:
         texts.append(
             f"{evidence.torque(most, '#.3g')} {way} at {at:.3g} deg, and {evidence.torque(least, '#.3g')} at least"
         )
-        sides.append(Side(f"most {way}", most, "N m"))
+        sides.append(ComparedNumber(f"most {way}", most, "N m"))
         ceiling = max(ceiling, most)
     static = evidence.number(_STATIC)
     holds = static is not None and static >= ceiling
-    yield Finding(
+    yield AuditFinding(
         id="torque-ceiling",
         severity="error" if holds else "note",
         title=f"the supply allows at most {evidence.torque(ceiling, '#.3g')}",
@@ -216,7 +220,8 @@ _ABOVE = "A reference above that cannot be followed by any valve or controller."
 
 def _verdict(evidence: Evidence, ceiling: float, constant: float) -> tuple[Severity, str]:
     static, demand = evidence.number(_STATIC), evidence.number(_DEMAND)
-    unit = evidence.parameter_set.shown.get("Pa_d", "kPa_d")
+    with shown_in(evidence.parameter_set.shown):
+        unit = shown_unit("Pa_d")
     if static is not None and static >= ceiling:
         needed = f"{from_si(static / constant, unit, 'Pa_d'):.4g} {unit}"
         return "error", f" Static friction of {evidence.torque(static)} is more: the vane cannot move below {needed}."
@@ -242,7 +247,7 @@ _TOE_OFF = math.radians(110.0)
 _PARTS = 200
 
 
-def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
+def check_published_torque(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield for each published torque whether the pressure gives it, and for walking whether it comes in time.
 
     Notes where it does, warnings where not; silent without published torques.
@@ -256,12 +261,15 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
         note = evidence.parameter_set.numbers[paths[0]].note
         held = constant * (pressure - evidence.atmosphere())
         agrees = abs(held / torque - 1.0) <= _ROOM
-        yield Finding(
+        yield AuditFinding(
             id=f"{name}-torque",
             severity="note" if agrees else "warning",
             title=f"the published {name} torque {'agrees' if agrees else 'does not agree'} with the torque constant",
             values=evidence.values_of(_TORQUE_CONSTANT, *paths),
-            sides=(Side("torque constant times pressure", held, "N m"), Side("published", torque, "N m")),
+            sides=(
+                ComparedNumber("torque constant times pressure", held, "N m"),
+                ComparedNumber("published", torque, "N m"),
+            ),
             paragraph=(
                 f"At {evidence.in_set_unit(paths[1], pressure)} the vane gives {evidence.torque(held)}, published "
                 f"are {evidence.torque(torque)}. This speaks of the torque constant alone: "
@@ -272,7 +280,7 @@ def check_published_torque(evidence: Evidence) -> Iterator[Finding]:
             yield from _while_walking(evidence, numbers[1], numbers[2])
 
 
-def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterator[Finding]:
+def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterator[AuditFinding]:
     """Yield for each valve how long chamber 1, as large as it is at toe-off, needs for the torque."""
     gas, volume = evidence.gas(), evidence.chamber_1_volume(_TOE_OFF)
     constant, atmosphere = evidence.number(_TORQUE_CONSTANT) or 0.0, evidence.atmosphere()
@@ -284,14 +292,14 @@ def _while_walking(evidence: Evidence, torque: float, pressure: float) -> Iterat
             continue
         time = _filling_time(gas, volume, numbers[0] * numbers[1], (atmosphere, target, pressure))
         severity: Severity = "note" if time <= _PUSH_OFF else "warning"
-        yield Finding(
+        yield AuditFinding(
             id=f"walking-torque-in-time-{valve}",
             severity=severity,
             title=f"valve '{valve}' fills chamber 1 {'within' if time <= _PUSH_OFF else 'too slowly for'} a push-off",
             values=evidence.values_of(
                 "actuator.displacement_per_radian", "actuator.dead_volume_1", *sizes, "reported.walking_torque_pressure"
             ),
-            sides=(Side("time to fill", time, "s"), Side("time of push-off", _PUSH_OFF, "s")),
+            sides=(ComparedNumber("time to fill", time, "s"), ComparedNumber("time of push-off", _PUSH_OFF, "s")),
             paragraph=(
                 f"At toe-off chamber 1 has {1e6 * volume:.3g} cm^3. Through the open valve '{valve}' "
                 f"{100.0 * _REACHED:.0f} % of the {evidence.torque(torque)} that were published of walking take "

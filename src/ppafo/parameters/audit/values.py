@@ -8,7 +8,7 @@ from ppafo.constants import UNIVERSAL_GAS_CONSTANT
 from ppafo.errors import ParameterError, UnitError, count_of
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
-from ppafo.parameters.audit.evidence import Evidence, Finding, Side
+from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence
 from ppafo.parameters.building import missing_values
 from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
@@ -18,7 +18,7 @@ from ppafo.units import to_si
 # Is every value that has the key of a published statement the number that this states?
 
 
-def check_statements(evidence: Evidence) -> Iterator[Finding]:
+def check_statements(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each value whose key names no published number, or one of another size."""
     for path, entry in evidence.parameter_set.numbers.items():
         name, _, identifier = entry.key.partition("/")
@@ -29,7 +29,7 @@ def check_statements(evidence: Evidence) -> Iterator[Finding]:
         if number == entry.value and unit == entry.unit:
             continue
         stated_number = f"{number:g} {unit}".rstrip() if identifier in stated else "no number of that name"
-        yield Finding(
+        yield AuditFinding(
             id=f"{path.replace('.', '-').replace('_', '-')}-against-statement",
             severity="error",
             title=f"{path} is not what '{entry.key}' states",
@@ -60,7 +60,7 @@ def _stated_numbers(name: str) -> dict[str, tuple[float, str]]:
 # Does a device lack a value?
 
 
-def check_missing(evidence: Evidence) -> Iterator[Finding]:
+def check_missing(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a warning with the values that a device still lacks, unless the set names one that completes it."""
     parameter_set = evidence.parameter_set
     if parameter_set.completed_by:
@@ -73,7 +73,7 @@ def check_missing(evidence: Evidence) -> Iterator[Finding]:
     if missing:
         paths = tuple(dict.fromkeys(missing))
         are, them = ("is", "it") if len(paths) == 1 else ("are", "them")
-        yield Finding(
+        yield AuditFinding(
             id="missing-values",
             severity="warning",
             title=f"no device yet: {count_of(len(paths), 'value')} {are} missing",
@@ -89,7 +89,7 @@ def check_missing(evidence: Evidence) -> Iterator[Finding]:
 # Does every value have the dimension that its equation needs?
 
 
-def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
+def check_dimensions(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield one finding for values of a foreign dimension, and one for each whose unit belongs to its inverse."""
     foreign = []
     for path, entry in evidence.parameter_set.numbers.items():
@@ -108,12 +108,15 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
             foreign.append(path)
             continue
         name = path.rpartition(".")[2].replace("_", "-")
-        yield Finding(
+        yield AuditFinding(
             id=f"{name}-upside-down",
             severity="error",
             title=f"{path} is upside down: its unit belongs to the inverse",
             values=evidence.values_of(path),
-            sides=(Side("as reported", value, inverse_unit), Side("taken literally", 1.0 / value, quantity.unit)),
+            sides=(
+                ComparedNumber("as reported", value, inverse_unit),
+                ComparedNumber("taken literally", 1.0 / value, quantity.unit),
+            ),
             paragraph=(
                 f"{path} = {number_text(entry)} is meant as: {quantity.summary}. That has the unit "
                 f"{quantity.unit}; the reported "
@@ -128,12 +131,12 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
             f"({declared[path].summary})"
             for path in foreign
         )
-        yield Finding(
+        yield AuditFinding(
             id="dimensions",
             severity="error",
             title="values whose unit does not fit their equation",
             values=evidence.values_of(*foreign),
-            sides=tuple(Side(path, evidence.number(path) or 0.0, "as given, base units") for path in foreign),
+            sides=tuple(ComparedNumber(path, evidence.number(path) or 0.0, "as given, base units") for path in foreign),
             paragraph=(
                 f"{described}. Give the same number in the unit that is needed, if only the unit was "
                 f"misreported; the other checks use the number as it stands."
@@ -144,22 +147,22 @@ def check_dimensions(evidence: Evidence) -> Iterator[Finding]:
 # Is every value within the limits of its declaration, which any device keeps?
 
 
-def check_ranges(evidence: Evidence) -> Iterator[Finding]:
+def check_ranges(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each value that no device can have."""
     for path, entry in evidence.parameter_set.numbers.items():
         quantity, value = evidence.declared[path], number_in_si(evidence.parameter_set, path)
         if value is None or is_within(value, quantity):
             continue
-        yield Finding(
+        yield AuditFinding(
             id=f"range-of-{path.replace('.', '-').replace('_', '-')}",
             severity="error",
             title=f"{path} is out of range",
             values=evidence.values_of(path),
             sides=(
-                Side("in the set", value, quantity.unit),
+                ComparedNumber("in the set", value, quantity.unit),
                 *(
-                    Side("lower limit", quantity.minimum, quantity.unit),
-                    Side("upper limit", quantity.maximum, quantity.unit),
+                    ComparedNumber("lower limit", quantity.minimum, quantity.unit),
+                    ComparedNumber("upper limit", quantity.maximum, quantity.unit),
                 ),
             ),
             paragraph=(
@@ -175,14 +178,14 @@ def check_ranges(evidence: Evidence) -> Iterator[Finding]:
 _TOLERANCE = 0.02
 
 
-def check_gas_data(evidence: Evidence) -> Iterator[Finding]:
+def check_gas_data(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield an error for each gas constant that is more than 2 % off the named gas."""
     name = evidence.text("gas.species")
     if name is None:
         return
     species = SPECIES.get(name)
     if species is None:
-        yield Finding(
+        yield AuditFinding(
             id="gas-species",
             severity="error",
             title=f"no data for the gas '{name}'",
@@ -196,12 +199,12 @@ def check_gas_data(evidence: Evidence) -> Iterator[Finding]:
         value = evidence.number(path)
         if value is not None and abs(value / expected - 1.0) > _TOLERANCE:
             unit = evidence.declared[path].unit
-            yield Finding(
+            yield AuditFinding(
                 id=path.replace(".", "-").replace("_", "-"),
                 severity="error",
                 title=f"{path} does not belong to the named gas",
                 values=evidence.values_of("gas.species", path),
-                sides=(Side("in the set", value, unit), Side("of the gas", expected, unit)),
+                sides=(ComparedNumber("in the set", value, unit), ComparedNumber("of the gas", expected, unit)),
                 paragraph=(
                     f"{path} is {evidence.in_set_unit(path, value)}, but {evidence.text('gas.species')} has "
                     f"{evidence.in_set_unit(path, expected)} ({species.source}). "
@@ -219,7 +222,7 @@ _WORTH_A_WARNING = 0.05
 _SUPPLY = "supply.pressure"
 
 
-def check_ideal_gas(evidence: Evidence) -> Iterator[Finding]:
+def check_ideal_gas(evidence: Evidence) -> Iterator[AuditFinding]:
     """Yield a note on the error of the ideal gas law at supply pressure, a warning where it exceeds 5 %."""
     gas, pressure = evidence.gas(), evidence.number(_SUPPLY)
     virial = SECOND_VIRIAL.get(evidence.text("gas.species") or "")
@@ -232,12 +235,15 @@ def check_ideal_gas(evidence: Evidence) -> Iterator[Finding]:
         return
     error = 1.0 - 1.0 / compressibility
     counts = "under-counts" if error < 0.0 else "over-counts"
-    yield Finding(
+    yield AuditFinding(
         id="ideal-gas",
         severity="warning" if abs(error) > _WORTH_A_WARNING else "note",
         title=f"the ideal gas law {counts} {gas.species} by {100.0 * abs(error):.2g} % at supply pressure",
         values=evidence.values_of("gas.species", "gas.temperature", _SUPPLY),
-        sides=(Side("real-gas factor, ideal", 1.0, ""), Side("real-gas factor, real", compressibility, "")),
+        sides=(
+            ComparedNumber("real-gas factor, ideal", 1.0, ""),
+            ComparedNumber("real-gas factor, real", compressibility, ""),
+        ),
         paragraph=(
             f"With the second virial coefficient {1e6 * virial:.3g} cm^3/mol the real-gas factor at "
             f"{evidence.in_set_unit(_SUPPLY, pressure)} is {compressibility:.4f}: the ideal gas law "

@@ -39,7 +39,8 @@ from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.overrides import Forms, other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import Entry, TextEntry
 from ppafo.parameters.parts import Part, load_catalogue
-from ppafo.units import format_quantity, from_si, split_quantity, to_si
+from ppafo.units import format_quantity, split_quantity, to_si
+from ppafo.units.shown import shown_text
 
 _FOLDER = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"
@@ -333,7 +334,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
         with refused_as(ParameterError, written, UnitError):
             values[path] = to_si(entry.value, entry.unit, PATHS[path].unit)
         if not (math.isfinite(values[path]) and is_within(values[path], PATHS[path])):
-            raise ParameterError(f"{written}: {range_rule(PATHS[path], limits_text(PATHS[path]))}")
+            raise ParameterError(f"{written}: {range_rule(PATHS[path], limits_text(PATHS[path], entry.unit))}")
     with refused_as(ParameterError, f"{file}: gas = '{parsed.gas.value}'", ParameterError):
         fluid = load_fluid(parsed.gas.value)
     bottle = Bottle(
@@ -342,7 +343,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
         fluid=fluid,
         heat_capacity_ratio=SPECIES[fluid.name].heat_capacity_ratio,
         volume=values["bottle.volume"],
-        mass=_mass_of_fill(values, fluid, file),
+        mass=_mass_of_fill(values, entries, fluid, file),
         wall=BottleWall(**{name: values[f"bottle.{name}"] for name in BottleWall._fields}),
         regulator=Regulator(
             set_pressure=values["regulator.set_pressure"],
@@ -360,7 +361,7 @@ def _build(parsed: Any, entries: Mapping[str, Entry], file: str) -> Bottle:
     return bottle
 
 
-def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float:
+def _mass_of_fill(values: Mapping[str, float], entries: Mapping[str, Entry], fluid: Fluid, file: str) -> float:
     """Return the mass of gas [kg] in a full bottle, given as such or by pressure and temperature."""
     by_pressure = [f"bottle.{quantity.name}" for quantity in FILL_BY_PRESSURE]
     stated = [path for path in by_pressure if path in values]
@@ -377,7 +378,8 @@ def _mass_of_fill(values: Mapping[str, float], fluid: Fluid, file: str) -> float
     # Above the saturated vapour the rest is liquid: pressure and temperature then leave the mass open.
     if fluid_pressure(fluid.table, temperature, math.inf) < pressure:
         most = fluid_pressure(fluid.table, temperature, math.inf)
-        where, end = f"{file}: bottle.fill_pressure", f"{_pressure_text(most)} at {temperature:g} K"
+        where, unit = f"{file}: bottle.fill_pressure", entries["bottle.fill_pressure"].unit
+        end = f"{shown_text(most, 'Pa_a', '.4g', unit=unit)} at {temperature:g} K"
         raise ParameterError(
             f"{where}: {fluid.name} is gas up to {end}; give bottle.gas_mass instead"
             if has_liquid(fluid.table)
@@ -413,12 +415,12 @@ def _check_content(bottle: Bottle, file: str) -> None:
         )
     content = bottle_content(fluid.table, bottle.mass, bottle.volume, temperature)
     if pressure_reserve(bottle.regulator, content.pressure, 0.0) <= 0.0:
-        needed = bottle.regulator.set_pressure + bottle.regulator.pressure_margin
-        raise ParameterError(
-            f"{file}: the full bottle has {_pressure_text(content.pressure)} at {temperature:g} K, but its regulator "
-            f"needs {_pressure_text(needed)}: regulator.set_pressure and regulator.pressure_margin"
+        needed, unit = (
+            bottle.regulator.set_pressure + bottle.regulator.pressure_margin,
+            bottle.entries["regulator.set_pressure"].unit,
         )
-
-
-def _pressure_text(pressure: float) -> str:
-    return f"{from_si(pressure, 'bar_a', 'Pa_a'):.4g} bar_a"
+        has, needs = (shown_text(each, "Pa_a", ".4g", unit=unit) for each in (content.pressure, needed))
+        raise ParameterError(
+            f"{file}: the full bottle has {has} at {temperature:g} K, but its regulator "
+            f"needs {needs}: regulator.set_pressure and regulator.pressure_margin"
+        )

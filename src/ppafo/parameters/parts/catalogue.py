@@ -291,7 +291,7 @@ def _part(file: str, group: str, name: str, parsed: Any) -> Part:
             # Data sheets give gauge pressures at sea level.
             values[key] = to_si(figure.value, figure.unit, declared[key].unit, STANDARD_ATMOSPHERE)
         if not is_within(values[key], declared[key]):
-            raise ParameterError(f"{shown}: must be {limits_text(declared[key])}")
+            raise ParameterError(f"{shown}: must be {limits_text(declared[key], figure.unit)}")
     if "torque_constant" in values:
         values.setdefault("displacement_per_radian", values["torque_constant"])
     return Part(

@@ -6,9 +6,9 @@ from typing import Any
 
 from ppafo.control.kind import ControllerKind
 from ppafo.model.declaration import Quantity
-from ppafo.processor.fixed_point import Readings
+from ppafo.processor.fixed_point import ConverterCounts
 
-Sample = Callable[[Any, Any, Readings], tuple[int, Any]]
+Sample = Callable[[Any, Any, ConverterCounts], tuple[int, Any]]
 """Command in steps, from -1000 to 1000, and next state, of numbers, state and readings: a pure function of integers."""
 
 

@@ -16,9 +16,9 @@ from ppafo.processor.fixed_point import (
     LARGEST_READING,
     OF_LIMITS,
     OF_STEPS,
-    Limits,
-    Readings,
-    Steps,
+    ConverterCounts,
+    ConverterLimits,
+    CountResolution,
     converter_with,
     error_of,
     read,
@@ -31,7 +31,7 @@ from ppafo.processor.torque_laws.law import FixedLaw
 class OnOffNumbers(NamedTuple):
     """Limits of the readings."""
 
-    limits: Limits
+    limits: ConverterLimits
 
 
 class OnOffCounts(NamedTuple):
@@ -43,11 +43,11 @@ class OnOffCounts(NamedTuple):
 class OnOffRows(NamedTuple):
     """Steps of the converter, and what ``on_off_sample`` is given."""
 
-    steps: Steps
+    steps: CountResolution
     numbers: OnOffNumbers
 
 
-def on_off_sample(numbers: OnOffNumbers, state: OnOffCounts, readings: Readings) -> tuple[int, OnOffCounts]:
+def on_off_sample(numbers: OnOffNumbers, state: OnOffCounts, readings: ConverterCounts) -> tuple[int, OnOffCounts]:
     """Command in steps: 1000 where the error is 0 or more, else -1000; 0, for good, after a reading at an end."""
     sound = still_sound(state.sound, readings, numbers.limits)
     command = COMMAND_STEPS if error_of(readings, numbers.limits) >= 0 else -COMMAND_STEPS
@@ -83,7 +83,7 @@ ON_OFF = FixedLaw(
 class DeadZoneNumbers(NamedTuple):
     """Limits of the readings; errors at which the valve opens and closes again [counts]; opening [steps]."""
 
-    limits: Limits
+    limits: ConverterLimits
     dead_zone: int
     release: int
     opening: int
@@ -99,11 +99,13 @@ class DeadZoneCounts(NamedTuple):
 class DeadZoneRows(NamedTuple):
     """Steps of the converter, and what ``dead_zone_sample`` is given."""
 
-    steps: Steps
+    steps: CountResolution
     numbers: DeadZoneNumbers
 
 
-def dead_zone_sample(numbers: DeadZoneNumbers, state: DeadZoneCounts, readings: Readings) -> tuple[int, DeadZoneCounts]:
+def dead_zone_sample(
+    numbers: DeadZoneNumbers, state: DeadZoneCounts, readings: ConverterCounts
+) -> tuple[int, DeadZoneCounts]:
     """Command in steps: the opening, towards the reference, beyond the dead zone; 0, for good, after a bad reading."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)

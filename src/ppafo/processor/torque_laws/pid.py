@@ -20,9 +20,9 @@ from ppafo.processor.fixed_point import (
     MOST_PLACES,
     OF_LIMITS,
     OF_STEPS,
-    Limits,
-    Readings,
-    Steps,
+    ConverterCounts,
+    ConverterLimits,
+    CountResolution,
     converter_with,
     error_of,
     fraction_of,
@@ -61,7 +61,7 @@ SHARE = float(2**FRACTION_BITS)
 class PidNumbers(NamedTuple):
     """Limits of the readings, gains as fractions of 15 bits and places, shares of filter and anti-windup in 1/2^15."""
 
-    limits: Limits
+    limits: ConverterLimits
     proportional: int
     proportional_places: int
     integral: int
@@ -85,11 +85,11 @@ class PidCounts(NamedTuple):
 class PidRows(NamedTuple):
     """Steps of the converter, and what ``pid_sample`` is given."""
 
-    steps: Steps
+    steps: CountResolution
     numbers: PidNumbers
 
 
-def pid_sample(numbers: PidNumbers, state: PidCounts, readings: Readings) -> tuple[int, PidCounts]:
+def pid_sample(numbers: PidNumbers, state: PidCounts, readings: ConverterCounts) -> tuple[int, PidCounts]:
     """Command in steps from -1000 to 1000 at a sample; 0, for good, once a reading was at an end of its range."""
     sound = still_sound(state.sound, readings, numbers.limits)
     error = error_of(readings, numbers.limits)

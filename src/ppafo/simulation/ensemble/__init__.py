@@ -15,7 +15,7 @@ from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
-from ppafo.simulation.ensemble.running import Outcome, Request, intervals, offered
+from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest, intervals, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY
 
@@ -87,14 +87,14 @@ def run_ensemble(
     if bands and plan.batches:
         longest = max(float((intervals(batch) * (batch.clock.samples - 1)).max()) for _, batch in plan.batches)
         times = np.arange(int(longest / interval * (1.0 + _ROUNDING)) + 1, dtype=np.float64) * interval
-    request = Request(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
-    outcome = Outcome(checked.runs, request)
+    request = OutputRequest(metrics, tuple(dict.fromkeys(bands)), interval, times, base.controller.custom)
+    outcome = MeteredRuns(checked.runs, request)
     outcome.run_all(plan.batches, threads)
     estimated = {}
     if errors:
         # For the metrics alone: nobody asks for the error of a trace.
-        alone = Request(metrics, (), interval, np.empty(0), base.controller.custom)
-        fine = Outcome(checked.runs, alone)
+        alone = OutputRequest(metrics, (), interval, np.empty(0), base.controller.custom)
+        fine = MeteredRuns(checked.runs, alone)
         fine.run_all(plan_ensemble(checked, finer).batches, threads)
         for name, values in outcome.metrics.items():
             # Where the finer run has no value this one may be wrong by anything; without a value it has no error.
@@ -103,7 +103,7 @@ def run_ensemble(
     return _result(plan, outcome, estimated)
 
 
-def _result(plan: EnsemblePlan, outcome: Outcome, errors: dict[str, Floats]) -> EnsembleResult:
+def _result(plan: EnsemblePlan, outcome: MeteredRuns, errors: dict[str, Floats]) -> EnsembleResult:
     status = np.where(outcome.is_completed, COMPLETED, DIVERGED).astype(np.int8)
     # Runs that were refused are in no batch, so that until here they count as diverged.
     status[list(plan.reasons)] = REFUSED

@@ -30,7 +30,7 @@ _TEXTS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class ScenarioColumns:
     """A scenario and what varies in it, followers included: values (runs,) in SI by path, with their declarations.
 
     ``given`` are the paths that are no followers.
@@ -47,7 +47,7 @@ class Columns:
         return next(iter(self.values.values())).size
 
 
-def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> Columns:
+def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[str] = ()) -> ScenarioColumns:
     """Return the columns with the chosen valve as ``valve``; ScenarioError for what no single run is to blame for.
 
     Those of the paths in ``gauge`` count from the atmosphere of their run.
@@ -85,7 +85,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     if heat_varies and WALL_AREA not in values and gas is not None and gas.wall_area_per_volume == 0.0:
         raise ScenarioError(f"{base.name}: its heat transfer varies, and '{WALL_AREA}' is 0: give the area")
     every = moving_together(base, absolute(base, values, gauge))
-    return Columns(base, every, {path: declared[path] for path in every}, frozenset(values))
+    return ScenarioColumns(base, every, {path: declared[path] for path in every}, frozenset(values))
 
 
 def absolute(base: Scenario, columns: Mapping[str, Floats], gauge: Collection[str]) -> dict[str, Floats]:

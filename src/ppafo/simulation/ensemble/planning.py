@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.engine.lanes import Batch
 from ppafo.engine.run import Members, Run, batches_of
 from ppafo.model.catalog import ACTUATORS
@@ -18,13 +17,12 @@ from ppafo.parameters.building import actuator_problem, beyond_pressures, consis
 from ppafo.parameters.declaration import limits_text
 from ppafo.parameters.plant import switches_of
 from ppafo.simulation.clock import TIMES
-from ppafo.simulation.declaration import limits, quantity_text
-from ppafo.simulation.ensemble.columns import Columns
-from ppafo.simulation.motion_kind import Clock, MotionKind
+from ppafo.simulation.ensemble.columns import ScenarioColumns
+from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.numbers import declared_numbers, with_numbers
-from ppafo.simulation.overrides import is_of_device
 from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
+from ppafo.units.shown import shown_text
 
 # Numbers that name one of many: there is nothing between two of them.
 _WHOLE = ("sensors.seed", "wearer.person")
@@ -40,10 +38,10 @@ class Screen:
     Without a ``clock`` it is the scenario's.
     """
 
-    columns: Columns
+    columns: ScenarioColumns
     members: Members
     reasons: dict[int, str]
-    clock: Clock | None = None
+    clock: RunTimes | None = None
 
     @property
     def scenario(self) -> Scenario:
@@ -65,7 +63,7 @@ class Screen:
         if clock is not None:
             times = clock.duration, clock.step, clock.output_interval, clock.period
             kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
-            clock = Clock(*kept)
+            clock = RunTimes(*kept)
         values = {path: column[places] for path, column in self.columns.values.items()}
         return Screen(replace(self.columns, values=values), self.members[places], self.reasons, clock)
 
@@ -80,7 +78,7 @@ class Screen:
         self.members, self.columns, self.clock = left.members, left.columns, left.clock
 
 
-def screen_columns(columns: Columns) -> Screen:
+def screen_columns(columns: ScenarioColumns) -> Screen:
     """The runs whose values are in range and fit together."""
     screen = Screen(columns, np.arange(columns.runs), {})
     for path in columns.values:
@@ -102,7 +100,7 @@ def screen_columns(columns: Columns) -> Screen:
     return screen
 
 
-def _out_of_range(columns: Columns, path: str) -> Problem:
+def _out_of_range(columns: ScenarioColumns, path: str) -> Problem:
     values, quantity = columns.values[path], columns.declared[path]
     unit = quantity.unit
 
@@ -112,9 +110,7 @@ def _out_of_range(columns: Columns, path: str) -> Problem:
             return f"{said}: is not a finite number"
         if path in _WHOLE and values[run] != np.floor(values[run]):
             return f"{said}: must be a whole number"
-        # In the words of the file that has the number: a parameter set's, or the scenario's.
-        allowed = limits_text(quantity) if is_of_device(path) else limits(quantity, STANDARD_ATMOSPHERE)
-        return f"{said}: {range_rule(quantity, allowed)}"
+        return f"{said}: {range_rule(quantity, limits_text(quantity, unit))}"
 
     above = values >= quantity.minimum if quantity.minimum_allowed else values > quantity.minimum
     is_good = np.isfinite(values) & above & (values <= quantity.maximum)
@@ -129,7 +125,7 @@ class EnsemblePlan:
     reasons: dict[int, str]
 
 
-def plan_ensemble(columns: Columns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
+def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None = None) -> EnsemblePlan:
     """Batches of all runs that can be; each has the rows, bit for bit, that ``plan_run`` gives it alone and changed."""
     screen = screen_columns(columns)
     batches: list[tuple[Members, Batch]] = []
@@ -229,7 +225,7 @@ def _second_regulator_above_the_first(scenario: Scenario) -> tuple[Problem, ...]
 
     def line(run: int) -> str:
         first, second = (
-            quantity_text(at(pressure, run), "Pa_a", at(supply.atmospheric_pressure, run))
+            shown_text(at(pressure, run), "Pa_a", atmosphere=at(supply.atmospheric_pressure, run))
             for pressure in (supply.pressure, supply.dorsiflexion_pressure)
         )
         return f"supply.dorsiflexion_pressure = {second}: with [supply_line] at most supply.pressure, {first}"

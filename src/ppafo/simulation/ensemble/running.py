@@ -23,7 +23,7 @@ _SAME = 1.0e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Request:
+class OutputRequest:
     """Outputs requested of every run: metrics by name, channels to trace, and the times at which to keep them [s].
 
     ``custom`` is the Python object that controls every run, one after the other; None where the lanes do.
@@ -37,10 +37,10 @@ class Request:
 
 
 @final
-class Outcome:
+class MeteredRuns:
     """Results of all runs so far: arrays that batches write their columns into, nan where nothing was written."""
 
-    def __init__(self, runs: int, request: Request) -> None:
+    def __init__(self, runs: int, request: OutputRequest) -> None:
         self.request = request
         self.failure_time = np.full(runs, np.nan)
         self.is_completed = np.zeros(runs, dtype=bool)
@@ -146,7 +146,7 @@ def offered(scenario: Scenario) -> dict[str, MetricKind]:
     }
 
 
-def _meter_batch(plain: Batch, members: Members, request: Request) -> _MeteredBatch:
+def _meter_batch(plain: Batch, members: Members, request: OutputRequest) -> _MeteredBatch:
     program = plain.program
     available = {name: kind for name, kind in request.metrics.items() if has_channels(program, kind)}
     # In one order, so that the same metrics are one program in whatever order they are requested.

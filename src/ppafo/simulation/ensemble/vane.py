@@ -12,11 +12,12 @@ from ppafo.model.columns import Problem, at
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.meter import LED_SHANK, WALK
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, clock_with, time_texts
-from ppafo.simulation.declaration import LOCKED_ANGLE, quantity_text
-from ppafo.simulation.motion_kind import Clock
+from ppafo.simulation.declaration import LOCKED_ANGLE
+from ppafo.simulation.motion_kind import RunTimes
 from ppafo.simulation.numbers import path_of_locked_angle
 from ppafo.simulation.profiles import Limits, limits_of, profile_bounds, profile_problem, stops_of
 from ppafo.simulation.scenario import ProfileChoice, Scenario, vane_motion
+from ppafo.units.shown import shown_text
 
 
 def rules(scenario: Scenario) -> tuple[Problem, ...]:
@@ -24,7 +25,7 @@ def rules(scenario: Scenario) -> tuple[Problem, ...]:
     delay, step = scenario.sensors.delay, scenario.run.step
 
     def long_line(run: int) -> str:
-        longest = quantity_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
+        longest = shown_text(MAXIMUM_STEPS_OF_DELAY * at(step, run), "s")
         return f"sensors.delay = {at(delay, run):.9g} s: must be at most {longest}, {MAXIMUM_STEPS_OF_DELAY:.0e} steps"
 
     return (
@@ -47,9 +48,9 @@ def _beyond_the_stops(scenario: Scenario) -> Problem:
     level = profile.level
 
     def angle_line(run: int) -> str:
-        low, high = (quantity_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
+        low, high = (shown_text(at(stop, run), "rad") for stop in (actuator.angle_min, actuator.angle_max))
         path = path_of_locked_angle(scenario) or LOCKED_ANGLE
-        said = f"{path} = {quantity_text(at(level, run), 'rad')}"
+        said = f"{path} = {shown_text(at(level, run), 'rad')}"
         return f"{said}: must be between the stops of {scenario.device.name}, {low} to {high}"
 
     return _is_beyond(stops_of(scenario.device), profile), angle_line
@@ -83,7 +84,7 @@ def _profile_beyond(scenario: Scenario, limits: Limits, profile: ProfileChoice, 
     return outside, lambda run: problems[run]
 
 
-def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Problem, ...]]:
+def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[RunTimes, tuple[Problem, ...]]:
     """Return the clock with columns of times [s] by path, and what does not fit together.
 
     Times are read as those of a file are, once for each combination of them.
@@ -101,7 +102,7 @@ def clock(base: Scenario, times: Mapping[str, Any]) -> tuple[Clock, tuple[Proble
         else:
             table[number] = read.duration, read.step, read.output_interval, read.period
     refused = np.array([bool(reason) for reason in reasons])[places]
-    return Clock(*table[places].T.copy()), ((refused, lambda run: reasons[places[run]]),)
+    return RunTimes(*table[places].T.copy()), ((refused, lambda run: reasons[places[run]]),)
 
 
 def lacks(scenario: Scenario, kind: MetricKind) -> str:

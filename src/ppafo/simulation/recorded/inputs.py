@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ppafo.engine.replay import RECORDED_ANGLE, Segment, StepInputs
+from ppafo.engine.replay import RECORDED_ANGLE, AngleSegment, StepInputs
 from ppafo.engine.run import Run
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
@@ -98,7 +98,7 @@ def _angle_path_at_steps(inputs: RecordedInputs, device: Device, run: Run) -> di
 def with_prescribed_angle(run: Run, angle: float) -> Run:
     """Return the run with the vane on a recorded angle, which is ``angle`` [rad] at the start."""
     program = replace(run.program, angle=RECORDED_ANGLE)
-    return replace(run, program=program, path=Segment(0.0, angle, 0.0), needs_parts=True)
+    return replace(run, program=program, path=AngleSegment(0.0, angle, 0.0), needs_parts=True)
 
 
 def between_stops(angles: Floats, device: Device, file: str) -> Floats:

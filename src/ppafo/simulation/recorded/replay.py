@@ -6,7 +6,7 @@ from ppafo.parameters.device import VANE, Device, Orifice
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.channels import ANGLE
 from ppafo.simulation.recorded.clock import LONGEST_STEP, sample_period
-from ppafo.simulation.recorded.rest import Start
+from ppafo.simulation.recorded.rest import ReplayStart
 from ppafo.simulation.scenario import (
     PYTHON_CONTROLLER,
     Control,
@@ -24,7 +24,7 @@ from ppafo.simulation.scenario import (
 def replay_scenario(
     recording: Recording,
     device: Device,
-    start: Start,
+    start: ReplayStart,
     duration: float,
     file: str,
     motion: FreeMotion | PrescribedMotion | None = None,

@@ -28,7 +28,7 @@ _LEAST_RANK = 1.0e-6
 
 
 @dataclass(frozen=True, slots=True)
-class Start:
+class ReplayStart:
     """Angle [rad], angular velocity [rad/s] and pressures [Pa absolute] at the first sample."""
 
     angle: float
@@ -48,7 +48,7 @@ def samples_at_rest(recording: Recording) -> int:
 
 def start_of(
     recording: Recording, device: Device, known: Mapping[str, float], file: str, remedies: Mapping[str, str]
-) -> Start:
+) -> ReplayStart:
     """Return where the replay of a recording starts: ``known`` values [SI] go before what its samples at rest show.
 
     DataError, which begins with ``file``, for a channel that is not there, with the remedy for it.
@@ -60,7 +60,7 @@ def start_of(
         elif name in remedies and name not in values:
             raise DataError(f"{file}: there is no channel '{name}' to start from; {remedies[name]}")
     angle = float(between_stops(np.array([values[ANGLE]]), device, file)[0])
-    return Start(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
+    return ReplayStart(angle, values.get("angular_velocity", 0.0), values["pressure_1"], values["pressure_2"])
 
 
 def value_at_rest(time: Floats, values: Floats, at_end: bool = False) -> float:

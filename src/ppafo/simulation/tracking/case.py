@@ -41,7 +41,7 @@ class Case(NamedTuple):
         return float(np.mean((command >= _FULLY_OPEN) & (command <= 1.0 + SHUT)))
 
 
-class Cause(NamedTuple):
+class TrackingCause(NamedTuple):
     """Cause in words with numbers, remedies to try, advice where none helps, and whether it is a lack of torque."""
 
     text: str

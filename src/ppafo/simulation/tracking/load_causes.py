@@ -9,7 +9,7 @@ from ppafo.parameters.graph import PRESSURE_PATH
 from ppafo.parameters.reach import static_torque, supply_for, supply_that_moves, torque_reach
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.scenario import FreeMotion, Scenario
-from ppafo.simulation.tracking.case import Case, Cause
+from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.remedies import change_text, level_text, remedy, stiffer_laws, torque_asked
 
 _ON_STOP = 1.0e-3
@@ -24,7 +24,7 @@ _FLUNG = 0.5
 """Way from the reference over the wanted change by which a joint is flung at the start [-]."""
 
 
-def torque_beyond_reach(case: Case) -> Cause | None:
+def torque_beyond_reach(case: Case) -> TrackingCause | None:
     """A torque is wanted that the supplies of the device do not give at that angle."""
     scenario, samples = case.scenario, case.settled.samples
     if scenario.controlled != TORQUE:
@@ -46,10 +46,10 @@ def torque_beyond_reach(case: Case) -> Cause | None:
         remedies.append(remedy(scenario, {supply: needed}))
     if "level" in scenario.reference.settings and not scenario.reference.kind.startswith("sine"):
         remedies.append(remedy(scenario, {"reference.level": 0.95 * reach}))
-    return Cause(text, tuple(remedies), is_beyond_reach=True)
+    return TrackingCause(text, tuple(remedies), is_beyond_reach=True)
 
 
-def load_beyond_reach(case: Case) -> Cause | None:
+def load_beyond_reach(case: Case) -> TrackingCause | None:
     """Load on a free joint beyond the torque of the actuator at the wanted angle."""
     scenario, motion, device = case.scenario, case.scenario.motion, case.scenario.device
     if scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
@@ -86,7 +86,7 @@ def load_beyond_reach(case: Case) -> Cause | None:
         for numbers in changes:
             held = abs(numbers.get("motion.external_torque", outside)) + float(device.friction.static_torque)
             remedies += stiffer_laws(scenario, held, case.settled, numbers)
-    return Cause(text, tuple(remedies), advice)
+    return TrackingCause(text, tuple(remedies), advice)
 
 
 def stop_of(scenario: Scenario, angle: Floats) -> str:
@@ -95,7 +95,7 @@ def stop_of(scenario: Scenario, angle: Floats) -> str:
     return next((word for word, stop in ends if np.mean(np.abs(angle - stop) <= _ON_STOP) > _MOSTLY), "")
 
 
-def flung_at_start(case: Case) -> Cause | None:
+def flung_at_start(case: Case) -> TrackingCause | None:
     """The pressures at the start do not carry the load, which flings the joint away before the loop holds it."""
     scenario, motion, device, initial = case.scenario, case.scenario.motion, case.scenario.device, case.scenario.initial
     if case.oscillates or scenario.controlled != ANGLE or not isinstance(motion, FreeMotion) or motion.leg is not None:
@@ -121,4 +121,4 @@ def flung_at_start(case: Case) -> Cause | None:
         is_first = supply_that_moves(device, load > own(start, room, room)) == PRESSURE_PATH
         pressures["initial.pressure_1" if is_first else "initial.pressure_2"] = needed
     remedies = [] if needed is None else [remedy(scenario, pressures)]
-    return Cause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")
+    return TrackingCause(text, tuple(remedies), "begin with pressures in [initial] that carry the load")

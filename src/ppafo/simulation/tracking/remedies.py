@@ -100,6 +100,16 @@ def gain_of_device(scenario: Scenario, law: ControllerKind | None) -> Remedy | N
     return None
 
 
+def integral_of_device(scenario: Scenario, law: ControllerKind | None) -> list[Remedy]:
+    """Remedy that gives an integral gain of 0 the device's value; none for a law without one, or with another value."""
+    if law is None:
+        return []
+    terms, settings = terms_of(scenario, law), scenario.controller.settings
+    names = [item.name for item in settings_of(scenario, law) if torque_loop.INTEGRAL_GAIN in item.follows]
+    right = float(terms[torque_loop.INTEGRAL_GAIN].number(lambda path: number_at(scenario, path))) if names else 0.0
+    return [remedy(scenario, {f"controller.{name}": right}) for name in names if settings.get(name) == 0.0 < right]
+
+
 def slower_loops(scenario: Scenario, law: ControllerKind, factors: Iterable[float]) -> tuple[Remedy, ...]:
     """Remedies that make the innermost loop slower by each of some factors; none for a law without such a setting."""
     first = speed_settings(scenario, law)

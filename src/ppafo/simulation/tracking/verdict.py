@@ -31,7 +31,7 @@ from ppafo.simulation.tracking.walk_causes import cause_of_walk
 from ppafo.units.shown import in_units, units_in_force
 
 if TYPE_CHECKING:
-    from ppafo.simulation.at_hand import Recorded
+    from ppafo.simulation.at_hand import RecordedResult
 
 _FEWEST_SAMPLES = 8
 """Samples of a recording below which nothing is judged."""
@@ -115,7 +115,7 @@ class Tracking:
         return f"; {self.advice}" if self.advice else ""
 
 
-def tracking_in(result: "Recorded") -> Tracking | None:
+def tracking_in(result: "RecordedResult") -> Tracking | None:
     """Verdict on a result; None where it follows its reference, or has none."""
     scenario, metrics = result.scenario, {name: metric.value for name, metric in result.metrics.items()}
     strides, time = metrics.get("strides", 0.0), result.recording.time

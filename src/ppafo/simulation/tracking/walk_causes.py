@@ -7,7 +7,7 @@ import numpy as np
 from ppafo.metrics.metric import followed
 from ppafo.parameters.reach import static_torque, supply_for, torque_reach
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.tracking.case import Case, Cause
+from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation
 from ppafo.simulation.tracking.remedies import level_text, remedy, sized_valves
 
@@ -17,12 +17,12 @@ _ANGLES_OF_WALK = 400
 """Samples of a walk at which the reach is compared with the request."""
 
 
-def cause_of_walk(case: Case) -> Cause:
+def cause_of_walk(case: Case) -> TrackingCause:
     """First cause that applies to a walk."""
     return next(cause for find in _OF_WALK if (cause := find(case)) is not None)
 
 
-def _request_beyond_reach(case: Case) -> Cause | None:
+def _request_beyond_reach(case: Case) -> TrackingCause | None:
     """The controller of a walk often requests more torque than the actuator gives at the angle of that moment."""
     scenario, samples = case.scenario, case.settled.samples
     device, torque = scenario.device, static_torque(scenario.device)
@@ -51,10 +51,10 @@ def _request_beyond_reach(case: Case) -> Cause | None:
         least = float(np.quantile(np.where(reference[places] > 0.0, reaches[:, 1], -reaches[:, 0]), _OFTEN))
         if least > 0.0:
             remedies.append(remedy(scenario, {"controller.largest_torque": least}))
-    return Cause(text, tuple(remedies), "take a higher `supply.pressure` or ask for less", is_beyond_reach=True)
+    return TrackingCause(text, tuple(remedies), "take a higher `supply.pressure` or ask for less", is_beyond_reach=True)
 
 
-def _valve_of_walk(case: Case) -> Cause | None:
+def _valve_of_walk(case: Case) -> TrackingCause | None:
     """The valve of a walk is fully open often: too small for the speed of the joint."""
     if case.oscillates or case.only_switches or case.fully_open <= _OFTEN:
         return None
@@ -62,10 +62,10 @@ def _valve_of_walk(case: Case) -> Cause | None:
         f"its valve is fully open for {100.0 * case.fully_open:.0f} % of the time: it is too small for how quickly the "
         "gait turns the joint"
     )
-    return Cause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "take a larger valve")
+    return TrackingCause(text, sized_valves(case.scenario, (2.0, 4.0, 8.0)), "take a larger valve")
 
 
-def _speed_of_gait(case: Case) -> Cause:
+def _speed_of_gait(case: Case) -> TrackingCause:
     """The gait turns the joint faster than the loop of a walk follows."""
     scenario = case.scenario
     volumes = {path: number_at(scenario, path) for path in ("actuator.dead_volume_1", "actuator.dead_volume_2")}
@@ -75,18 +75,18 @@ def _speed_of_gait(case: Case) -> Cause:
         for factor in (2.0, 4.0)
         if min(volumes.values()) > 0.0
     ]
-    return Cause(
+    return TrackingCause(
         "the gait turns the joint more quickly than its loop follows",
         tuple(remedies),
         "take larger dead volumes or a quicker valve",
     )
 
 
-def _oscillation_of_walk(case: Case) -> Cause | None:
+def _oscillation_of_walk(case: Case) -> TrackingCause | None:
     return oscillation(case) if case.oscillates else None
 
 
-_OF_WALK: tuple[Callable[[Case], Cause | None], ...] = (
+_OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _request_beyond_reach,
     _oscillation_of_walk,
     _valve_of_walk,

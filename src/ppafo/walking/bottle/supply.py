@@ -13,9 +13,10 @@ from ppafo.model.source import content_energy, densest_gas, has_liquid, liquid_d
 from ppafo.parameters.bottles.bottle import PATHS, Bottle, is_of_catalogue, load_bottle
 from ppafo.parameters.device import Device
 from ppafo.parameters.parameter_set import Entry
-from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, Reading, kind_at, quantity_text, value_at
+from ppafo.simulation.declaration import SUPPLY_LINE, THERMAL, DocumentReader, kind_at, value_at
 from ppafo.simulation.scenario import SupplyLine
 from ppafo.units import format_quantity, to_si
+from ppafo.units.shown import shown_text
 
 BOTTLE = "bottle"
 BOTTLE_NAME = f"{BOTTLE}.name"
@@ -116,7 +117,7 @@ class BottleSupply:
         }
 
 
-def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply | None:
+def read_bottle(reading: DocumentReader, device: Device, folder: Path) -> BottleSupply | None:
     """Return the bottle of a walk file, None where it has none; ScenarioError or ParameterError for a mistake."""
     section = value_at(reading.document, BOTTLE)
     if section is None:
@@ -144,8 +145,8 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
         room = device.supply.atmospheric_pressure
         raise ScenarioError(
             f"{reading.file}: {BOTTLE_NAME}: {name} sets {_SET_PRESSURE} to "
-            f"{quantity_text(own_pressure, 'Pa_a', room)}, and supply.pressure is "
-            f"{quantity_text(pressure, 'Pa_a', room)}: give both the same"
+            f"{shown_text(own_pressure, 'Pa_a', atmosphere=room)}, and supply.pressure is "
+            f"{shown_text(pressure, 'Pa_a', atmosphere=room)}: give both the same"
         )
     # The bottle with its regulator set to the supply pressure of the device, in its entries too.
     entry = Entry(value=pressure, unit="Pa_a", origin="derived", source="supply.pressure of the walk")
@@ -164,7 +165,7 @@ def read_bottle(reading: Reading, device: Device, folder: Path) -> BottleSupply 
     return supply
 
 
-def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
+def _numbers(reading: DocumentReader, section: Mapping[str, Any], bottle: Bottle) -> dict[str, float]:
     """Return the numbers of the section; the bottle starts at the temperature of the room unless one is given."""
     room = replace(TEMPERATURE, default=bottle.room_temperature)
     items = (
@@ -186,7 +187,7 @@ def _numbers(reading: Reading, section: Mapping[str, Any], bottle: Bottle) -> di
     return numbers
 
 
-def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
+def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> None:
     """Refuse what does not go with a bottle."""
     fluid, regulator = supply.bottle.fluid, supply.bottle.regulator
     if abs(device.gas.specific_gas_constant / fluid.table.gas_constant - 1.0) > _SAME_GAS:
@@ -214,8 +215,8 @@ def _check(reading: Reading, device: Device, supply: BottleSupply) -> None:
         )
     pressure = supply.offers_first().content.pressure
     if pressure < regulator.set_pressure + regulator.pressure_margin:
-        has = quantity_text(pressure, "Pa_a", device.supply.atmospheric_pressure)
-        needs = quantity_text(
-            regulator.set_pressure + regulator.pressure_margin, "Pa_a", device.supply.atmospheric_pressure
+        has, needs = (
+            shown_text(each, "Pa_a", atmosphere=device.supply.atmospheric_pressure)
+            for each in (pressure, regulator.set_pressure + regulator.pressure_margin)
         )
         raise reading.refusal(BOTTLE_NAME, f"has {has} at the start, and its regulator needs {needs}")

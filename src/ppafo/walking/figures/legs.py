@@ -11,21 +11,29 @@ from numpy.typing import NDArray
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.report.display_units import axis_unit, display_value, display_values
-from ppafo.report.style import BLACK, CHAMBER_1, CHAMBER_2, GREY, Margins, figure_of_panels, house_style, mark_kind
+from ppafo.report.style import (
+    BLACK,
+    CHAMBER_1,
+    CHAMBER_2,
+    GREY,
+    FigureMargins,
+    figure_of_panels,
+    house_style,
+    mark_kind,
+)
 from ppafo.signals.recording import Floats
 from ppafo.walking.figures.mean_stride import WITH, WITHOUT
 from ppafo.walking.gait_series import Posture, ankle_path, gait_timing
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES, settled, times_of_phases
-from ppafo.walking.walk import Comparison
+from ppafo.walking.walk import WalkComparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
     from matplotlib.patches import Polygon
-    from PIL.Image import Image
 
 GHOST = "#5a5a5a"
 """The healthy foot: dark enough to be seen on a coloured one, in front of which it is drawn."""
@@ -41,7 +49,7 @@ _SLOT = 0.62
 """Width of the ground under one frame [m]."""
 
 _PHASES_SIZE = (9.4, 6.0)
-_MARGINS = Margins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
+_MARGINS = FigureMargins(left=1.3, right=0.2, top=0.55, bottom=0.52, row_gap=0.22, label=0.5)
 _HEIGHTS = (1.75, 0.7, 0.7, 0.7, 1.35)
 _PERCENT = 100.0 * PHASES
 _STRIP_FRAMES = 8
@@ -152,7 +160,7 @@ def drags(legs: Legs, index: int) -> bool:
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
 
 
-def frames_figure(comparison: Comparison) -> "Figure":
+def frames_figure(comparison: WalkComparison) -> "Figure":
     """Return ten instants of one stride, without the device above and with it below."""
     from matplotlib.figure import Figure
 
@@ -193,7 +201,7 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class StateBand:
     """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
 
     name: str
@@ -207,32 +215,34 @@ def _is(value: float) -> Callable[[Floats], NDArray[np.bool_]]:
 
 
 _FREE, _DORSI, _PLANTAR = "#e4e4e4", "#f0b48a", "#8fbfe0"
-_ROWS: Mapping[str, tuple[str, tuple[State, ...]]] = {
+_ROWS: Mapping[str, tuple[str, tuple[StateBand, ...]]] = {
     "Controller": (
         "controller_phase",
         (
-            State("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
-            State("4 free motion", "4 free", _FREE, _is(2.0)),
-            State("2 push-off", "2 push", _PLANTAR, _is(3.0)),
-            State("3 swing", "3 swing", _DORSI, _is(0.0)),
+            StateBand("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
+            StateBand("4 free motion", "4 free", _FREE, _is(2.0)),
+            StateBand("2 push-off", "2 push", _PLANTAR, _is(3.0)),
+            StateBand("3 swing", "3 swing", _DORSI, _is(0.0)),
         ),
     ),
     "Foot": (
         "contact",
         (
-            State("on the heel", "heel", "#cfe3c9", _is(1.0)),
-            State("flat", "flat", "#9fcf94", _is(2.0)),
-            State("on the toes", "toes", "#63ad59", _is(3.0)),
-            State("in the air", "air", "#f3f3f3", _is(0.0)),
+            StateBand("on the heel", "heel", "#cfe3c9", _is(1.0)),
+            StateBand("flat", "flat", "#9fcf94", _is(2.0)),
+            StateBand("on the toes", "toes", "#63ad59", _is(3.0)),
+            StateBand("in the air", "air", "#f3f3f3", _is(0.0)),
         ),
     ),
     "Valve": (
         "command",
         (
-            State("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
-            State("closed", "closed", "#ffffff", _is(0.0)),
-            State("plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)),
-            State("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
+            StateBand("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
+            StateBand("closed", "closed", "#ffffff", _is(0.0)),
+            StateBand(
+                "plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)
+            ),
+            StateBand("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
         ),
     ),
 }
@@ -258,7 +268,7 @@ def strip_figure(result: WalkResult) -> "Figure":
         return figure
 
 
-def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floats:
+def _shares(result: WalkResult, channel: str, states: tuple[StateBand, ...]) -> Floats:
     """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
     chosen = settled(result.helped)
     if channel not in result.recording or not chosen.any():
@@ -269,7 +279,7 @@ def _shares(result: WalkResult, channel: str, states: tuple[State, ...]) -> Floa
     return np.array([np.mean(state.holds(values), axis=0) for state in states])
 
 
-def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[State, ...]) -> None:
+def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[StateBand, ...]) -> None:
     below = np.zeros(PHASES.size)
     for state, fraction in zip(states, fractions, strict=True):
         axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
@@ -350,7 +360,7 @@ class _Scene:
         return [self.ticks, *parts]
 
 
-def animation(comparison: Comparison) -> bytes:
+def animation(comparison: WalkComparison) -> bytes:
     """Return the GIF; two strides at half speed."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from PIL import Image
@@ -380,10 +390,24 @@ def animation(comparison: Comparison) -> bytes:
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
             images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy())
-        return _gif(images, stride_time)
+        sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
+        palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
+        tones = palette.getpalette() or []
+        triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
+        # What is nearly white is white, for averages with its edges would tint the background; a red foot is kept.
+        kept = [[255] * 3 if min(triple) > _NEARLY_WHITE else triple for triple in triples[:_COLOURS]]
+        kept.append([int(DRAGS[digit : digit + 2], 16) for digit in (1, 3, 5)])
+        palette.putpalette([tone for triple in kept for tone in triple])
+        frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+        buffer = io.BytesIO()
+        milliseconds = 10 * round(100.0 * _SLOWED * stride_time / _PER_STRIDE)  # a GIF counts hundredths of a second
+        frames[0].save(
+            buffer, "GIF", save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False
+        )
+        return buffer.getvalue()
 
 
-def _stage(comparison: Comparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
+def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list[_Scene], Any, Any]":
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=_ANIMATION_SIZE, dpi=_RESOLUTION)
@@ -442,24 +466,3 @@ def _scene(axes: "Axes", result: WalkResult, turns: np.ndarray, label: str, colo
         artist.set_animated(True)
     start = float(np.mean(legs.healthy.ankle[:_PER_STRIDE, 0] - stride * (turns[:_PER_STRIDE] - turns[0])))
     return _Scene(axes, legs, artists, ticks, colour, start + stride * (turns - turns[0]))
-
-
-def _gif(images: "list[Image]", stride_time: float) -> bytes:
-    """All frames on the palette of one, so that only what moves takes room."""
-    from PIL import Image
-
-    sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
-    palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
-    tones = palette.getpalette() or []
-    triples = [tones[start : start + 3] for start in range(0, len(tones), 3)]
-    # What is nearly white is white, for averages with its edges would tint the background; a small red foot is kept.
-    kept = [[255] * 3 if min(triple) > _NEARLY_WHITE else triple for triple in triples[:_COLOURS]]
-    kept.append([int(DRAGS[digit : digit + 2], 16) for digit in (1, 3, 5)])
-    palette.putpalette([tone for triple in kept for tone in triple])
-    frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    buffer = io.BytesIO()
-    milliseconds = 10 * round(100.0 * _SLOWED * stride_time / _PER_STRIDE)  # a GIF counts hundredths of a second
-    frames[0].save(
-        buffer, "GIF", save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=False
-    )
-    return buffer.getvalue()

@@ -60,7 +60,11 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
         TOES: [GROUND, *toes],
         GAS: [Mark("line", time, recording["supplied_mass"], colour=WITH)],
     }
-    segments, set_limits = _segment_marks(worn), partial(_set_limits, float(time[-1]))
+    behind: dict[str, Any] = {"alpha": 1.0, "zorder": 0}
+    shaded = [Mark("span", (part.start, part.end), colour=_SHADED, style=behind) for part in worn.segments[1::2]]
+    losses = [part.safe_time for part in worn.segments if part.safe_time is not None]
+    segments = [*shaded, *(Mark("at", loss, colour=_LESS_HELP, style={"linewidth": 1.2}) for loss in losses)]
+    set_limits = partial(_set_limits, float(time[-1]))
     panels = [_pace_panel(worn, segments)]
     panels += [
         Panel(TIME, kind, [*segments, *marks], then=set_limits, shares_x=True) for kind, marks in marks_by_kind.items()
@@ -73,14 +77,6 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
         note="blue: with the device; orange: without it; red line: the controller helps less",
         kind=recording.kind,
     )
-
-
-def _segment_marks(worn: WalkResult) -> list[Mark]:
-    """Return every other segment on grey, and a line where the controller helps less."""
-    behind: dict[str, Any] = {"alpha": 1.0, "zorder": 0}
-    shaded = [Mark("span", (part.start, part.end), colour=_SHADED, style=behind) for part in worn.segments[1::2]]
-    losses = [part.safe_time for part in worn.segments if part.safe_time is not None]
-    return [*shaded, *(Mark("at", loss, colour=_LESS_HELP, style={"linewidth": 1.2}) for loss in losses)]
 
 
 def _pace_panel(worn: WalkResult, segments: list[Mark]) -> Panel:

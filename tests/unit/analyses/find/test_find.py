@@ -1,6 +1,7 @@
 """``ppafo find``: the lowest or highest value that meets a condition."""
 
 import json
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -80,8 +81,8 @@ def test_a_condition_that_is_never_met_has_no_value_and_shows_the_nearest(
     found = answer.found
     assert (found.value, found.not_met_at, found.changes) == (None, None, 0)
     assert len(found.tried) == 9
-    assert answer.said[0].startswith("no supply.pressure from 14.3")
-    assert "the nearest is 2 N m at 43.3" in answer.said[0]
+    assert answer.said[0].startswith("no supply.pressure from 2 bar_a to 10 bar_a")
+    assert "the nearest is 2 N m at 4 bar_a" in answer.said[0]
     assert not answer.passed
 
 
@@ -213,6 +214,11 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     assert found.value is None
     assert found.unsettled > 0
     assert f"in {found.unsettled} runs the loop oscillates on the hold" in " ".join(found.remarks)
+    assert "their condition is asked of rms_error_hold too" in " ".join(found.remarks)
+    # What stands under the name of the metric is the metric, and what was asked of stands beside it.
+    (tried,) = (each for each in found.tried if each.value == pytest.approx(101325.0 + 84.0 * 6894.757293168361))
+    assert tried.metric == pytest.approx(alone["final_error"].value)
+    assert tried.judged == pytest.approx(alone["rms_error_hold"].value) or math.isnan(tried.judged)
 
 
 def test_one_instant_of_a_loop_that_settles_is_its_error() -> None:

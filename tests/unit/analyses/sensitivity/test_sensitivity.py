@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from ppafo.analyses.sensitivity.answer import overlapping_pairs, remarks
 from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, changes
 from ppafo.analyses.sensitivity.question import sensitivity
-from ppafo.analyses.sensitivity.solve import Influences, Settings, analyse
+from ppafo.analyses.sensitivity.solve import Influences, SensitivitySettings, analyse
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty
@@ -24,7 +24,7 @@ Model = Callable[[Mapping[str, Floats]], Mapping[str, Floats]]
 ANGLES = Uncertainty(tuple(Drawn(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
 
 
-def analysed(model: Model, uncertainty: Uncertainty, method: str, settings: Settings) -> Influences:
+def analysed(model: Model, uncertainty: Uncertainty, method: str, settings: SensitivitySettings) -> Influences:
     """What comes of a formula in place of a simulation."""
     return analyse(Runs.of_model(model, [METRIC]), uncertainty, METHODS[method], settings)
 
@@ -56,7 +56,7 @@ def failing(model: Model, rows: Floats) -> Model:
 
 
 def test_sobol_indices_of_ishigami_come_out_and_settle() -> None:
-    found = analysed(ishigami, ANGLES, "sobol", Settings(4096)).metrics[0]
+    found = analysed(ishigami, ANGLES, "sobol", SensitivitySettings(4096)).metrics[0]
     first, total = known_indices()
     assert found.indices.values["first"] == pytest.approx(first, abs=0.02)
     assert found.indices.values["total"] == pytest.approx(total, abs=0.02)
@@ -69,7 +69,7 @@ def test_sobol_indices_of_ishigami_come_out_and_settle() -> None:
 
 
 def test_the_result_is_the_same_every_time() -> None:
-    one, other = (analysed(ishigami, ANGLES, "sobol", Settings(256, seed=5)) for _ in range(2))
+    one, other = (analysed(ishigami, ANGLES, "sobol", SensitivitySettings(256, seed=5)) for _ in range(2))
     assert np.array_equal(one.metrics[0].indices.values["total"], other.metrics[0].indices.values["total"])
     assert np.array_equal(one.metrics[0].indices.bands["total"], other.metrics[0].indices.bands["total"])
 
@@ -81,7 +81,7 @@ def test_a_distribution_without_ends_has_finite_effects() -> None:
         return {METRIC: columns["x1"].copy()}
 
     for method in METHODS.values():
-        indices = analysed(first, normal, method.name, Settings(64)).metrics[0].indices
+        indices = analysed(first, normal, method.name, SensitivitySettings(64)).metrics[0].indices
         assert np.all(np.isfinite(indices.values[method.shown[0]]))
         least = 1e-9 if method.name != "shapley" else indices.bands["shapley"][1]
         assert indices.values[method.shown[0]][1] == pytest.approx(0.0, abs=least)
@@ -89,7 +89,7 @@ def test_a_distribution_without_ends_has_finite_effects() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
-    settings = Settings(128, maximum_failed=0.02)
+    settings = SensitivitySettings(128, maximum_failed=0.02)
     rows = METHODS[method].block_rows(3)
     broken = np.array([0, 5 * rows + 1, 5 * rows + 2, 127 * rows + rows - 1])
     found = analysed(failing(ishigami, broken), ANGLES, method, settings)
@@ -103,7 +103,7 @@ def test_a_failed_run_takes_its_whole_block_with_it(method: str) -> None:
 def test_failures_at_the_beginning_only_shorten_the_course() -> None:
     rows = METHODS["sobol"].block_rows(3)
     model = failing(ishigami, np.arange(62) * rows)
-    found = analysed(model, ANGLES, "sobol", Settings(1024)).metrics[0]
+    found = analysed(model, ANGLES, "sobol", SensitivitySettings(1024)).metrics[0]
     assert [each.blocks for each in found.settling] == [128, 256, 512, 1024]
     assert [each.used for each in found.settling] == [66, 194, 450, 962]
 
@@ -112,13 +112,13 @@ def test_a_sample_with_hardly_a_whole_block_says_nothing() -> None:
     rows = METHODS["sobol"].block_rows(3)
     model = failing(ishigami, np.arange(62) * rows)
     with pytest.raises(StudyError, match=r"2 of 64 base points have 'rms_error' in all their runs, which is too few"):
-        analysed(model, ANGLES, "sobol", Settings(64, maximum_failed=0.5))
+        analysed(model, ANGLES, "sobol", SensitivitySettings(64, maximum_failed=0.5))
 
 
 def test_too_many_failed_runs_are_refused() -> None:
     model = failing(ishigami, np.arange(0, 640, 20))
     with pytest.raises(StudyError, match=r"32 of 640 runs failed \(5 %\), more than the 2 %.*diverged"):
-        analysed(model, ANGLES, "sobol", Settings(128))
+        analysed(model, ANGLES, "sobol", SensitivitySettings(128))
 
 
 def test_a_metric_that_is_always_the_same_is_refused() -> None:
@@ -126,7 +126,7 @@ def test_a_metric_that_is_always_the_same_is_refused() -> None:
         return {METRIC: np.full(columns["x1"].size, 2.0)}
 
     with pytest.raises(StudyError, match="'rms_error' is 2 in every run"):
-        analysed(constant, ANGLES, "sobol", Settings(128))
+        analysed(constant, ANGLES, "sobol", SensitivitySettings(128))
 
 
 def test_neighbours_whose_bands_overlap_are_named() -> None:
@@ -134,29 +134,29 @@ def test_neighbours_whose_bands_overlap_are_named() -> None:
         values = columns["x1"] + columns["x2"] + 0.001 * columns["x3"]
         return {METRIC: values}
 
-    found = analysed(equal, ANGLES, "sobol", Settings(256))
+    found = analysed(equal, ANGLES, "sobol", SensitivitySettings(256))
     assert [set(pair) for pair in overlapping_pairs(found, found.metrics[0])] == [{"x1", "x2"}]
 
 
 def test_bad_settings_are_one_line() -> None:
-    def refused(uncertainty: Uncertainty, method: str, settings: Settings) -> str:
+    def refused(uncertainty: Uncertainty, method: str, settings: SensitivitySettings) -> str:
         with pytest.raises(StudyError) as caught:
             analysed(ishigami, uncertainty, method, settings)
         return str(caught.value)
 
-    assert "need a power of 2, such as 128" in refused(ANGLES, "sobol", Settings(100))
-    assert "shapley needs 64 to" in refused(ANGLES, "shapley", Settings(2))
-    assert "maximum_failed = 1.0" in refused(ANGLES, "sobol", Settings(64, maximum_failed=1.0))
-    assert "seed = -1: must be 0 or more" in refused(ANGLES, "sobol", Settings(64, seed=-1))
-    assert "vary two or more" in refused(Uncertainty(ANGLES.drawn[:1]), "sobol", Settings(64))
+    assert "need a power of 2, such as 128" in refused(ANGLES, "sobol", SensitivitySettings(100))
+    assert "shapley needs 64 to" in refused(ANGLES, "shapley", SensitivitySettings(2))
+    assert "maximum_failed = 1.0" in refused(ANGLES, "sobol", SensitivitySettings(64, maximum_failed=1.0))
+    assert "seed = -1: must be 0 or more" in refused(ANGLES, "sobol", SensitivitySettings(64, seed=-1))
+    assert "vary two or more" in refused(Uncertainty(ANGLES.drawn[:1]), "sobol", SensitivitySettings(64))
     correlated = Uncertainty(ANGLES.drawn[:2], ((1.0, 0.0), (0.6, 0.8)))
-    assert "sobol need values that are independent" in refused(correlated, "sobol", Settings(64))
+    assert "sobol need values that are independent" in refused(correlated, "sobol", SensitivitySettings(64))
 
 
 @pytest.mark.parametrize("blocks", [256, 1024])
 def test_the_bands_of_sobol_hold_and_are_not_far_too_wide(blocks: int) -> None:
     first, total = known_indices()
-    found = [analysed(ishigami, ANGLES, "sobol", Settings(blocks, seed)) for seed in range(1, 61)]
+    found = [analysed(ishigami, ANGLES, "sobol", SensitivitySettings(blocks, seed)) for seed in range(1, 61)]
     for name, known in (("first", first), ("total", total)):
         values = np.array([item.metrics[0].indices.values[name] for item in found])
         bands = np.array([item.metrics[0].indices.bands[name] for item in found])
@@ -177,7 +177,7 @@ def linear_in(slopes: Mapping[str, float]) -> Model:
 @pytest.mark.parametrize("method", METHODS)
 def test_the_change_of_ishigami_is_the_known_one_and_its_band_holds(method: str) -> None:
     known = np.array([2.0 * math.sin(0.9 * math.pi) * (1.0 + B * math.pi**4 / 5.0), 0.0, 0.0])
-    found = [analysed(ishigami, ANGLES, method, Settings(512, seed)) for seed in range(1, 41)]
+    found = [analysed(ishigami, ANGLES, method, SensitivitySettings(512, seed)) for seed in range(1, 41)]
     away = np.array([np.array(item.metrics[0].change_from_5_to_95_percent) - known for item in found])
     bands = np.array([item.metrics[0].band_of_change for item in found])
     assert np.mean(np.abs(away) <= bands) >= 0.9
@@ -192,7 +192,7 @@ def test_the_band_of_the_change_holds_where_the_metric_bends() -> None:
         return {METRIC: np.exp(2.0 * columns["x1"] / math.pi) + 0.5 * columns["x2"]}
 
     known = np.array([math.exp(1.8) - math.exp(-1.8), 0.9 * math.pi, 0.0])
-    found = [analysed(bent, ANGLES, "sobol", Settings(256, seed)) for seed in range(1, 31)]
+    found = [analysed(bent, ANGLES, "sobol", SensitivitySettings(256, seed)) for seed in range(1, 31)]
     away = np.array([np.array(item.metrics[0].change_from_5_to_95_percent) - known for item in found])
     bands = np.array([item.metrics[0].band_of_change for item in found])
     assert np.all(np.mean(np.abs(away) <= bands, axis=0) >= 0.85)
@@ -208,7 +208,7 @@ def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_wha
         )
     )
     model = linear_in({"x1": 1.0, "x2": -5.0, "x3": 2.0, "x4": 1.0})
-    found = analysed(model, mixed, "sobol", Settings(4096)).metrics[0]
+    found = analysed(model, mixed, "sobol", SensitivitySettings(4096)).metrics[0]
     normal = 1.6448536269514722
     known = [2.0 * 2.0 * normal, -5.0, 0.0, 2.0**normal - 2.0**-normal]
     assert found.change_from_5_to_95_percent == pytest.approx(known, abs=0.06)
@@ -219,7 +219,7 @@ def test_a_correlated_value_goes_along_in_the_change() -> None:
     # x2 does nothing by itself; where it is high, x1 is.
     drawn = (Drawn("x1", NormalAround(0.0, 1.0)), Drawn("x2", NormalAround(5.0, 3.0)))
     together = Uncertainty(drawn, ((1.0, 0.0), (-0.8, 0.6)))
-    found = analysed(linear_in({"x1": 2.0}), together, "shapley", Settings(4096)).metrics[0]
+    found = analysed(linear_in({"x1": 2.0}), together, "shapley", SensitivitySettings(4096)).metrics[0]
     whole = 2.0 * 2.0 * 1.6448536269514722
     assert found.change_from_5_to_95_percent == pytest.approx([whole, -0.8 * whole], abs=0.15)
 
@@ -251,7 +251,7 @@ def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands
     model = linear_in(dict(zip(names, slopes.tolist(), strict=True)))
     held = []
     for seed in range(1, 41):
-        settings = Settings(1024, seed)
+        settings = SensitivitySettings(1024, seed)
         found = analysed(model, Uncertainty(drawn, factor), "shapley", settings).metrics[0].indices
         assert np.sum(found.values["shapley"]) == pytest.approx(1.0)
         held.append(np.abs(found.values["shapley"] - truth) <= found.bands["shapley"])
@@ -261,7 +261,7 @@ def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands
 
 def test_shapley_effects_of_independent_values_share_out_what_acts_together() -> None:
     first, total = known_indices()
-    found = analysed(ishigami, ANGLES, "shapley", Settings(8192)).metrics[0].indices
+    found = analysed(ishigami, ANGLES, "shapley", SensitivitySettings(8192)).metrics[0].indices
     assert found.values["shapley"] == pytest.approx(0.5 * (first + total), abs=0.03)
 
 

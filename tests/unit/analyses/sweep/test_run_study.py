@@ -21,7 +21,7 @@ from ppafo.signals.recording import CHANNELS
 from ppafo.storage.places import DiskFolder
 from ppafo.studies.loading import load_study
 from ppafo.study import store
-from ppafo.study.store import Task, chunk_file, compute_chunk, estimate_bytes, stored_unit
+from ppafo.study.store import ChunkTask, chunk_file, compute_chunk, estimate_bytes, stored_unit
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
 
@@ -150,7 +150,7 @@ def test_bands_read_a_few_times_at_once_are_the_same(
 def test_chunks_are_the_same_in_any_order_and_on_any_number_of_threads(small_results: StudyResults, small: Any) -> None:
     written = contents(small_results.place.address)
     for number in (7, 2, 0, 5):
-        _, content = compute_chunk(Task(load_study(small), "nowhere", 1 + number % 2), number)
+        _, content = compute_chunk(ChunkTask(load_study(small), "nowhere", 1 + number % 2), number)
         assert content == written[chunk_file(number)]
 
 

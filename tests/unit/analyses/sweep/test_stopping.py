@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.analyses.sweep.statistic import draw_until, estimate
 from ppafo.analyses.sweep.statistic_kind import Statistic, mean_of, parse_statistic, probability_of, quantile_of
-from ppafo.analyses.sweep.stopping import Estimate, StoppingRule, stopping_rule
+from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, stopping_rule
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween, replicates_interval
 from ppafo.studies.draws import REPLICATES, Uncertainty
@@ -32,7 +32,9 @@ def value(columns: Mapping[str, Floats]) -> dict[str, Floats]:
     return {METRIC: columns["x"]}
 
 
-def drawn_until(model: Model, uncertain: Uncertainty, statistic: Statistic, rule: StoppingRule, seed: int) -> Estimate:
+def drawn_until(
+    model: Model, uncertain: Uncertainty, statistic: Statistic, rule: StoppingRule, seed: int
+) -> StatisticEstimate:
     """What is found on a formula in place of a simulation."""
     return draw_until(Runs.of_model(model, [METRIC]), uncertain, METRIC, statistic, rule, seed).found
 
@@ -260,7 +262,7 @@ def test_widths_are_read_in_the_unit_of_the_metric() -> None:
 
 
 def test_a_scenario_is_drawn_until_its_error_is_known() -> None:
-    def asked() -> Estimate:
+    def asked() -> StatisticEstimate:
         return estimate(
             STUDY,
             metric=METRIC,

@@ -5,16 +5,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.tune.problem import Effort, Problem, Searched, Spread, Term
+from ppafo.analyses.tune.problem import ObjectiveTerm, Problem, Searched, SearchEffort, Spread
 from ppafo.analyses.tune.result import INFEASIBLE, agreement
 from ppafo.analyses.tune.solve import UNUSABLE, Crossed, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
-from ppafo.studies.draws import Limit, Uncertainty
+from ppafo.studies.draws import MetricLimit, Uncertainty
 from ppafo.studies.study import Drawn
 from ppafo.studies.varying import varied_path
 
-EFFORT = Effort(starts=3, generations=200, candidates_per_gain=12, seed=4)
+EFFORT = SearchEffort(starts=3, generations=200, candidates_per_gain=12, seed=4)
 SCALES = {"rms_error": 2.0, "gas_supplied": 1.0}
 
 
@@ -26,8 +26,8 @@ def problem(**changes: Any) -> Problem:
         "scenario": load_scenario("torque-task-proportional"),
         "overrides": (),
         "searched": (),
-        "goals": (Term("rms_error", 1.0, None),),
-        "constraints": (Limit("gas_supplied", 0.5, True, "500 g"),),
+        "goals": (ObjectiveTerm("rms_error", 1.0, None),),
+        "constraints": (MetricLimit("gas_supplied", 0.5, True, "500 g"),),
         "spread": None,
         "effort": EFFORT,
     }
@@ -69,7 +69,7 @@ def test_a_search_is_the_same_every_time_for_a_seed_and_another_for_another() ->
     costs = bowl(np.array([0.5, 0.5]))
     one, other = (search(costs, [0.1, 0.1], EFFORT) for _ in range(2))
     assert one == other
-    assert one != search(costs, [0.1, 0.1], Effort(starts=3, generations=200, candidates_per_gain=12, seed=5))
+    assert one != search(costs, [0.1, 0.1], SearchEffort(starts=3, generations=200, candidates_per_gain=12, seed=5))
 
 
 def test_the_values_before_are_among_the_candidates_so_that_nothing_is_lost() -> None:
@@ -78,15 +78,20 @@ def test_the_values_before_are_among_the_candidates_so_that_nothing_is_lost() ->
     def costs(shares: Floats) -> Floats:
         return np.where(np.all(np.abs(shares - needle) < 1e-9, axis=1), 0.0, 1.0 + shares[:, 0])
 
-    assert search(costs, needle.tolist(), Effort(starts=1, generations=3, candidates_per_gain=5, seed=1))[0].cost == 0.0
-    assert search(costs, [1.5, 0.5], Effort(starts=1, generations=3, candidates_per_gain=5, seed=1))[0].cost >= 1.0
+    assert (
+        search(costs, needle.tolist(), SearchEffort(starts=1, generations=3, candidates_per_gain=5, seed=1))[0].cost
+        == 0.0
+    )
+    assert (
+        search(costs, [1.5, 0.5], SearchEffort(starts=1, generations=3, candidates_per_gain=5, seed=1))[0].cost >= 1.0
+    )
 
 
 def test_two_minima_that_are_as_good_are_told_apart() -> None:
     def costs(shares: Floats) -> Floats:
         return np.asarray(1.0 + np.minimum((shares[:, 0] - 0.1) ** 2, (shares[:, 0] - 0.9) ** 2))
 
-    starts = search(costs, [0.5], Effort(starts=12, generations=100, candidates_per_gain=8, seed=1))
+    starts = search(costs, [0.5], SearchEffort(starts=12, generations=100, candidates_per_gain=8, seed=1))
     assert agreement(starts) == pytest.approx(0.8, abs=0.02)
 
 
@@ -97,7 +102,7 @@ def test_every_generation_is_asked_at_once() -> None:
         asked.append(len(shares))
         return np.asarray(np.sum(shares, axis=1))
 
-    search(costs, [0.5, 0.5], Effort(starts=1, generations=4, candidates_per_gain=10, seed=1))
+    search(costs, [0.5, 0.5], SearchEffort(starts=1, generations=4, candidates_per_gain=10, seed=1))
     generations = [count for count in asked if count > 1]
     assert set(generations) == {20}
     assert len(generations) <= 5
@@ -111,7 +116,7 @@ def test_a_flat_valley_that_is_not_along_an_axis_is_followed_to_its_end() -> Non
         return np.asarray(1.0 + 0.1 * (1.0 - x) ** 2 + 10.0 * (y - x**2) ** 2)
 
     for seed in range(3):
-        (start,) = search(costs, [0.1, 0.9], Effort(starts=1, generations=12, candidates_per_gain=6, seed=seed))
+        (start,) = search(costs, [0.1, 0.9], SearchEffort(starts=1, generations=12, candidates_per_gain=6, seed=seed))
         assert start.cost == pytest.approx(1.0, abs=1e-3)
 
 
@@ -137,7 +142,7 @@ def test_a_run_without_the_metric_counts_as_failed() -> None:
 def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations: float) -> None:
     spread = Spread(Uncertainty((Drawn("x", NormalAround(0.0, 1.0)),)), "s", 5, 1, deviations, share)
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
-    goals = (Term("rms_error", 1.0, None), Term("gas_supplied", -1.0, None))
+    goals = (ObjectiveTerm("rms_error", 1.0, None), ObjectiveTerm("gas_supplied", -1.0, None))
     judged = judge(
         runs([values.tolist()], [values.tolist()]), problem(spread=spread, goals=goals, constraints=()), SCALES
     )

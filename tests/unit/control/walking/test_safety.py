@@ -8,7 +8,7 @@ import pytest
 from ppafo.control.walking import fault_checks, fault_flags, phases, safety
 from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PhaseState, Switch
-from ppafo.control.walking.safety import Finding, SafetyState, Stance, ValveTimes
+from ppafo.control.walking.safety import SafetyState, Stance, ValveTimes, VentingFault
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
 from ppafo.model.regulator import SupplyLines
@@ -103,10 +103,10 @@ def test_of_two_signs_the_one_that_stops_counts() -> None:
     assert found(now=endless) == fault_flags.ENDLESS_PHASE
     assert found(GOOD._replace(angle=9.0), endless) == fault_flags.ANGLE_RANGE
     paused = safety.monitor(RULES, safety.START, endless, endless, GOOD, PERIOD)
-    assert paused.finding == Finding(fault_flags.ENDLESS_PHASE, 300.0, 200.0, 1.5, 1.1e5, 1.05e5)
+    assert paused.finding == VentingFault(fault_flags.ENDLESS_PHASE, 300.0, 200.0, 1.5, 1.1e5, 1.05e5)
     stopped = safety.monitor(RULES, paused, endless, endless, GOOD._replace(angle=9.0), PERIOD)
     assert (stopped.level, stopped.ventings) == (STOPPED, 2.0)
-    assert stopped.finding == Finding(fault_flags.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
+    assert stopped.finding == VentingFault(fault_flags.ANGLE_RANGE, 300.0, 200.0, 9.0, 1.1e5, 1.05e5)
 
 
 ON_TOES = phase(PUSH_OFF, 0.5, heel=0.0)

@@ -12,10 +12,10 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.bench.flow import GasAt, Opening, Sizes, iso6358_shape, orifice_shape
+from ppafo.identification.bench.flow import GasAt, Opening, OpeningSizes, iso6358_shape, orifice_shape
 from ppafo.identification.bench.vane_leak import pressures_of_fall
 from ppafo.identification.noise import burg
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.model.orifice import isentropic_flow_function, iso6358_flow_function
 from tests.unit.identification import planted
 
@@ -25,8 +25,8 @@ EFFECTIVE = 0.3e-6 * 0.113
 AREA = "actuator.leak.area"
 
 
-def changed(source: Source, name: str, values: np.ndarray) -> Source:
-    return Source(source.recording.with_channel(name, values, source.recording.unit(name)))
+def changed(source: RecordingSource, name: str, values: np.ndarray) -> RecordingSource:
+    return RecordingSource(source.recording.with_channel(name, values, source.recording.unit(name)))
 
 
 def test_the_shapes_of_flow_are_the_flow_functions_of_the_model_and_antisymmetric() -> None:
@@ -76,7 +76,7 @@ def test_flow_of_the_standard_gives_back_its_two_numbers_and_an_orifice_law_hold
 def test_a_laminar_valve_gives_back_its_coefficient() -> None:
     source = planted.flow()
     pressures = source.recording["upstream_pressure"], source.recording["downstream_pressure"]
-    flow = Opening(planted.CO2, "laminar").flow(Sizes(3.0e-14), *pressures)
+    flow = Opening(planted.CO2, "laminar").flow(OpeningSizes(3.0e-14), *pressures)
     laminar = changed(source, "mass_flow", flow * (1.0 + np.random.default_rng(1).normal(0.0, 0.003, flow.size)))
     found = open_valve_flow((laminar,), planted.CO2, law="laminar")
     assert found["open_valve_flow.laminar_coefficient"].value == pytest.approx(3.0e-14, rel=0.01)
@@ -136,7 +136,7 @@ def test_a_valve_that_opens_more_in_one_direction_holds_for_this_model_only() ->
 
 
 def test_a_command_that_only_rises_leaves_hysteresis_out() -> None:
-    up = Source(planted.sweep().recording.between(0.0, 10.0))
+    up = RecordingSource(planted.sweep().recording.between(0.0, 10.0))
     result = valve_map((up,), planted.CO2)
     assert "effects.spool_play.width" not in [item.path for item in result.estimates]
 
@@ -238,7 +238,7 @@ def test_steady_flow_with_the_wrong_sign_is_told() -> None:
 
 def test_a_leak_in_the_form_of_the_standard_gives_its_conductance() -> None:
     first, second = np.linspace(1.3e5, 6.0e5, 24), np.full(24, planted.ROOM)
-    flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(Sizes(7.0e-11), first, second)
+    flow = Opening(planted.CO2, "iso6358", 1.0, 0.25).flow(OpeningSizes(7.0e-11), first, second)
     flow *= 1.0 + np.random.default_rng(3).normal(0.0, 0.003, 24)
     channels = {"pressure_1": (first, "Pa"), "pressure_2": (second, "Pa"), "mass_flow": (flow, "kg/s")}
     source = planted.source("steady", np.arange(24.0), **channels)
@@ -250,7 +250,7 @@ def test_a_leak_in_the_form_of_the_standard_gives_its_conductance() -> None:
 def test_choked_outflow_of_one_chamber_into_a_room_is_an_exponential_of_the_pressure() -> None:
     opening = Opening(planted.CO2, "orifice", 1.0 / planted.CO2.choked_flow_constant)
     time = np.linspace(0.0, 3.0, 50)
-    first, _ = pressures_of_fall(opening, Sizes(0.2), 1e6, 1e5, 0.0, 1.0, time)
+    first, _ = pressures_of_fall(opening, OpeningSizes(0.2), 1e6, 1e5, 0.0, 1.0, time)
     assert np.allclose(first, 1e6 * np.exp(-0.2 * time), rtol=1e-4)
 
 

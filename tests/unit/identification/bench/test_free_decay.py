@@ -8,7 +8,7 @@ import pytest
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import Tolerances, free_decay
 from ppafo.identification.bench.free_decay import Slowing, course
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from tests.unit.identification import planted
 
 
@@ -100,14 +100,14 @@ def test_too_few_samples_between_start_and_end_are_refused() -> None:
         free_decay((planted.decay(),), start=7.99)
 
 
-def with_velocity(factor: float = 1.0) -> Source:
+def with_velocity(factor: float = 1.0) -> RecordingSource:
     """A decay whose angular velocity was recorded too, times a factor."""
     source = planted.decay()
     time = source.recording.time
     slowing = Slowing(planted.DAMPING_RATE, planted.DECELERATION)
     speed = course(np.maximum(time - 1.0, 0.0), 2.5, slowing).speed
     speed = np.where(time < 1.0, 0.0, speed) + np.random.default_rng(51).normal(0.0, 0.003, time.size)
-    return Source(source.recording.with_channel("angular_velocity", factor * speed, "rad/s"))
+    return RecordingSource(source.recording.with_channel("angular_velocity", factor * speed, "rad/s"))
 
 
 def test_a_recorded_velocity_makes_the_interval_narrower_and_it_holds() -> None:

@@ -16,11 +16,11 @@ from ppafo.identification.bench import (
     valve_map,
     vane_leak,
 )
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.signals.recording import Floats
 from tests.unit.identification import planted
 
-Solve = Callable[[tuple[Source, ...]], BenchResult]
+Solve = Callable[[tuple[RecordingSource, ...]], BenchResult]
 RESPONSES = {
     "decay": "angle",
     "flow": "mass_flow",
@@ -46,15 +46,15 @@ def solved() -> dict[str, Solve]:
     }
 
 
-def made(kind: str, seed: int) -> Source:
+def made(kind: str, seed: int) -> RecordingSource:
     """Return a right recording of a kind."""
     sized = {"leak": ("orifice", 3.39e-8), "steady": ("orifice", 3.39e-8)}
     return getattr(planted, kind)(*sized.get(kind, ()), seed=seed)  # type: ignore[no-any-return]
 
 
-def changed(source: Source, name: str, values: Floats, file: str = "") -> Source:
+def changed(source: RecordingSource, name: str, values: Floats, file: str = "") -> RecordingSource:
     recording = source.recording.with_channel(name, values, source.recording.unit(name))
-    return Source(replace(recording, label=file or recording.label))
+    return RecordingSource(replace(recording, label=file or recording.label))
 
 
 @pytest.mark.parametrize("seed", [11, 12, 13])

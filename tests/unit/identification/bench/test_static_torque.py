@@ -5,14 +5,14 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.bench import Tolerances, static_torque
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from tests.unit.identification import planted
 
 GROWTH = "effects.seal_friction.static_per_pressure"
 
 
-def changed(source: Source, name: str, values: np.ndarray) -> Source:
-    return Source(source.recording.with_channel(name, values, source.recording.unit(name)))
+def changed(source: RecordingSource, name: str, values: np.ndarray) -> RecordingSource:
+    return RecordingSource(source.recording.with_channel(name, values, source.recording.unit(name)))
 
 
 def test_without_noise_every_planted_value_comes_back() -> None:

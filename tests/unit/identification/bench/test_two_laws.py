@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 from ppafo.identification.bench import open_valve_flow, vane_leak
 from ppafo.identification.bench.flow import GasAt
-from ppafo.identification.source import Source
+from ppafo.identification.source import RecordingSource
 from ppafo.signals import Channel, Recording
 
 K, R, T, ROOM = 1.4, 8.314462618 / 0.02897, 293.15, 101325.0
@@ -25,20 +25,20 @@ def through(mix: Mix, first: float, second: float) -> float:
     return mix[0] * first * shape + mix[1] * (first**2 - second**2)
 
 
-def recording(**channels: tuple[np.ndarray, str]) -> tuple[Source]:
+def recording(**channels: tuple[np.ndarray, str]) -> tuple[RecordingSource]:
     (first, _), *_ = channels.values()
     made = {name: Channel(np.asarray(values), unit) for name, (values, unit) in channels.items()}
-    return (Source(Recording("made", 0.05 * np.arange(len(first)), made, "synthetic")),)
+    return (RecordingSource(Recording("made", 0.05 * np.arange(len(first)), made, "synthetic")),)
 
 
-def steady(mix: Mix, random: np.random.Generator) -> tuple[Source]:
+def steady(mix: Mix, random: np.random.Generator) -> tuple[RecordingSource]:
     first, second = np.linspace(1.2e5, 6.0e5, 40), np.full(40, ROOM)
     flow = np.array([through(mix, *pair) for pair in zip(first, second, strict=True)])
     flow = flow + 0.003 * flow.max() * random.standard_normal(40)
     return recording(pressure_1=(first, "Pa"), pressure_2=(second, "Pa"), mass_flow=(flow, "kg/s"))
 
 
-def closed(mix: Mix, random: np.random.Generator) -> tuple[Source]:
+def closed(mix: Mix, random: np.random.Generator) -> tuple[RecordingSource]:
     """Two chambers of 60 and 45 cm^3, twenty seconds at 20 Hz, isothermal."""
     one, other = R * T / 60.0e-6, R * T / 45.0e-6
 
@@ -51,11 +51,11 @@ def closed(mix: Mix, random: np.random.Generator) -> tuple[Source]:
     return recording(pressure_1=(first, "Pa"), pressure_2=(second, "Pa"))
 
 
-def of_steady(sources: tuple[Source, ...], law: str) -> object:
+def of_steady(sources: tuple[RecordingSource, ...], law: str) -> object:
     return vane_leak(sources, AIR, law=law)  # type: ignore[arg-type]
 
 
-def of_closed(sources: tuple[Source, ...], law: str) -> object:
+def of_closed(sources: tuple[RecordingSource, ...], law: str) -> object:
     return vane_leak(sources, AIR, 60.0e-6, 45.0e-6, law=law)  # type: ignore[arg-type]
 
 
@@ -66,7 +66,7 @@ MIXES = ((0.8e-8, 0.32e-16), (1.6e-8, 0.0), (0.0, 0.64e-16))
 @pytest.mark.parametrize("mix", MIXES)
 @pytest.mark.parametrize(("make", "solve"), [(steady, of_steady), (closed, of_closed)])
 def test_both_laws_hold_where_either_alone_or_both_flow(
-    make: Callable[..., tuple[Source]], solve: Callable[..., object], mix: Mix
+    make: Callable[..., tuple[RecordingSource]], solve: Callable[..., object], mix: Mix
 ) -> None:
     found = solve(make(mix, np.random.default_rng(640)), "both")
     for path, truth in zip(("vane_leak.effective_area", "effects.laminar_leak.coefficient"), mix, strict=True):

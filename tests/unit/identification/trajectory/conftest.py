@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from ppafo.identification.trajectory import Experiment
+from ppafo.identification.trajectory import FittedExperiment
 from ppafo.running import simulate
 from ppafo.signals.recording import Channel, Recording
 from ppafo.simulation.loading import load_scenario
@@ -38,6 +38,6 @@ def recorded() -> Callable[..., Recording]:
 
 
 @pytest.fixture(scope="session")
-def experiment(step: Scenario, recorded: Callable[..., Recording]) -> Experiment:
+def experiment(step: Scenario, recorded: Callable[..., Recording]) -> FittedExperiment:
     """The step response with its recording."""
-    return Experiment("step", step, recorded(step), noise=NOISE)
+    return FittedExperiment("step", step, recorded(step), noise=NOISE)

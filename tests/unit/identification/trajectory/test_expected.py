@@ -7,8 +7,8 @@ import pytest
 
 from ppafo.errors import IdentificationError
 from ppafo.identification.trajectory import (
-    Candidate,
-    Experiment,
+    CandidateExperiment,
+    FittedExperiment,
     FreeParameter,
     TrajectoryFit,
     TrajectoryProblem,
@@ -20,7 +20,7 @@ from tests.unit.identification.trajectory.conftest import NOISE
 
 
 @pytest.fixture(scope="module")
-def found(experiment: Experiment) -> TrajectoryFit:
+def found(experiment: FittedExperiment) -> TrajectoryFit:
     """Flow, damping and leak from a step response, in which the leak hardly shows."""
     paths = ("valve.discharge_coefficient", "friction.viscous_damping", "actuator.leak.area")
     return fit(TrajectoryProblem(tuple(FreeParameter(path) for path in paths), (experiment,)))
@@ -30,7 +30,7 @@ def test_the_experiment_that_lets_the_leak_be_seen_is_recommended_before_the_sam
     slow = load_scenario("step-response", ["controller.command=0.05", "run.duration=2 s", "name=slow"])
     shut = load_scenario("step-response", ["controller.command=0", "run.duration=2 s", "name=shut"])
     again = found.scenarios[0]
-    ranked = expected_information(found, [Candidate(one.name, one, NOISE) for one in (again, slow, shut)])
+    ranked = expected_information(found, [CandidateExperiment(one.name, one, NOISE) for one in (again, slow, shut)])
     gains = [one.gain for one in ranked]
     assert gains == sorted(gains, reverse=True)
     assert ranked[-1].label == again.name
@@ -38,25 +38,25 @@ def test_the_experiment_that_lets_the_leak_be_seen_is_recommended_before_the_sam
 
 
 def test_the_same_experiment_again_narrows_everything_by_the_square_root_of_two(
-    found: TrajectoryFit, experiment: Experiment
+    found: TrajectoryFit, experiment: FittedExperiment
 ) -> None:
-    (again,) = expected_information(found, [Candidate("again", experiment.scenario, {})])
+    (again,) = expected_information(found, [CandidateExperiment("again", experiment.scenario, {})])
     for share in again.shrinkage.values():
         assert share == pytest.approx(1.0 / np.sqrt(2.0), rel=0.12)
     assert again.gain == pytest.approx(1.5 * np.log(2.0), rel=0.2)
 
 
-def test_more_noise_and_a_shorter_run_bring_less(found: TrajectoryFit, experiment: Experiment) -> None:
+def test_more_noise_and_a_shorter_run_bring_less(found: TrajectoryFit, experiment: FittedExperiment) -> None:
     loud = {name: 3.0 * noise for name, noise in NOISE.items()}
     short = dataclasses.replace(experiment.scenario, run=dataclasses.replace(experiment.scenario.run, duration=0.1))
     candidates = [
-        Candidate("noisy", experiment.scenario, loud),
-        Candidate("short", short, NOISE),
-        Candidate("whole", experiment.scenario, NOISE),
+        CandidateExperiment("noisy", experiment.scenario, loud),
+        CandidateExperiment("short", short, NOISE),
+        CandidateExperiment("whole", experiment.scenario, NOISE),
     ]
     assert expected_information(found, candidates)[0].label == "whole"
 
 
-def test_a_candidate_with_noise_of_no_channel_is_refused(found: TrajectoryFit, experiment: Experiment) -> None:
+def test_a_candidate_with_noise_of_no_channel_is_refused(found: TrajectoryFit, experiment: FittedExperiment) -> None:
     with pytest.raises(IdentificationError, match="noise must be above 0"):
-        expected_information(found, [Candidate("free", experiment.scenario, {"torque": 1.0})])
+        expected_information(found, [CandidateExperiment("free", experiment.scenario, {"torque": 1.0})])

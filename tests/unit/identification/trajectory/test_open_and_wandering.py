@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.identification.trajectory import (
-    Experiment,
+    FittedExperiment,
     FreeParameter,
     Tolerances,
     TrajectoryFit,
@@ -24,7 +24,7 @@ STEP = ("motion.kind=free", "run.duration=0.35 s")
 LEAK = 0.3e-6
 
 
-def fitted(experiment: Experiment, *sought: FreeParameter) -> TrajectoryFit:
+def fitted(experiment: FittedExperiment, *sought: FreeParameter) -> TrajectoryFit:
     stated = stated_by(load_parameter_set("ppafo2011"), experiment.scenario)
     tolerances = tolerance_parameters(Tolerances(), (experiment,), sought, stated)
     return fit(TrajectoryProblem((*sought, *tolerances), (experiment,)))
@@ -37,7 +37,7 @@ def test_a_leak_beside_the_delay_of_a_valve_is_not_identifiable_and_its_interval
     delay = FreeParameter("valve.delay", start=2.0e-3, low=1.0e-4, high=2.0e-2)
     sought = FreeParameter("valve.discharge_coefficient"), FreeParameter("actuator.leak.area"), delay
 
-    found = fitted(Experiment("step", scenario, recording), *sought)
+    found = fitted(FittedExperiment("step", scenario, recording), *sought)
 
     leak = found.estimate("actuator.leak.area")
     assert leak.verdict == "not identifiable"
@@ -49,7 +49,7 @@ def test_a_leak_beside_the_delay_of_a_valve_is_not_identifiable_and_its_interval
     assert not any(one.is_identified for one in found.estimates)
 
 
-def wandering_by(experiment: Experiment, size: float) -> TrajectoryFit:
+def wandering_by(experiment: FittedExperiment, size: float) -> TrajectoryFit:
     """A fit of a recording whose first pressure has noise with a memory of some hundred samples, of a size [Pa]."""
     recording, random = experiment.recording, np.random.default_rng(11)
     level = random.normal(size=len(recording))
@@ -62,7 +62,7 @@ def wandering_by(experiment: Experiment, size: float) -> TrajectoryFit:
 
 
 def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_this_model_only(
-    experiment: Experiment,
+    experiment: FittedExperiment,
 ) -> None:
     found = wandering_by(experiment, 6000.0)
 
@@ -72,7 +72,7 @@ def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_t
 
 
 def test_noise_that_wanders_by_less_than_the_zero_of_its_sensor_may_be_off_is_the_sensors(
-    experiment: Experiment,
+    experiment: FittedExperiment,
 ) -> None:
     found = wandering_by(experiment, 1000.0)
 
@@ -80,7 +80,7 @@ def test_noise_that_wanders_by_less_than_the_zero_of_its_sensor_may_be_off_is_th
     assert found.estimates[0].is_identified
 
 
-def test_samples_that_stand_out_are_left_out_and_said(experiment: Experiment) -> None:
+def test_samples_that_stand_out_are_left_out_and_said(experiment: FittedExperiment) -> None:
     recording = experiment.recording
     values = recording["pressure_2"].copy()
     values[[40, 200]] += np.array([4.0e4, -4.0e4])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
+from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory.numbers import (
     TIME_OFFSET,
     broken_rule,
@@ -23,11 +23,11 @@ from ppafo.simulation.scenario import Scenario
 INERTIA = FreeParameter("foot_plate.inertia")
 
 
-def problem(experiment: Experiment, *parameters: FreeParameter) -> TrajectoryProblem:
+def problem(experiment: FittedExperiment, *parameters: FreeParameter) -> TrajectoryProblem:
     return TrajectoryProblem(parameters, (experiment,))
 
 
-def test_bounds_and_scale_follow_from_the_declaration(experiment: Experiment) -> None:
+def test_bounds_and_scale_follow_from_the_declaration(experiment: FittedExperiment) -> None:
     inertia, friction, angle = numbers_of(
         problem(experiment, INERTIA, FreeParameter("friction.static_torque"), FreeParameter("motion.angle"))
     )
@@ -49,7 +49,7 @@ def test_bounds_and_scale_follow_from_the_declaration(experiment: Experiment) ->
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_refused(
-    experiment: Experiment, parameter: FreeParameter, message: str
+    experiment: FittedExperiment, parameter: FreeParameter, message: str
 ) -> None:
     with pytest.raises(IdentificationError, match=message):
         problem(experiment, parameter)
@@ -66,25 +66,25 @@ def test_a_parameter_that_makes_no_sense_is_refused(
     ],
 )
 def test_an_experiment_that_makes_no_sense_is_refused(
-    experiment: Experiment, change: dict[str, object], message: str
+    experiment: FittedExperiment, change: dict[str, object], message: str
 ) -> None:
     with pytest.raises(IdentificationError, match=message):
         problem(dataclasses.replace(experiment, **change), INERTIA)  # type: ignore[arg-type]
 
 
-def test_the_same_parameter_twice_is_refused(experiment: Experiment) -> None:
+def test_the_same_parameter_twice_is_refused(experiment: FittedExperiment) -> None:
     with pytest.raises(IdentificationError, match="named twice"):
         problem(experiment, FreeParameter("valve.area"), FreeParameter("valves.proportional.area"))
 
 
-def test_a_problem_without_parameters_is_refused(experiment: Experiment) -> None:
+def test_a_problem_without_parameters_is_refused(experiment: FittedExperiment) -> None:
     with pytest.raises(IdentificationError, match="at least one"):
         problem(experiment)
 
 
 @pytest.mark.parametrize(("start", "then"), [(0.0, 0.002), (0.002, 0.0)])
 def test_a_setting_of_the_valve_that_goes_to_or_from_zero_is_named(
-    experiment: Experiment, start: float, then: float
+    experiment: FittedExperiment, start: float, then: float
 ) -> None:
     path = "valves.proportional.delay"
     prepared = prepare(experiment, {path: start})
@@ -98,19 +98,19 @@ def test_noise_is_estimated_from_a_signal_that_moves() -> None:
     assert noise_of(noisy) == pytest.approx(0.003, rel=0.1)
 
 
-def test_too_few_samples_after_the_start_are_refused(experiment: Experiment) -> None:
+def test_too_few_samples_after_the_start_are_refused(experiment: FittedExperiment) -> None:
     with pytest.raises(IdentificationError, match="at least 10 are needed"):
         fit(problem(dataclasses.replace(experiment, start=0.345), INERTIA))
 
 
-def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: Experiment) -> None:
+def test_samples_on_the_grid_are_taken_from_the_record_as_they_are(experiment: FittedExperiment) -> None:
     prepared = prepare(experiment, {})
     assert not prepared.fraction.any()
     assert prepared.run.record_every == prepared.run.steps_per_sample
     assert len(prepared.time) == len(experiment.recording)
 
 
-def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) -> None:
+def test_samples_off_the_grid_lie_between_two_records(experiment: FittedExperiment) -> None:
     recording = experiment.recording.resample(np.linspace(0.0, 0.35, 223))
     prepared = prepare(dataclasses.replace(experiment, recording=recording), {})
     assert prepared.fraction.any()
@@ -118,7 +118,7 @@ def test_samples_off_the_grid_lie_between_two_records(experiment: Experiment) ->
     assert at == pytest.approx(recording.time, abs=1e-9)
 
 
-def test_the_initial_state_is_that_in_which_the_samples_up_to_the_start_end(experiment: Experiment) -> None:
+def test_the_initial_state_is_that_in_which_the_samples_up_to_the_start_end(experiment: FittedExperiment) -> None:
     clean = simulate(experiment.scenario).recording
     shifted = dataclasses.replace(clean, time=clean.time - 0.01)
     prepared = prepare(dataclasses.replace(experiment, recording=shifted, initial_state="recording"), {})
@@ -178,7 +178,7 @@ def test_dynamic_friction_above_static_friction_is_named(step: Scenario) -> None
     assert "friction.dynamic_torque" in broken_rule(above.device)
 
 
-def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Experiment) -> None:
+def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: FittedExperiment) -> None:
     values = np.array(experiment.recording["pressure_1"])
     random = np.random.default_rng(0)
     level = float(np.quantile(values, 0.1))
@@ -190,7 +190,7 @@ def test_a_clipped_channel_is_called_so_and_not_without_noise(experiment: Experi
 
 
 def test_a_channel_that_is_at_its_limit_from_the_third_sample_on_is_not_one_without_noise(
-    experiment: Experiment,
+    experiment: FittedExperiment,
 ) -> None:
     values = np.array(experiment.recording["pressure_1"])
     values[2:] = values.max() + 1e5

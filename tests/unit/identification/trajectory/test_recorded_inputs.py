@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError, IdentificationError
-from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
+from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory.problem import numbers_of
 from ppafo.identification.trajectory.runs import prepare, signals_at, signals_of
 from ppafo.running import simulate
@@ -22,7 +22,7 @@ OFFSET = FreeParameter("recording.time_offset", recordings=("step",))
 LATE = 3.4e-3
 
 
-def with_input(experiment: Experiment, name: str, values: np.ndarray, unit: str) -> Experiment:
+def with_input(experiment: FittedExperiment, name: str, values: np.ndarray, unit: str) -> FittedExperiment:
     recording = experiment.recording.with_channel(name, values, unit)
     return dataclasses.replace(experiment, recording=recording, inputs=(*experiment.inputs, name))
 
@@ -37,7 +37,7 @@ def controlled() -> tuple[Scenario, Recording]:
 
 
 @pytest.fixture(scope="module")
-def late(experiment: Experiment) -> Experiment:
+def late(experiment: FittedExperiment) -> FittedExperiment:
     """The step response, recorded 3.4 ms later than the run."""
     recording = dataclasses.replace(experiment.recording, time=experiment.recording.time + LATE)
     return dataclasses.replace(experiment, recording=recording)
@@ -46,7 +46,7 @@ def late(experiment: Experiment) -> Experiment:
 def test_a_recorded_command_gives_the_run_that_the_controller_made(controlled: tuple[Scenario, Recording]) -> None:
     scenario, recording = controlled
     assert np.count_nonzero(np.diff(recording["command"])) > 100
-    followed = Experiment("task", scenario, recording, noise=NOISE, inputs=("command",))
+    followed = FittedExperiment("task", scenario, recording, noise=NOISE, inputs=("command",))
     numbers = numbers_of(TrajectoryProblem((FreeParameter("valve.discharge_coefficient"),), (followed,)))
     (signals,) = signals_of([prepare(followed, {})], numbers, np.array([[numbers[0].free.start]]))
     assert signals["angle"][:, 0] == pytest.approx(recording["angle"], abs=1e-5)
@@ -55,7 +55,7 @@ def test_a_recorded_command_gives_the_run_that_the_controller_made(controlled: t
 
 def test_forty_runs_follow_the_same_command_as_one(controlled: tuple[Scenario, Recording]) -> None:
     scenario, recording = controlled
-    followed = Experiment("task", scenario, recording, noise=NOISE, inputs=("command",))
+    followed = FittedExperiment("task", scenario, recording, noise=NOISE, inputs=("command",))
     numbers, prepared = numbers_of(TrajectoryProblem((FLOW,), (followed,))), [prepare(followed, {})]
     points = np.linspace(0.10, 0.12, 40)[None, :]
     (many,) = signals_of(prepared, numbers, points)
@@ -64,7 +64,7 @@ def test_forty_runs_follow_the_same_command_as_one(controlled: tuple[Scenario, R
 
 
 def test_a_recorded_supply_takes_the_place_of_both_regulators(
-    experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
+    experiment: FittedExperiment, step: Scenario, recorded: Callable[..., Recording]
 ) -> None:
     low = load_scenario(
         "step-response",
@@ -85,7 +85,7 @@ def test_a_recorded_supply_takes_the_place_of_both_regulators(
     assert abs(blind.values["valves.proportional.discharge_coefficient"] / 0.113 - 1.0) > 0.02
 
 
-def test_a_supply_that_changes_is_followed_millisecond_by_millisecond(experiment: Experiment) -> None:
+def test_a_supply_that_changes_is_followed_millisecond_by_millisecond(experiment: FittedExperiment) -> None:
     count = len(experiment.recording)
     supply = np.linspace(4.0e5, 4.4e5, count)
     inputs = prepare(with_input(experiment, "supply_pressure", supply, "Pa"), {}).inputs
@@ -107,7 +107,7 @@ def test_along_a_recorded_angle_a_wrong_inertia_does_not_matter(
         device=dataclasses.replace(step.device, foot_plate=dataclasses.replace(step.device.foot_plate, inertia=0.02)),
     )
     recording = recorded(step)
-    free = Experiment("step", heavy, recording, noise=NOISE)
+    free = FittedExperiment("step", heavy, recording, noise=NOISE)
     led = dataclasses.replace(free, channels=("pressure_1", "pressure_2"), inputs=("angle",))
     path = "valves.proportional.discharge_coefficient"
     assert fit(TrajectoryProblem((FLOW,), (led,))).values[path] == pytest.approx(0.113, rel=5e-3)
@@ -116,7 +116,9 @@ def test_along_a_recorded_angle_a_wrong_inertia_does_not_matter(
         TrajectoryProblem((FLOW,), (dataclasses.replace(free, inputs=("angle",)),))
 
 
-def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_are_not(experiment: Experiment) -> None:
+def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_are_not(
+    experiment: FittedExperiment,
+) -> None:
     other = dataclasses.replace(experiment, label="again")
     with pytest.raises(IdentificationError, match=r"experiment 'step'.*experiment 'again'.* are the same recording"):
         TrajectoryProblem((FLOW,), (experiment, other))
@@ -128,7 +130,7 @@ def test_the_same_recording_in_two_experiments_is_refused_and_two_parts_of_it_ar
     assert len(TrajectoryProblem((FLOW,), (early, late)).experiments) == 2
 
 
-def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: Experiment) -> None:
+def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: FittedExperiment) -> None:
     followed = with_input(experiment, "supply_pressure", np.full(len(experiment.recording), 4.0e5), "Pa")
     with pytest.raises(IdentificationError, match="follows the recorded 'supply_pressure'"):
         TrajectoryProblem((FreeParameter("supply.pressure"),), (followed,))
@@ -142,14 +144,14 @@ def test_a_supply_that_is_followed_cannot_be_fitted_too(experiment: Experiment) 
     ],
 )
 def test_an_input_that_cannot_be_is_refused(
-    experiment: Experiment, name: str, values: float, unit: str, message: str
+    experiment: FittedExperiment, name: str, values: float, unit: str, message: str
 ) -> None:
     followed = with_input(experiment, name, np.full(len(experiment.recording), values), unit)
     with pytest.raises(DataError, match=message):
         TrajectoryProblem((INERTIA,), (followed,))
 
 
-def test_a_gap_in_an_input_is_refused(experiment: Experiment) -> None:
+def test_a_gap_in_an_input_is_refused(experiment: FittedExperiment) -> None:
     whole = with_input(experiment, "command", np.ones(len(experiment.recording)), "-")
     time = whole.recording.time.copy()
     time[100:] += 0.2
@@ -158,7 +160,7 @@ def test_a_gap_in_an_input_is_refused(experiment: Experiment) -> None:
         TrajectoryProblem((INERTIA,), (broken,))
 
 
-def test_a_late_trigger_is_found_and_leaves_the_other_numbers_alone(late: Experiment) -> None:
+def test_a_late_trigger_is_found_and_leaves_the_other_numbers_alone(late: FittedExperiment) -> None:
     found = fit(TrajectoryProblem((INERTIA, FLOW, OFFSET), (late,)))
     offset = found.estimate("recording.time_offset of step")
     assert offset.half_width < 2e-4
@@ -176,13 +178,13 @@ def test_a_long_recording_whose_samples_are_moved_does_not_fill_the_memory(step:
         name: Channel(np.full(time.size, value), unit)
         for name, value, unit in (("angle", 0.5, "rad"), ("pressure_1", 2e5, "Pa"), ("pressure_2", 2e5, "Pa"))
     }
-    slow = Experiment("slow", step, Recording("slow", time, flat), noise=NOISE)
+    slow = FittedExperiment("slow", step, Recording("slow", time, flat), noise=NOISE)
     run = prepare(slow, {}, reach=0.02).run
     assert run.step_count // run.record_every <= 200_000
     assert run.steps_per_sample % run.record_every == 0
 
 
-def test_the_zero_of_the_sensor_of_a_followed_supply_moves_what_the_run_follows(experiment: Experiment) -> None:
+def test_the_zero_of_the_sensor_of_a_followed_supply_moves_what_the_run_follows(experiment: FittedExperiment) -> None:
     supply = np.linspace(4.0e5, 4.4e5, len(experiment.recording))
     followed = prepare(with_input(experiment, "supply_pressure", supply, "Pa"), {})
     shifted = prepare(with_input(experiment, "supply_pressure", supply - 2.0e3, "Pa"), {})
@@ -195,7 +197,7 @@ def test_the_zero_of_the_sensor_of_a_followed_supply_moves_what_the_run_follows(
     assert np.abs(moved["pressure_1"][:, 0] - moved["pressure_1"][:, 1]).max() > 1.0e3
 
 
-def test_the_error_of_coarse_steps_is_shared_by_all_samples(experiment: Experiment, step: Scenario) -> None:
+def test_the_error_of_coarse_steps_is_shared_by_all_samples(experiment: FittedExperiment, step: Scenario) -> None:
     clean = simulate(dataclasses.replace(step, run=dataclasses.replace(step.run, step=2e-5))).recording
     scores = []
     for seed in (1, 2, 3):

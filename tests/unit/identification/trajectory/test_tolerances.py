@@ -10,7 +10,7 @@ import pytest
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.errors import IdentificationError
 from ppafo.identification.tolerances import BenchSection, Tolerances, tolerances_of
-from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryProblem, fit
+from ppafo.identification.trajectory import FittedExperiment, FreeParameter, TrajectoryProblem, fit
 from ppafo.identification.trajectory import runs as trajectory_runs
 from ppafo.identification.trajectory.numbers import number_at, with_numbers
 from ppafo.identification.trajectory.runs import prepare, signals_at
@@ -44,7 +44,7 @@ def test_a_tolerance_that_is_none_is_refused_in_one_line(key: str, text: str, wo
         tolerances_of(BenchSection(**{key: text}), "file")
 
 
-def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor(experiment: Experiment) -> None:
+def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor(experiment: FittedExperiment) -> None:
     loaded = replace(experiment, label="loaded", scenario=with_numbers(experiment.scenario, {LOAD: 2.0}))
     found = tolerance_parameters(STATED, (experiment, loaded), ())
     names = [item.name for item in found]
@@ -64,7 +64,7 @@ def test_supplies_are_those_of_a_recording_and_zeros_and_gains_those_of_a_sensor
     assert (load.start, load.deviation) == pytest.approx((2.0, 0.04 / math.sqrt(3.0)))
 
 
-def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(experiment: Experiment) -> None:
+def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(experiment: FittedExperiment) -> None:
     found = tolerance_parameters(Tolerances(), (experiment,), (), {"actuator.torque_constant": 1.0e-6})
     deviations = {item.path: item.deviation for item in found}
     assert deviations["actuator.torque_constant"] == pytest.approx(1.0e-6 / 1.96, rel=1e-3)
@@ -76,7 +76,7 @@ def test_a_number_of_the_set_is_held_with_what_the_set_states_or_else_a_default(
 
 
 def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_says_nothing_of_it(
-    experiment: Experiment,
+    experiment: FittedExperiment,
 ) -> None:
     found, share = (one for one in tolerance_parameters(Tolerances(), (experiment,), ()) if "stribeck" in one.path)
     assert found.is_logarithm
@@ -96,14 +96,14 @@ def test_friction_at_rest_may_last_in_a_motion_up_to_a_velocity_where_the_set_sa
     assert not any("stribeck" in one.path for one in exact)
 
 
-def test_a_start_read_from_noisy_samples_is_known_to_their_noise(experiment: Experiment) -> None:
+def test_a_start_read_from_noisy_samples_is_known_to_their_noise(experiment: FittedExperiment) -> None:
     inside = replace(experiment, start=0.05, initial_state="recording")
     deviations = {item.path: item.deviation for item in tolerance_parameters(Tolerances(), (inside,), ())}
     assert deviations["motion.angle"] == pytest.approx(math.radians(math.hypot(0.05, 0.1)), rel=0.1)
     assert deviations["initial.pressure_1"] == pytest.approx(500.0, rel=0.2)
 
 
-def test_a_followed_supply_has_the_zero_of_its_sensor(experiment: Experiment) -> None:
+def test_a_followed_supply_has_the_zero_of_its_sensor(experiment: FittedExperiment) -> None:
     count = len(experiment.recording)
     recording = experiment.recording.with_channel("supply_pressure", np.full(count, 4.8e5), "Pa")
     followed = replace(experiment, recording=recording, inputs=("supply_pressure",))
@@ -112,21 +112,21 @@ def test_a_followed_supply_has_the_zero_of_its_sensor(experiment: Experiment) ->
     assert "supply.pressure" not in paths
 
 
-def test_a_sensor_that_is_mounted_anew_has_a_zero_in_each_recording(experiment: Experiment) -> None:
+def test_a_sensor_that_is_mounted_anew_has_a_zero_in_each_recording(experiment: FittedExperiment) -> None:
     other = replace(experiment, label="other")
     found = tolerance_parameters(Tolerances(gain=0.003, each_recording=("gain",)), (experiment, other), ())
     gains = [item for item in found if item.path.startswith("recording.gain")]
     assert [item.recordings for item in gains] == [("step",), ("other",)] * 3
 
 
-def test_what_is_fitted_anyway_gets_no_tolerance(experiment: Experiment) -> None:
+def test_what_is_fitted_anyway_gets_no_tolerance(experiment: FittedExperiment) -> None:
     fitted = (FreeParameter("supply.pressure"), FreeParameter("valve.discharge_coefficient"))
     paths = [item.path for item in tolerance_parameters(STATED, (experiment,), fitted)]
     assert not {"supply.pressure", "valves.proportional.discharge_coefficient"} & set(paths)
 
 
 def test_zeros_and_gains_change_what_the_sensor_says_and_need_no_run_of_their_own(
-    experiment: Experiment, monkeypatch: pytest.MonkeyPatch
+    experiment: FittedExperiment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     prepared = prepare(experiment, {"foot_plate.inertia": 0.008})
     inertia = np.array([0.008, 0.009, 0.008, 0.009])
@@ -163,11 +163,11 @@ def test_errors_of_the_bench_hide_no_number_where_they_are_tolerances(recorded: 
         }.items()
     }
 
-    def on_bench(scenario: Scenario, off: float, seed: int) -> Experiment:
+    def on_bench(scenario: Scenario, off: float, seed: int) -> FittedExperiment:
         wrong = {path: number_at(scenario, path) + off for path in SUPPLIES}
         made = recorded(with_numbers(scenario, wrong), seed)
         channels = {name: Channel(made[name] + ZEROS[name], made.unit(name)) for name in made.names}
-        return Experiment(scenario.name, scenario, replace(made, channels=channels))
+        return FittedExperiment(scenario.name, scenario, replace(made, channels=channels))
 
     experiments = (on_bench(planned["there"], 5000.0, 1), on_bench(planned["low"], -5500.0, 2))
     free = (FreeParameter("foot_plate.inertia", start=0.009), FreeParameter("friction.viscous_damping"))

@@ -7,21 +7,21 @@ import pytest
 
 from ppafo.errors import ParameterError
 from ppafo.parameters import apply_overrides, build_device, list_sets, load_parameter_set
-from ppafo.parameters.audit import Finding, audit
+from ppafo.parameters.audit import AuditFinding, audit
 
 BASE = load_parameter_set("ppafo2011")
 REPORTED_FLOW = "reported.valves.proportional.mass_flow"
 
 
-def findings(*overrides: str) -> dict[str, Finding]:
+def findings(*overrides: str) -> dict[str, AuditFinding]:
     return {finding.id: finding for finding in audit(apply_overrides(BASE, overrides))}
 
 
-def _of_set(name: str, *overrides: str) -> dict[str, Finding]:
+def _of_set(name: str, *overrides: str) -> dict[str, AuditFinding]:
     return {finding.id: finding for finding in audit(apply_overrides(load_parameter_set(name), overrides))}
 
 
-def side(finding: Finding, label: str) -> float:
+def side(finding: AuditFinding, label: str) -> float:
     return next(side.value for side in finding.sides if side.label == label)
 
 
@@ -239,7 +239,7 @@ def test_a_torque_of_another_actuator_says_so() -> None:
     assert "Of another actuator: the original one was a Parker" in findings()["rated-torque"].paragraph
 
 
-def with_key(path: str, key: str) -> list[Finding]:
+def with_key(path: str, key: str) -> list[AuditFinding]:
     numbers = {**BASE.numbers, path: BASE.numbers[path].model_copy(update={"key": key})}
     return [item for item in audit(replace(BASE, numbers=numbers)) if item.id.endswith("-against-statement")]
 

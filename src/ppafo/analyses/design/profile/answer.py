@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Margins:
+class SizingMargins:
     """Reserves of a sized valve to its limits, as fractions [-].
 
     ``error``: how much smaller the RMS error is than its limit. ``torque``: how much more torque the pressure can hold
@@ -82,7 +82,7 @@ class SizedValve:
     gas_in_all: float
     bottle: Part | None
     mass: float | None
-    margins: Margins | None
+    margins: SizingMargins | None
     limit: Limit
     notes: Notes
     curve: tuple[Floats, Floats, Floats]
@@ -196,20 +196,6 @@ _MAXIMUM_OF_LIMIT = 4.0
 _DOTTED = {"marker": ".", "markersize": 4}
 
 
-def torque_panel(sizing: Sizing) -> Panel:
-    """Return the prescribed torque over time, and the suggestion's."""
-    times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
-    prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
-    profile = sizing.problem.profile.at(times)
-    marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
-    recording, choice = sizing.recording, sizing.choice
-    if recording is not None and choice is not None:
-        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
-        colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
-        marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
-    return Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))
-
-
 def pressure_panels(sizing: Sizing) -> list[Panel]:
     """Return error and gas over supply pressure, with a ring at the pressure that was chosen for each valve."""
     limit = sizing.problem.largest_error
@@ -288,8 +274,8 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
         said=(*([problem.description] if problem.description else []), _wanted(sizing)),
         parts=(
             *_tables(sizing),
-            finding.Part(remarks=_remarks(sizing)),
-            finding.Part(
+            finding.Section(remarks=_remarks(sizing)),
+            finding.Section(
                 "Error and gas over pressure",
                 panels=partial(pressure_panels, sizing),
                 name="profile",
@@ -298,7 +284,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 size=(4.5, 3.3),
                 is_detail=True,
             ),
-            finding.Part(
+            finding.Section(
                 "The torque",
                 panels=partial(_torque_panels, sizing),
                 name="torque",
@@ -307,7 +293,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 is_detail=True,
             ),
             *parts_to_check(sizing.doubtful),
-            finding.Part("How to read it", said=(*_READING, *_method(problem)), is_detail=True),
+            finding.Section("How to read it", said=(*_READING, *_method(problem)), is_detail=True),
             part_titles([sized.valve for sized in sizing.valves]),
         ),
         found=sizing,
@@ -357,10 +343,19 @@ def _method(problem: SizingProblem) -> tuple[str, ...]:
 
 
 def _torque_panels(sizing: Sizing) -> list[Panel]:
-    return [torque_panel(sizing)]
+    times = np.linspace(0.0, sizing.problem.scenario.run.duration, 3001)
+    prescribed = {"linestyle": REFERENCE.line, "linewidth": 1.2}
+    profile = sizing.problem.profile.at(times)
+    marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
+    recording, choice = sizing.recording, sizing.choice
+    if recording is not None and choice is not None:
+        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
+        colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
+        marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
+    return [Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
 
 
-def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
+def _tables(sizing: Sizing) -> tuple[finding.Section, finding.Section]:
     """Return a row for each valve, and the margins and gains of those that work."""
     rows: list[tuple[Cell, ...]] = []
     margins: list[tuple[Cell, ...]] = []
@@ -387,8 +382,8 @@ def _tables(sizing: Sizing) -> tuple[finding.Part, finding.Part]:
     head: list[str | tuple[str, Kind]] = ["valve", *((f"{name} margin", fraction) for name in _MARGINS), "gains"]
     chosen = () if sizing.suggested is None else (sizing.suggested,)
     return (
-        finding.Part("Valves", columns_of(_HEAD, rows), marked=chosen),
-        finding.Part("Margins" if margins else "", columns_of(head, margins), marked=marked),
+        finding.Section("Valves", columns_of(_HEAD, rows), marked=chosen),
+        finding.Section("SizingMargins" if margins else "", columns_of(head, margins), marked=marked),
     )
 
 

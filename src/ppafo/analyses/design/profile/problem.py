@@ -30,7 +30,7 @@ _MOMENT = 1.0e-5
 """Time [s] in which a table goes from the end of a repetition to the beginning of the next where these differ."""
 
 
-class ProfileTable(StrictTable):
+class ProfileSection(StrictTable):
     """The prescribed torque over one repetition: a recording, or times and torques."""
 
     recording: Annotated[
@@ -43,7 +43,7 @@ class ProfileTable(StrictTable):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TorqueProfile:
+class RequiredTorque:
     """Period of a torque profile: times [s] from 0 and torques [N m] as given, and the knots of its table.
 
     ``kind`` says where it comes from: ``measured``, ``simulated``, ``synthetic`` or ``typed``.
@@ -87,7 +87,7 @@ class TorqueProfile:
         )
 
 
-def read_profile(table: ProfileTable, folder: Path, file: str) -> TorqueProfile:
+def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorque:
     """Return the profile of a design file; a recording's path begins in ``folder``."""
     where = f"{file}: profile"
     is_typed = bool(table.time or table.torque)
@@ -112,7 +112,7 @@ def read_profile(table: ProfileTable, folder: Path, file: str) -> TorqueProfile:
     samples = time[:-1], torque[:-1]
     if torque[-1] != torque[0]:
         samples = np.append(time[:-1], time[-1] - min(_MOMENT, 0.5 * (time[-1] - time[-2]))), torque
-    return TorqueProfile(time, torque, kind, *choose_knots(*samples))
+    return RequiredTorque(time, torque, kind, *choose_knots(*samples))
 
 
 def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
@@ -131,7 +131,7 @@ def choose_knots(time: Floats, torque: Floats) -> tuple[Floats, Floats]:
     return time[chosen], torque[chosen]
 
 
-def _profile_of_table(table: ProfileTable, where: str) -> tuple[Floats, Floats]:
+def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats]:
     if len(table.time) != len(table.torque) or len(table.time) < 2:
         raise StudyError(
             f"{where}: time has {len(table.time)} and torque {len(table.torque)} entries; give as many of each, "
@@ -201,7 +201,7 @@ class SizingFile(StrictTable):
     catalogue: Annotated[str, Field(description="catalogue of parts: a name, or a path relative to this file")] = (
         DEFAULT
     )
-    profile: ProfileTable
+    profile: ProfileSection
     use: UseTable
     limits: LimitsTable
     parts: SizingPartsTable
@@ -233,7 +233,7 @@ class SizingProblem:
     description: str
     file: str
     scenario: Scenario
-    profile: TorqueProfile
+    profile: RequiredTorque
     simulated: int
     repetitions: float
     reserve: float
@@ -315,7 +315,7 @@ def sizing_problem(document: SizingFile, file: str, folder: Path) -> SizingProbl
     )
 
 
-def _scenario(document: SizingFile, profile: TorqueProfile, folder: Path, file: str) -> Scenario:
+def _scenario(document: SizingFile, profile: RequiredTorque, folder: Path, file: str) -> Scenario:
     """Return the scenario with the profile as its reference, for a whole number of samples over all repetitions."""
     name = beside(document.scenario, folder)
     plain = load_scenario(name, document.overrides)

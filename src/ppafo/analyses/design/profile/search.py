@@ -54,7 +54,7 @@ OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trial:
+class ProfileTrials:
     """RMS error [N m], gas per repetition [kg] and number of the set of gains of trials; all (trials,).
 
     Error and gas are nan where a run failed.
@@ -64,9 +64,9 @@ class Trial:
     gas: Floats
     gains: NDArray[np.intp]
 
-    def at(self, members: NDArray[np.intp]) -> "Trial":
+    def at(self, members: NDArray[np.intp]) -> "ProfileTrials":
         """Return some of the trials."""
-        return Trial(self.error[members], self.gas[members], self.gains[members])
+        return ProfileTrials(self.error[members], self.gas[members], self.gains[members])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +77,7 @@ class Pressures:
     """
 
     pressure: Floats
-    trial: Trial
+    trial: ProfileTrials
     works: NDArray[np.bool_]
 
     @property
@@ -109,7 +109,7 @@ class Trials:
         self.seeds = seeds_of_noise([problem.scenario], (), 0, STREAMS, _SEED)
         self._threads = threads
 
-    def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
+    def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> ProfileTrials:
         """Return what came of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
         columns = self.columns(valve, pressure, gains, opening)
         outcome = run_trials(self.problem.scenario, columns, (ERROR, GAS), self.seeds, self._threads)
@@ -117,9 +117,9 @@ class Trials:
         for reason in outcome.reasons:
             self.failures[reason] = self.failures.get(reason, 0) + 1
         error, gas = outcome.metrics[ERROR].max(axis=0), outcome.metrics[GAS].mean(axis=0)
-        return Trial(error, gas / self.problem.simulated, gains)
+        return ProfileTrials(error, gas / self.problem.simulated, gains)
 
-    def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
+    def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> ProfileTrials:
         """Return for each pressure the trial with the best set of gains.
 
         Of those that keep the error limit the one that uses least gas; where none does, the one with the minimum error.
@@ -185,7 +185,7 @@ def try_pressures(trials: Trials, valve: Part) -> Pressures:
         finer = _pressures(trials, valve, np.linspace(lower, upper, GRID)[1:-1])
         both = (tried, finer)
         pressure = np.concatenate([part.pressure for part in both])
-        trial = Trial(
+        trial = ProfileTrials(
             np.concatenate([part.trial.error for part in both]),
             np.concatenate([part.trial.gas for part in both]),
             np.concatenate([part.trial.gains for part in both]),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ppafo.analyses.design.profile.answer import Margins, Notes, SizedValve, Sizing
+from ppafo.analyses.design.profile.answer import Notes, SizedValve, Sizing, SizingMargins
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import Trials, ceiling, flow_margin, highest_pressure, limit_of, try_pressures
 from ppafo.analyses.endurance.discharge import TIME_IS_UP
@@ -86,7 +86,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     used = gas * problem.repetitions
     margins = None
     if works:
-        margins = Margins(
+        margins = SizingMargins(
             error=1.0 - error / problem.largest_error,
             torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
             flow=flow_margin(trials, valve, pressure),
@@ -129,7 +129,7 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
             for path, entry in scaled_entries(part, paper.entries).items()
             if entry != paper.entries.get(path)
         ]
-        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} Pa_a"])
+        full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} SI"])
         try:
             ended = follow_bottle(full, draw_of_numbers(gas, period, None), schedule).discharge.ending.kind
         except ParameterError:

@@ -10,7 +10,7 @@ from ppafo.analyses.design.wearer.wish import (
     TOES,
     TORQUE,
     WALKS,
-    Device,
+    SizedDevice,
     WearerSizing,
     Wish,
 )
@@ -36,8 +36,9 @@ _HEAD = (
 _CAPTION = "The walk of the suggestion on its bottle for the requested {wished}; the bottle lasts {lasts}."
 _READING = (
     "Every pair of valve and actuator of the catalogue walks a few strides at the pressure. Those whose mean stride "
-    "reaches the torque with the toes above the ground walk on bottles, lightest first, until one lasts; that walk is "
-    "shown. Dead volumes, friction and sensors are the walk's; dorsiflexion has nine tenths of the gauge pressure.",
+    "reaches the torque (95 % of it at least) with the toes above the ground walk on bottles, lightest first, until "
+    "one lasts; that walk is shown. Dead volumes, friction and sensors are the walk's; dorsiflexion has nine tenths of "
+    "the gauge pressure.",
     "Power of the valve is what its coils, or its spool in proportion to the stroke, take over the walk; drivers lose "
     "nothing. A shut-off valve is open as long as the device helps.",
 )
@@ -51,7 +52,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         for tried in sorted(sizing.tried, key=lambda tried: -tried.torque)
     ]
     remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
-    table = finding.Part(
+    table = finding.Section(
         "What was walked with", columns_of(_HEAD, rows), remarks=remarks, left=2, is_detail=device is not None
     )
     stature = f"{wish.height:.4g} m"
@@ -63,7 +64,7 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
-        (finding.Part(remarks=("No device in the catalogue can do this. Alternatives:", *sizing.instead)), table)
+        (finding.Section(remarks=("No device in the catalogue can do this. Alternatives:", *sizing.instead)), table)
         if device is None
         else (*_sections(wish, device), table, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
     )
@@ -72,13 +73,13 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
         kicker="From a wearer to a device",
         title="The device",
         said=said,
-        parts=(*sections, finding.Part("How to read it", said=_READING, is_detail=True)),
+        parts=(*sections, finding.Section("How to read it", said=_READING, is_detail=True)),
         found=sizing,
         passed=device is not None,
     )
 
 
-def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
+def _sections(wish: Wish, device: SizedDevice) -> tuple[finding.Section, ...]:
     walked = device.walked
     share = device.torque / wish.torque
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
@@ -106,7 +107,7 @@ def _sections(wish: Wish, device: Device) -> tuple[finding.Part, ...]:
     caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
     return (
-        finding.Part("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
-        finding.Part("What it weighs", facts(masses)),
-        finding.Part("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
+        finding.Section("The walk on its bottle", facts(rows), remarks=remarks, code=device.command),
+        finding.Section("What it weighs", facts(masses)),
+        finding.Section("The bottle over the walk", name="bottle", caption=caption, draw=draw, is_detail=True),
     )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ppafo.analyses.design.wearer.shelf import Shelf
-from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
+from ppafo.analyses.design.wearer.wish import WALKS, WalkedDevice, Wish
 from ppafo.errors import ScenarioError
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report
@@ -14,8 +14,6 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.result import WalkResult
 from ppafo.walking.walk import walk
 
-_KEPT = 0.9
-"""Torque in the walk on the bottle over the wanted one: that at which a walk on a bottle ends."""
 _ALLOWANCE = 1.15
 """Gas that a pair may need over what another got out of a bottle, to be tried on it as well."""
 
@@ -23,12 +21,12 @@ _ALLOWANCE = 1.15
 class OnBottle(NamedTuple):
     """A pair of parts with a bottle, and its walk on it."""
 
-    pair: Tried
+    pair: WalkedDevice
     bottle: Part
     walked: WalkResult
 
 
-def lightest_on_bottle(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Report) -> OnBottle | None:
+def lightest_on_bottle(wish: Wish, tried: Sequence[WalkedDevice], shelf: Shelf, report: Report) -> OnBottle | None:
     """Return the lightest pair and bottle whose walk does what is wanted, with that walk; None if none does.
 
     No pair that might last on a bottle is left out, so that an offer is found again when its values are requested.
@@ -50,7 +48,7 @@ def lightest_on_bottle(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report:
     return None
 
 
-def walk_on_bottle(pair: Tried, bottle: str, seconds: float) -> WalkResult | None:
+def walk_on_bottle(pair: WalkedDevice, bottle: str, seconds: float) -> WalkResult | None:
     """Walk for a time [s], or until the bottle ends it; None where it cannot feed the device at all."""
     try:
         return walk(load_walk(WALKS[pair.valve.kind], pair.overrides, bottle=bottle), minutes=seconds / 60.0)
@@ -65,7 +63,7 @@ def walking_time(walked: WalkResult | None) -> float:
     return math.inf if walked.supply.ending.kind == WALKED else float(walked.recording.time[-1])
 
 
-def lasting_flow(pair: Tried, lasted: float, seconds: float) -> float:
+def lasting_flow(pair: WalkedDevice, lasted: float, seconds: float) -> float:
     """Return the flow [kg/s] above which no pair lasts on a bottle, with some allowance.
 
     It follows from one that ``lasted`` less than ``seconds`` [s] there.
@@ -74,8 +72,8 @@ def lasting_flow(pair: Tried, lasted: float, seconds: float) -> float:
 
 
 def keeps(walked: WalkResult, wish: Wish) -> bool:
-    """Return whether the mean stride of a walk on a bottle has most of the torque, and the clearance."""
+    """Return whether the mean stride of a walk on a bottle reaches the torque, and has the clearance."""
     if not walked.averages or walked.tracking:
         return False
-    torque = walked.averages["torque"].mean.max()
-    return bool(torque >= _KEPT * wish.torque and walked.metrics["lowest_toes"].value >= wish.clearance)
+    is_reached = wish.is_reached_by(float(walked.averages["torque"].mean.max()))
+    return bool(is_reached and walked.metrics["lowest_toes"].value >= wish.clearance)

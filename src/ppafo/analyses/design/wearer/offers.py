@@ -8,7 +8,7 @@ from typing import NamedTuple
 from ppafo.analyses.design.wearer.bottle import keeps, lasting_flow, walk_on_bottle, walking_time
 from ppafo.analyses.design.wearer.shelf import Shelf
 from ppafo.analyses.design.wearer.strides import few_strides
-from ppafo.analyses.design.wearer.wish import SHORTEST, Offer, Tried, Wish, shown_clearance
+from ppafo.analyses.design.wearer.wish import SHORTEST, Offer, WalkedDevice, Wish, shown_clearance
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import rated_pressure
@@ -34,10 +34,10 @@ class _Candidate(NamedTuple):
     """A pair of parts as it walked a few strides, and the wish with the pressure of that walk."""
 
     wish: Wish
-    pair: Tried
+    pair: WalkedDevice
 
 
-def offers_instead(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Report) -> Iterator[Offer]:
+def offers_instead(wish: Wish, tried: Sequence[WalkedDevice], shelf: Shelf, report: Report) -> Iterator[Offer]:
     """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
     bottle = max(shelf.bottles, key=lambda bottle: bottle.values["content"])
     candidates = [_Candidate(wish, pair) for pair in tried]
@@ -45,11 +45,11 @@ def offers_instead(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Rep
     able = sorted((at for at in candidates if at.pair.has(wish)), key=lambda at: at.pair.flow)
     # A device whose toes drag is no offer.
     weak = sorted(
-        (at for at in candidates if at.pair.toes >= wish.clearance and at.pair.torque < wish.torque),
+        (at for at in candidates if at.pair.toes >= wish.clearance and not wish.is_reached_by(at.pair.torque)),
         key=lambda at: -at.pair.torque,
     )
     low = sorted(
-        (at for at in candidates if at.pair.torque >= wish.torque and 0.0 <= at.pair.toes < wish.clearance),
+        (at for at in candidates if wish.is_reached_by(at.pair.torque) and 0.0 <= at.pair.toes < wish.clearance),
         key=lambda at: -at.pair.toes,
     )
     report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
@@ -66,7 +66,7 @@ def offers_instead(wish: Wish, tried: Sequence[Tried], shelf: Shelf, report: Rep
         yield from [] if lasting is None else [lasting]
 
 
-def _at_less_pressure(wish: Wish, tried: Sequence[Tried], report: Report) -> list[_Candidate]:
+def _at_less_pressure(wish: Wish, tried: Sequence[WalkedDevice], report: Report) -> list[_Candidate]:
     """Return the pairs that have the most torque for their gas, at pressures below the wanted one."""
     thrifty = sorted((pair for pair in tried if pair.flow > 0.0), key=lambda pair: -pair.torque / pair.flow)
     # Actuators of the same numbers walk alike: one of them is enough.
@@ -81,9 +81,9 @@ def _at_less_pressure(wish: Wish, tried: Sequence[Tried], report: Report) -> lis
     return candidates
 
 
-def _at_more_pressure(wish: Wish, tried: Sequence[Tried]) -> Iterator[_Candidate]:
+def _at_more_pressure(wish: Wish, tried: Sequence[WalkedDevice]) -> Iterator[_Candidate]:
     """Yield what does it at more pressure, the lowest first: of each kind of valve the strongest and the highest."""
-    best: list[Tried] = []
+    best: list[WalkedDevice] = []
     for kind in dict.fromkeys(pair.valve.kind for pair in tried):
         of_kind = [pair for pair in tried if pair.valve.kind == kind]
         strongest, highest = max(of_kind, key=lambda pair: pair.torque), max(of_kind, key=lambda pair: pair.toes)
@@ -124,7 +124,7 @@ def _lasting(wish: Wish, weak: Sequence[_Candidate], bottle: Part, shelf: Shelf)
 def _offered(candidate: _Candidate, bottle: Part, shelf: Shelf) -> Offer | None:
     """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
     lesser, pair = candidate
-    if pair.torque < lesser.torque:
+    if not lesser.is_reached_by(pair.torque):
         lesser = replace(lesser, torque=math.floor(_SHOWN_TORQUE * pair.torque) / _SHOWN_TORQUE)
     if pair.toes < lesser.clearance:
         lesser = replace(lesser, toes=shown_clearance(pair.toes))

@@ -16,8 +16,8 @@ from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of
 from ppafo.analyses.design.wearer.wish import (
     TOES,
     WALKS,
-    Device,
-    Tried,
+    SizedDevice,
+    WalkedDevice,
     WearerSizing,
     Wish,
     check_wish,
@@ -47,7 +47,7 @@ def size_for_wearer(wish: Wish, report: Report, catalogue: str | Path = DEFAULT)
     # What the healthy gait itself does not do is not asked of a device, unless somebody does.
     wish = replace(wish, usual_toes=shown_clearance(min(TOES, healthy)))
     pairs = shelf.pairs(wish.pressure)
-    tried: list[Tried] = []
+    tried: list[WalkedDevice] = []
     for number, (valve, actuator) in enumerate(pairs):
         report(Progress(f"walking with {valve.name}", number, len(pairs), noun="pairs"))
         tried += few_strides(wish, valve, actuator)
@@ -60,7 +60,7 @@ def size_for_wearer(wish: Wish, report: Report, catalogue: str | Path = DEFAULT)
     return WearerSizing(wish, healthy, tuple(tried), None, instead)
 
 
-def _device(lightest: OnBottle, wish: Wish, shelf: Shelf) -> Device:
+def _device(lightest: OnBottle, wish: Wish, shelf: Shelf) -> SizedDevice:
     """Return the device of a pair and a bottle: with regulators, shut-off valve, processor and battery."""
     pair, bottle, walked = lightest
     life = endurance_of_walk(walked)
@@ -76,7 +76,7 @@ def _device(lightest: OnBottle, wish: Wish, shelf: Shelf) -> Device:
         f"processor {processor.name}": processor.full_mass,
         f"battery, {electrical.cells} x {cell.name}": electrical.mass,
     }
-    return Device(pair, bottle, shelf.bottle_name(bottle), walked, life, electrical, masses)
+    return SizedDevice(pair, bottle, shelf.bottle_name(bottle), walked, life, electrical, masses)
 
 
 def _masses_of_regulators(regulators: list[Part]) -> dict[str, float]:

@@ -4,13 +4,14 @@ Of a torque controller the lowest torque is requested that gives the one wanted;
 where the toes would not clear the ground.
 """
 
-from ppafo.analyses.design.wearer.wish import WALKS, Tried, Wish
+from ppafo.analyses.design.wearer.wish import WALKS, WalkedDevice, Wish
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.model.catalog import VALVES
 from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters.declaration import ACTUATOR, ORIFICE
 from ppafo.parameters.parts import Part
+from ppafo.units.shown import written_text
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.walk import walk
@@ -40,19 +41,22 @@ def of_wearer(wish: Wish) -> tuple[str, ...]:
     return f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={wish.height:.6g} m"
 
 
-def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[Tried]:
+def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[WalkedDevice]:
     """Return a few strides with a pair of parts that have the torque and the clearance, else those that come nearest.
 
     Nearest are the most torque, and the highest toes with enough of it: one or two, none where no walk has help.
     """
     common = _common_overrides(wish, valve, actuator)
-    strides: list[Tried] = []
+    strides: list[WalkedDevice] = []
     for request in _requests(wish, valve, actuator):
         for lift in _lifts(request, wish, valve, actuator):
-            tried = _strides_of(valve, actuator, (*common, *_request_overrides(request, valve), *lift))
+            peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
+            limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
+            tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
             if tried is None:
                 break
-            if tried.has(wish):
+            # A request that has all of the torque goes before one that all but reaches it.
+            if tried.torque >= wish.torque and tried.has(wish):
                 return [tried]
             strides.append(tried)
             # Another lift gives no more torque.
@@ -72,10 +76,10 @@ def _common_overrides(wish: Wish, valve: Part, actuator: Part) -> tuple[str, ...
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(wish),
-        f"supply.pressure={wish.pressure:.7g} Pa_a",
-        f"supply.dorsiflexion_pressure={dorsiflexion:.7g} Pa_a",
-        *(f"{path}={number:.6g} {units[path.partition('.')[2]]}".strip() for path, number in numbers.items()),
-        f"shut_off.area={SHUT_OFF_PARTS['area']:g} m^2",
+        f"supply.pressure={written_text(wish.pressure, 'Pa_a')}",
+        f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
+        *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
+        f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
     )
 
 
@@ -86,13 +90,6 @@ def _requests(wish: Wish, valve: Part, actuator: Part) -> list[float]:
     # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
     held = actuator.values["torque_constant"] * (wish.pressure - STANDARD_ATMOSPHERE)
     return list(dict.fromkeys(min(factor * wish.torque, held) for factor in _REQUESTS))
-
-
-def _request_overrides(request: float, valve: Part) -> tuple[str, ...]:
-    """Return the overrides of a request [N m], and of the limit that has to follow it."""
-    peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
-    limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
-    return (*peak, *limit)
 
 
 def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
@@ -108,11 +105,11 @@ def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tupl
     return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
 
 
-def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> Tried | None:
+def _strides_of(valve: Part, actuator: Part, overrides: tuple[str, ...]) -> WalkedDevice | None:
     """Return a few strides with some overrides; None where they lack help, or the torque loop oscillates."""
     result = walk(load_walk(WALKS[valve.kind], overrides), minutes=_MINUTES)
     if not result.status.is_completed or not result.is_helped or not result.averages or result.tracking:
         return None
     flow = result.metrics["gas"].value / walk_of(result.scenario).gait.stride_time
     torque = float(result.averages["torque"].mean.max())
-    return Tried(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)
+    return WalkedDevice(valve, actuator, overrides, torque, flow, result.metrics["lowest_toes"].value)

@@ -1,6 +1,7 @@
 """Design requirements of a wearer, the devices that were tried, and the result of each."""
 
 import math
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,6 +13,8 @@ from ppafo.constants import PASCALS_PER_PSI, STANDARD_ATMOSPHERE
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part
 from ppafo.report.kind import Kind
+from ppafo.units import from_si, to_si
+from ppafo.units.shown import shown_unit
 from ppafo.version import __version__
 from ppafo.walking.motion import LONGEST_MINUTES
 from ppafo.walking.result import WalkResult
@@ -23,10 +26,12 @@ BODY_MASS_INDEX = 22.0
 """Body mass over the square of the stature [kg/m^2] of a wearer of whom the mass alone is known."""
 TOES = 0.01
 """Clearance of the toes [m] that is wanted where none is given, unless the healthy gait itself has less."""
+REACHED = 0.95
+"""Peak torque of the mean stride over the wanted one from which on a device reaches it: in offers and in refusals."""
 SHORTEST = 6.0
 """Time [s] that a walk on a bottle takes at least."""
-_HIGHEST_TOES = 0.2
-"""Clearance [m] above which a wish is a slip of the pen."""
+_STRONGEST, _HIGHEST_TOES = 100.0, 0.2
+"""Torque [N m] and clearance [m] from which on a wish is a slip of the pen."""
 TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass"), Kind("", "m", "length", ".1f")
 
 
@@ -56,9 +61,17 @@ class Wish:
         return self.usual_toes if self.toes is None else self.toes
 
     def at_gauge(self, share: float) -> "Wish":
-        """Return this wish at a share of its gauge pressure, rounded to a tenth of a psi."""
-        gauge = round(share * (self.pressure - STANDARD_ATMOSPHERE) / PASCALS_PER_PSI, 1)
-        return replace(self, pressure=STANDARD_ATMOSPHERE + gauge * PASCALS_PER_PSI)
+        """Return this wish at a share of its gauge pressure, rounded to what gauges show: 0.1 psi, 0.01 bar, 1 kPa."""
+        unit = shown_unit("Pa_d")
+        step = to_si(10.0 ** round(math.log10(from_si(0.1 * PASCALS_PER_PSI, unit, "Pa_d"))), unit, "Pa_d")
+        return replace(
+            self,
+            pressure=STANDARD_ATMOSPHERE + step * round(share * (self.pressure - STANDARD_ATMOSPHERE) / step),
+        )
+
+    def is_reached_by(self, torque: float) -> bool:
+        """Tell whether a peak torque of the mean stride [N m] is the wanted one, but for what a stride differs."""
+        return torque >= REACHED * self.torque
 
     def text(self) -> str:
         """Return torque, pressure, time and clearance in words."""
@@ -82,8 +95,9 @@ def check_wish(wish: Wish) -> None:
         )
     if not wish.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
-    if not 0.0 < wish.torque < 100.0:
-        raise StudyError(f"--torque: {wish.torque:g} N m: must be above 0 and below 100 N m")
+    if not 0.0 < wish.torque < _STRONGEST:
+        text, most = TORQUE.text(wish.torque), TORQUE.text(_STRONGEST)
+        raise StudyError(f"--torque: {text}: must be above 0 and below {most}")
     if not SHORTEST <= wish.seconds <= 60.0 * LONGEST_MINUTES:
         raise StudyError(
             f"--minutes: {wish.seconds / 60.0:g} min: a walk on a bottle is followed for 0.1 to {LONGEST_MINUTES:g} min"
@@ -105,7 +119,7 @@ def shown_clearance(toes: float) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Tried:
+class WalkedDevice:
     """Valve, actuator and overrides of a walk; peak torque of the mean stride [N m], mean flow of gas [kg/s].
 
     ``toes`` is the lowest height of the toes over the ground in mid-swing [m]; below 0 they would drag.
@@ -125,17 +139,17 @@ class Tried:
 
     def has(self, wish: Wish) -> bool:
         """Tell whether a few strides have the torque and the clearance of a wish."""
-        return self.torque >= wish.torque and self.toes >= wish.clearance
+        return wish.is_reached_by(self.torque) and self.toes >= wish.clearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Device:
+class SizedDevice:
     """A device that was walked with on its bottle for the time that is wanted, how long it lasts, what it takes.
 
     ``bottle_name`` is what ``--bottle`` takes for the bottle.
     """
 
-    tried: Tried
+    tried: WalkedDevice
     bottle: Part
     bottle_name: str
     walked: WalkResult
@@ -156,9 +170,10 @@ class Device:
     @property
     def command(self) -> str:
         """The command that walks with it."""
-        sets = " ".join(f"--set '{text}'" for text in self.tried.overrides)
         minutes = float(self.walked.recording.time[-1]) / 60.0
-        return f"ppafo walk {WALKS[self.tried.valve.kind]} --bottle {self.bottle_name} --minutes {minutes:.4g} {sets}"
+        words = ("ppafo", "walk", WALKS[self.tried.valve.kind], "--bottle", self.bottle_name)
+        sets = (word for text in self.tried.overrides for word in ("--set", text))
+        return shlex.join((*words, "--minutes", f"{minutes:.4g}", *sets))
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +181,7 @@ class Offer:
     """A wish that can be met in place of another, with the parts that walked."""
 
     wish: Wish
-    tried: Tried
+    tried: WalkedDevice
     bottle: Part
 
     def text(self, asked: Wish) -> str:
@@ -191,8 +206,8 @@ class WearerSizing:
 
     wish: Wish
     healthy_toes: float
-    tried: tuple[Tried, ...]
-    device: Device | None
+    tried: tuple[WalkedDevice, ...]
+    device: SizedDevice | None
     instead: tuple[str, ...]
 
     @property

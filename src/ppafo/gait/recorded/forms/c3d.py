@@ -10,7 +10,7 @@ import numpy as np
 from ppafo.errors import DataError, one_line
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
-from ppafo.gait.recorded.table import Events, MotionTable, Trial
+from ppafo.gait.recorded.table import Events, MotionTable, TrialData
 from ppafo.signals.recording import Floats
 from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart
 from ppafo.storage.files import read_bytes
@@ -157,13 +157,13 @@ def _texts(group: Any, key: str) -> list[str]:
     return [str(text) for name in keys if name in group for text in group[name]["value"]]
 
 
-def _trial(parameters: Any) -> Trial:
+def _trial(parameters: Any) -> TrialData:
     """Return subject and events; an unknown spelling, or an implausible value, counts as absent."""
     group = parameters.get("PROCESSING", {})
     mass, height = _number(group, _BODY), _number(group, _HEIGHT)
     # Plug-in Gait keeps the height in mm.
     stature = None if height is None else height / 1000.0 if height > 100.0 else height
-    return Trial(
+    return TrialData(
         mass if mass is not None and 1.0 <= mass <= 500.0 else None,
         stature if stature is not None and 0.5 <= stature <= 2.5 else None,
         *_events(parameters.get("EVENT", {})),

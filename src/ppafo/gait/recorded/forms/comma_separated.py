@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from ppafo.errors import DataError, UnitError, one_line, refused_as
-from ppafo.gait.recorded.delimited import Block, Cells, lines_of, table_of
+from ppafo.gait.recorded.delimited import Cells, NumberBlock, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map
 from ppafo.gait.recorded.table import MotionTable
@@ -83,7 +83,9 @@ def read_plain_csv(path: str | Path) -> MotionTable:
         kind = kind_of_comments(line for line in lines if line.startswith("#"))
     with refused_as(DataError, f"{path}: column {names[at]!r}", UnitError):
         seconds = to_si(1.0, units[at] or _TIMES[names[at].lower()], "s")
-    block = Block(lines=lines, first=first + 1, delimiter=delimiter, decimal="," if has_comma else ".", is_ragged=False)
+    block = NumberBlock(
+        lines=lines, first=first + 1, delimiter=delimiter, decimal="," if has_comma else ".", is_ragged=False
+    )
     cells = Cells([*[""] * at, *names[at:]], units)
     return table_of(path, block, cells, names[at], seconds=seconds, kind=kind)
 

@@ -1,4 +1,4 @@
-"""Text exports of motion capture: Vicon Nexus CSV, Qualisys TSV, OptiTrack Motive CSV and D-Flow text.
+"""Text exports of motion capture: Vicon Nexus CSV, Qualisys TSV, OptiTrack Motive CSV, D-Flow text and BTS EMT.
 
 Each is known by its first line, which states the frame rate or the clock; markers become columns ``LABEL.x``, ``.y``
 and ``.z``, without the subject's name before a colon.
@@ -13,7 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.errors import DataError, one_line
-from ppafo.gait.recorded.delimited import Block, Cells, Clock, PerFrame, PerRow, cells_of, lines_of, rows_of, table_of
+from ppafo.gait.recorded.delimited import (
+    Cells,
+    Clock,
+    NumberBlock,
+    PerFrame,
+    PerRow,
+    cells_of,
+    lines_of,
+    rows_of,
+    table_of,
+)
 from ppafo.gait.recorded.form import FileReader, GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, MotionTable
@@ -22,6 +32,8 @@ from ppafo.signals.recording import Floats
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
 """Blocks of a Nexus export: markers, angles and moments of models; force plates and other analog channels."""
 _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
+_MOTIVE_ROWS = 3
+"""Rows above the axes of a Motive export: types, names and quantities at least."""
 _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
 
@@ -34,10 +46,6 @@ def _first_cell(path: str | Path, delimiters: str = ",;\t") -> str:
 
 def _bare(label: str) -> str:
     return label.rpartition(":")[2].strip()
-
-
-def _delimiter_of(line: str) -> str:
-    return max(",;\t", key=line.count)
 
 
 def _head_of(line: str) -> str:
@@ -64,7 +72,7 @@ class _NexusBlock(NamedTuple):
     labels: list[str]
     axes: list[str]
     units: list[str]
-    rows: Block
+    rows: NumberBlock
 
 
 def _read_nexus(path: str | Path) -> MotionTable:
@@ -99,7 +107,7 @@ def _joined(table: MotionTable, columns: Mapping[str, Floats], units: Mapping[st
 def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBlock:
     """Return the block that begins at the line of its kind; DataError where its header is no header."""
     head = lines[start + 1 : start + 5]
-    delimiter = _delimiter_of(head[2]) if len(head) == 4 else ","
+    delimiter = max(",;\t", key=head[2].count) if len(head) == 4 else ","
     axes = cells_of(head[2], delimiter) if len(head) == 4 else []
     if [axis.lower() for axis in axes[:2]] != ["frame", "sub frame"]:
         raise DataError(f"{path}: line {start + 4}: must begin with 'Frame' and 'Sub Frame', as Nexus writes it")
@@ -112,7 +120,7 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     units = [*cells_of(head[3], delimiter), *[""] * len(axes)][: len(axes)]
     rate = _rate_in(path, cells_of(head[0], delimiter)[0], start + 2)
     end = next((n for n in range(start + 5, len(lines)) if not lines[n].strip(",;\t ")), len(lines))
-    rows = Block(lines[:end], start + 5, delimiter)
+    rows = NumberBlock(lines[:end], start + 5, delimiter)
     return _NexusBlock(rate=rate, labels=labels, axes=axes, units=units, rows=rows)
 
 
@@ -168,7 +176,7 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     # Newer exports have a header line, and the number of the frame and the time before the markers.
     is_counted = cells_of(lines[first - 1], "\t")[:2] == ["Frame", "Time"]
     before = ["", "time"] if is_counted else []
-    block = Block(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
+    block = NumberBlock(lines, first, "\t", decimal="," if "," in lines[min(first, len(lines) - 1)] else ".")
     cells = Cells([*before, *names], [*["", "s"][: len(before)], *["mm"] * len(names)])
     if width < len(before) + len(names) - 2:
         raise DataError(f"{path}: line {first + 1} has {width} values for {len(labels)} markers")
@@ -193,6 +201,9 @@ def _read_motive(path: str | Path) -> MotionTable:
     at = next((n for n, line in enumerate(lines) if cells_of(line, ",")[:1] == ["Frame"]), -1)
     above = [cells_of(line, ",") for line in lines[1 : max(at, 1)] if line.strip(", \t")]
     rows = {cells[1]: cells for cells in above if len(cells) > 1 and cells[1]}
+    if not rows and len(above) >= _MOTIVE_ROWS:
+        # Some exports leave out what their rows are: types, names, and further ones above the quantities.
+        rows = {"Type": above[0], "Name": above[1]}
     if at < 0 or "Name" not in rows:
         raise DataError(f"{path}: has no header 'Frame, Time (Seconds), X, Y, Z, ...' below the names of its markers")
     axes, quantities = cells_of(lines[at], ","), above[-1]
@@ -202,9 +213,15 @@ def _read_motive(path: str | Path) -> MotionTable:
         kind, label, quantity = (cells[place] if place < len(cells) else "" for cells in (kinds, labels, quantities))
         is_marker = "marker" in kind.lower() and quantity.lower() == "position" and axis.lower() in AXES
         names.append(f"{_bare(label)}.{axis.lower()}" if is_marker else "")
+    if not any(names):
+        raise DataError(f"{path}: has no columns of markers; export the take with Markers, and their Position")
     names[1] = "time"
     return table_of(
-        path, Block(lines, at + 1, ","), Cells(names, ["", "s", *[unit] * (len(names) - 2)]), "time", noun="markers"
+        path,
+        NumberBlock(lines, at + 1, ","),
+        Cells(names, ["", "s", *[unit] * (len(names) - 2)]),
+        "time",
+        noun="markers",
     )
 
 
@@ -218,7 +235,31 @@ def _read_dflow(path: str | Path) -> MotionTable:
         names.append(f"{_bare(column[1])}.{column[3].lower()}" if column is not None and is_marker else cell)
         units.append(_DFLOW[column[2]] if column is not None else "")
     names = ["" if name == "FrameNumber" else name for name in names]
-    return table_of(path, Block(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
+    return table_of(path, NumberBlock(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
+
+
+def _read_bts(path: str | Path) -> MotionTable:
+    """Return the markers of a BTS text file: its kind, unit and rate, and ``Frame, Time, LABEL.X, LABEL.Y, ...``."""
+    lines = lines_of(path)
+    at = next((n for n, line in enumerate(lines) if cells_of(line, "\t")[:2] == ["Frame", "Time"]), -1)
+    stated = dict(cells_of(line, "\t")[:2] for line in lines[: max(at, 0)] if line.count("\t") >= 1)
+    kind = stated.get("Type:", "")
+    if at < 0 or kind != "Point 3D tracks":
+        raise DataError(
+            f"{path}: has '{one_line(kind)[:40]}' in the place of markers; export 'Point 3D tracks', with the line "
+            "'Frame, Time, ...' above the numbers"
+        )
+    unit = stated.get("Measure unit:", "")
+    names = ["", "time"]
+    for cell in cells_of(lines[at], "\t")[2:]:
+        label, _, axis = cell.rpartition(".")
+        names.append(f"{_bare(label)}.{axis.lower()}" if axis.lower() in AXES else "")
+    while not names[-1]:
+        names.pop()
+    is_decimal_comma = "," in lines[min(at + 1, len(lines) - 1)]
+    block = NumberBlock(lines, at + 1, "\t", decimal="," if is_decimal_comma else ".")
+    cells = Cells(names, ["", "s", *[unit if unit in _LENGTHS.values() else ""] * (len(names) - 2)])
+    return table_of(path, block, cells, "time", noun="markers")
 
 
 def _form(name: str, summary: str, first: Sequence[str], read: FileReader) -> GaitForm:
@@ -235,4 +276,7 @@ def _form(name: str, summary: str, first: Sequence[str], read: FileReader) -> Ga
 NEXUS = _form("nexus", "CSV exports of Vicon Nexus", (*_NEXUS_MOTION, _NEXUS_DEVICES), _read_nexus)
 QUALISYS = _form("qualisys", "TSV exports of Qualisys Track Manager", ("NO_OF_FRAMES",), _read_qualisys)
 MOTIVE = _form("motive", "CSV exports of OptiTrack Motive", ("Format Version",), _read_motive)
+BTS = replace(
+    _form("bts", "EMT text files of BTS Bioengineering", ("BTS ASCII format",), _read_bts), suffixes=(".emt",)
+)
 DFLOW = _form("dflow", "text files of D-Flow", ("TimeStamp", "% TimeStamp"), _read_dflow)
