@@ -464,7 +464,6 @@ REFUSED: tuple[tuple[str, float, str], ...] = (
     ("controller.period", 1.0e-4, "run.step"),
     ("friction.dynamic_torque", 1.0e3, "friction.dynamic_torque"),
     ("actuator.angle_min", 3.0, "actuator.angle_min"),
-    ("supply.pressure", 5.0e4, "supply.pressure"),
     ("motion.angle", 0.1, "motion.angle"),
 )
 """Numbers [SI] that ``VANE_BASE`` cannot have, by path, and the path that every door names."""
