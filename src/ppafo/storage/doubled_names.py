@@ -10,6 +10,8 @@ from ppafo.signals.recording import Floats
 
 _LONGEST_SHOWN = 40
 """Characters of a name that a remark repeats."""
+_MOST_SAID = 3
+"""Doubled names of which each has a remark."""
 
 
 def told_apart(names: Sequence[str], descriptions: Sequence[str] = ()) -> list[str]:
@@ -50,9 +52,11 @@ def without_copies(columns: Mapping[str, Floats], twins: Mapping[str, Sequence[s
 
 
 def said_of_doubled(twins: Mapping[str, Sequence[str]], left: Mapping[str, object], noun: str) -> list[str]:
-    """Return a remark on each doubled name of which more than one is left."""
-    return [
+    """Return a remark on each doubled name of which more than one is left; beyond a few their number alone."""
+    said = [
         f"{noun} of one name, {one_line(name)[:_LONGEST_SHOWN]!r}: they are {', '.join(map(repr, own))} here"
         for name, own in twins.items()
         if all(other in left for other in own)
     ]
+    more = len(said) - _MOST_SAID
+    return said if more <= 0 else [*said[:_MOST_SAID], f"so are {noun} of {more} more names"]

@@ -105,6 +105,15 @@ def test_a_coarse_sensor_widens_what_counts_as_there_and_as_motion() -> None:
     assert rate_filter(LOOP, coarse) > rate_filter(LOOP, JOINT)
 
 
+def test_noise_of_the_angle_is_no_motion_and_is_filtered_more_than_a_step_of_that_size() -> None:
+    noisy = JOINT._replace(noise=math.radians(0.05))
+    # Two samples differ by the root of 2 of its standard deviation; by 4.9 of these once in a million samples.
+    assert rest_distance(LOOP, noisy) >= 4.9 * math.sqrt(2.0) * noisy.noise
+    coarse = JOINT._replace(resolution=noisy.noise)
+    assert rate_filter(LOOP, noisy) > rate_filter(LOOP, coarse)
+    assert rate_filter(LOOP, JOINT._replace(noise=0.0)) == rate_filter(LOOP, JOINT)
+
+
 def test_a_law_on_the_angle_alone_keeps_half_the_gain_at_which_the_mass_swings_on_its_gas() -> None:
     smooth = JOINT._replace(friction=0.0)
     loop = slow_loop(LOOP, smooth)

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import ppafo
 from ppafo.errors import DataError
 from ppafo.storage.column_map import ColumnMap, json_schema, load_column_map
+from ppafo.storage.doubled_names import said_of_doubled
 from ppafo.storage.foreign import read_foreign, read_trials
 from tests.repeatable import TOO_SLOW
 
@@ -352,6 +353,20 @@ def test_a_foreign_log_is_measured_and_read_through_a_map_by_name(tmp_path: Path
     )
     assert ppafo.evaluate(log, columns=f"{maps}:bench")["peak_torque"].value == pytest.approx(2.5)
     assert ppafo.read_recording(log, columns=load_column_map(maps))["torque"].tolist() == pytest.approx([0, 1.205, 2.5])
+
+
+def test_a_binary_file_is_not_told_to_be_latin_1(tmp_path: Path) -> None:
+    path = tmp_path / "wheel.txt"
+    path.write_bytes(b"\x05\x00\x80\xff\x00\x01" * 50)
+    with pytest.raises(DataError, match=r"is not a text file \(byte 1 is zero\)$"):
+        read_foreign(path, mapped(channels={"torque": {"column": 2, "unit": "N m"}}))
+
+
+def test_of_many_doubled_names_three_are_told_and_the_rest_counted() -> None:
+    twins = {f"M{number}": [f"M{number}#1", f"M{number}#2"] for number in range(9)}
+    said = said_of_doubled(twins, {name: 0 for names in twins.values() for name in names}, "columns")
+    assert len(said) == 4
+    assert said[-1] == "so are columns of 6 more names"
 
 
 def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Path) -> None:
