@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.engine.groups import Role, filled
+from ppafo.engine.groups import Role, filled, rows_of
 from ppafo.engine.in_python import functions_of
 from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
 from ppafo.engine.program import FaultPhases, LegPhases, Program
@@ -177,13 +177,14 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
     timing = LaneTiming(
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
-    parameters = filled(program.parameter_rows(), _parameters_of(run, timing), runs, Role.PARAMETER)
-    states = filled(program.state_rows(), _states_of(run), runs, Role.STATE)
+    own_groups = program.groups
+    parameters = filled(rows_of(own_groups, Role.PARAMETER), _parameters_of(run, timing), runs, Role.PARAMETER)
+    states = filled(rows_of(own_groups, Role.STATE), _states_of(run), runs, Role.STATE)
     counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     for column, count in enumerate(numbers):
         counts[:, column] = count
-    if (counts == counts[0]).all():
+    if runs == 1 or (counts == counts[0]).all():
         clocks, groups = counts[:1], [np.arange(runs)]
     else:
         clocks, group = np.unique(counts, axis=0, return_inverse=True)

@@ -69,7 +69,7 @@ def gait_import(
     name: Name = "imported-gait",
     title: str = "",
 ) -> Finding[GaitFound]:
-    """Make a gait from recorded files (.mot, .sto, .csv, .txt, .tsv, .c3d, .trc, .mat).
+    """Make a gait from recorded files (.mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat).
 
     files: files of one walk, on one clock
     body_mass: mass of the wearer, such as '62 kg'; default: what a C3D file states

@@ -64,7 +64,7 @@ class ImportedGait:
 def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> ImportedGait:
     """Return the mean stride in recorded files of one walk of one person on one clock.
 
-    They are of any form of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .c3d, .trc, .mat.
+    They are of any form of ``reading.FORMS``: .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc, .mat.
 
     Strides come from the vertical force where there is one, else from events of the file or from the shank. DataError
     names all that is wrong with file, column and row, and what to do: what is wrong with one curve is noted, and the

@@ -8,7 +8,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.simulation.place import quicker_at
+from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
 from ppafo.simulation.tracking.pair_step import pair_step
