@@ -128,13 +128,12 @@ def rate_filter(loop: TorqueLoop, joint: Joint) -> float:
     """Time constant [s] of the filter on the measured rate: as late as the torque loop, at most 0.1/w.
 
     A step of a coarse sensor may open the valve by half, and its noise by a tenth in the mean: for that the filter is
-    slower, up to 0.3/w and 0.5/w.
+    slower, up to 0.3/w.
     """
     per_angle = 2.0 * inner_gain(loop, joint) * angle_damping(loop, joint)
     frequency = stiffened(loop, joint)
-    coarse = min(per_angle * joint.resolution, 0.3 / frequency)
-    noisy = min(NOISE_IN_FILTER * per_angle * joint.noise, 0.5 / frequency)
-    return max(min(loop.dead_time, 0.1 / frequency), coarse, noisy)
+    smoothing = per_angle * max(joint.resolution, NOISE_IN_FILTER * joint.noise)
+    return max(min(loop.dead_time, 0.1 / frequency), min(smoothing, 0.3 / frequency))
 
 
 def inner_gain(loop: TorqueLoop, _joint: Joint) -> float:
