@@ -143,7 +143,7 @@ class Given(float):
 
 
 def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
-    """Return the units of the numbers that came with one, by unit in SI; a pressure brings that of differences."""
+    """Return the units of the numbers given with a unit, by unit in SI; a pressure also sets its differences."""
     units: dict[str, str] = {}
     for si_unit, value in by_si_unit.items():
         if isinstance(value, Given) and value.unit != SI:

@@ -78,7 +78,7 @@ _OF_UNIT = {
 }
 """Kind of quantity by its unit in SI."""
 _WRITTEN = {"Pa": "Pa_a", "-": "1"}
-"""What the unit of a metric or a channel is called as the unit of a number in a file."""
+"""Unit of a number in a file for the unit of a metric or a channel."""
 _PER_PRESSURE = {"N/Pa": "N", "N m/Pa": "N m"}
 """Units in SI of what a pressure gives, and of what it gives; the pressure is in the unit of the set."""
 _DIGITS = 9
