@@ -42,7 +42,7 @@ class Kind:
     """Kind of a number: words, SI unit, quantity (``QUANTITIES``; else shown in SI), and form.
 
     ``zero`` [Pa absolute] is the pressure from which gauge ones count, None for the atmosphere of the device.
-    ``given`` is the unit in which the user gave the number, which goes before that of the set.
+    ``given`` is the unit in which the user gave the number, which replaces the one of the set.
     """
 
     words: str = ""

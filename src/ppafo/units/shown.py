@@ -164,7 +164,7 @@ def shown_value(
 ) -> float:
     """Return a value in SI in a unit, or in the one in which it is shown; what is not larger than ``zero`` is 0.
 
-    Gauge counts from ``atmosphere`` [Pa absolute], that of the device in force unless given.
+    Gauge counts from ``atmosphere`` [Pa absolute], by default of the device in force.
     """
     known, unit = _WRITTEN.get(si_unit, si_unit), unit or shown_unit(si_unit)
     if unit in (known, "") or not math.isfinite(value):
