@@ -487,7 +487,9 @@ def test_a_column_that_the_users_map_names_must_be_there(
 
 
 def test_an_unknown_kind_of_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match=r"walk.xlsx: is not a .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc or .mat file"):
+    with pytest.raises(
+        DataError, match=r"walk.xlsx: is not a .mot, .sto, .csv, .txt, .tsv, .emt, .c3d, .trc or .mat file"
+    ):
         import_gait([tmp_path / "walk.xlsx"], ImportSettings(62.0))
 
 
