@@ -213,8 +213,8 @@ def test_a_recording_goes_straight_into_identify(
     (tmp_path / "problem.toml").write_text(PROBLEM, encoding="utf-8")
     main(["identify", "problem.toml", "--out", "identified"])
     text = (tmp_path / "identified" / "identify.txt").read_text(encoding="utf-8")
-    found = float(next(line.split()[1] for line in text.splitlines() if line.startswith("actuator.torque_constant")))
-    assert found == pytest.approx(1.45e-5, rel=0.02)
+    _, found, unit, *_ = next(line for line in text.splitlines() if line.startswith("actuator.torque_constant")).split()
+    assert (float(found), unit) == (pytest.approx(14.5, rel=0.02), "cm^3")
 
 
 def test_whoever_sends_first_is_not_the_bench_unless_it_sends_a_packet(

@@ -173,11 +173,11 @@ def test_the_table_shows_units_of_the_set_tolerances_and_the_next_experiment(bot
     text = text_of(finding_of(both))
     assert "trajectory (synthetic): 2 numbers fitted to 2 recordings" in text
     assert "foot_plate.inertia: variance from actuator.torque_constant" in text
-    number = r"\(([\d.]+) \+- ([\d.]+)\)e-05 m\^3"
+    number = r"([\d.]+) \+- ([\d.]+) cm\^3"
     told = re.search(rf"tolerance: actuator\.torque_constant: stated {number}, fitted {number}", text)
     assert told is not None
     stated, error, fitted, smaller = map(float, told.groups())
-    assert (stated, error) == (1.451, 0.017)
+    assert (stated, error) == (14.51, 0.17)
     assert smaller < error
     assert abs(fitted - stated) < 2.0 * error
     assert "g m^2" in text

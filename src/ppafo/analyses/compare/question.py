@@ -21,6 +21,9 @@ Configured = Annotated[
 ]
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
 
+_DRAWS = 4096
+"""Draws of the uncertain values unless given."""
+
 
 @checked
 def compare(
@@ -30,7 +33,7 @@ def compare(
     tasks: Tasks = (),
     overrides: Overrides = (),
     baseline: Name | None = None,
-    draws: Whole = 4096,
+    draws: Whole | None = None,
     seed: Seed | None = None,
     confidence: Confidence = 0.95,
     maximum_failed: MaximumFailed = 0.01,
@@ -53,7 +56,7 @@ def compare(
             written
         overrides: values to change, for example 'valve.area=12.6 mm^2'; may be repeated
         baseline: configuration that all others are compared with; default: the first
-        draws: draws of the uncertain values; default 4096
+        draws: draws of the uncertain values of the study, or of the noise; default 4096
         seed: random seed; default: the file's
         confidence: confidence of all intervals; default 95%
         maximum_failed: fraction of the runs that may fail before the study is refused; default 1%
@@ -81,15 +84,20 @@ def compare(
     from ppafo.analyses.compare.answer import finding_of
     from ppafo.analyses.compare.solve import Draws, baseline_of, compared, overrides_by_task
     from ppafo.arguments.words import taken_tasks
+    from ppafo.errors import StudyError
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import choose_configurations
 
-    requested = Draws(draws, seed, confidence, maximum_failed, threads, progress)
+    requested = Draws(_DRAWS if draws is None else draws, seed, confidence, maximum_failed, threads, progress)
     requested.check()
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)
     reference = baseline_of(chosen, baseline)
     comparison = compared(chosen, reference, overrides_by_task(taken_tasks(tasks)), loaded, requested)
+    if draws is not None and not comparison.draws:
+        raise StudyError(
+            f"draws = {draws}: nothing is drawn here; give a study, or sensors with noise, or leave it out"
+        )
     finding = finding_of(comparison)
     if not check:
         return finding

@@ -1,6 +1,7 @@
 """A tuning as a finding: gains and metrics before and after, how the search went, and lines to paste."""
 
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -210,7 +211,7 @@ def _options(tuned: Tuned) -> str:
 def _command(tuned: Tuned) -> str:
     """Return the line that runs the scenario with the gains found."""
     scenario = tuned.problem.scenario
-    return f"ppafo {scenario.motion.motion_kind.command} {_named(scenario)} {_options(tuned)}"
+    return f"ppafo {scenario.motion.motion_kind.command} {shlex.quote(_named(scenario))} {_options(tuned)}"
 
 
 def _named(scenario: Scenario) -> str:

@@ -108,6 +108,10 @@ def validate(
     if chosen is None:
         near = nearest_name(motion, MOTIONS)
         raise DataError(f"motion '{one_line(motion)}' is not one of {', '.join(MOTIONS)}{near}")
+    if volume is not None and chosen != "free":
+        raise DataError(
+            f"motion '{chosen}': a fixed volume has no vane that could move; give motion or volume, not both"
+        )
     settings = ReplaySettings(
         motion=chosen,
         initial=parse_initial(initial, device.supply.atmospheric_pressure),

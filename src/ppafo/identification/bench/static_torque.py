@@ -100,6 +100,7 @@ def static_torque(
 
     fitted, weighted = solve(law, _weighted(readings), numbers, confidence)
     values, residuals = fitted.by_name, readings.torque - weighted / readings.weight
+    slope, slope_unit = in_shown_unit(values[names.slope_path], names.slope_unit)
     friction, unit = in_shown_unit(values[names.friction_path], names.unit)
     scatter, _ = in_shown_unit(float(np.std(residuals)), names.unit)
     load = Kind(names.load.capitalize(), names.unit, names.load)
@@ -109,7 +110,7 @@ def static_torque(
         fitted,
         _reported(readings),
         f"{readings.pressure.size} readings, {count_of(readings.repetitions, 'repetition')}; {names.slope} "
-        f"{values[names.slope_path]:.4g} {names.slope_unit}, {names.friction} {friction:.3g} {unit}; "
+        f"{slope:.4g} {slope_unit}, {names.friction} {friction:.3g} {unit}; "
         f"scatter {scatter:.3g} {unit}",
         with_residuals(
             f"Static {names.load}",

@@ -175,6 +175,8 @@ def test_mistakes_are_one_line() -> None:
         compare(study=STUDY, draws=3)
     with pytest.raises(StudyError, match=r"confidence = 1\.0"):
         compare(study=STUDY, confidence=1.0)
+    with pytest.raises(StudyError, match="draws = 64: nothing is drawn here; give a study, or sensors with noise"):
+        compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
 
 
 def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() -> None:

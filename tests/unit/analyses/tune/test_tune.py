@@ -197,11 +197,12 @@ def test_an_objective_that_was_zero_has_no_percentage() -> None:
 
 
 def test_a_scenario_of_a_file_is_pasted_by_its_file(tmp_path: Path) -> None:
-    file = tmp_path / "mine.toml"
+    file = tmp_path / "my ankle.toml"
     file.write_bytes((Path(ppafo.__file__).parent / "scenarios" / "torque-task-proportional.toml").read_bytes())
     finding = tune(changed(scenario=str(file), effort={"starts": 1, "generations": 1, "candidates_per_gain": 4}))
     pasted = finding.files["overrides.txt"]().decode()
     assert f"ppafo.simulate({str(file)!r}, [" in pasted
+    assert f"ppafo simulate '{file}' --set" in str(finding)
 
 
 @pytest.mark.parametrize(

@@ -152,6 +152,7 @@ def test_the_verb_of_python_takes_what_the_command_takes(
         ([*SET, "step.csv", "--valve", "soleniod"], "solenoid"),
         ([*SET, "step.csv", "--threshold", "angel=5%"], "did you mean 'angle'"),
         ([*SET, "step.csv", "--motion", "fre"], "did you mean 'free'"),
+        ([*SET, "step.csv", "--motion", "leg", "--volume", "60 cm^3"], "give motion or volume, not both"),
         ([*SET, "step.csv", "--initial", "angle=3"], "initial value"),
         ([*SET, "step.csv", "--longest-delay", "soon"], "--longest-delay soon"),
         (
