@@ -86,12 +86,16 @@ def bottle(
         return finding_of(follow_bottle(load_bottle(named, changed), draw, schedule))
     if peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
-    uses = {
-        use.label if isinstance(use, Recording) else use.scenario.name if isinstance(use, WalkResult) else str(use): use
-        for use in given
-    }
-    if len(uses) < len(given):
-        raise ParameterError("the same recording is given twice")
+    uses: dict[str, str | Path | Recording | WalkResult] = {}
+    for use in given:
+        if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in uses.values()):
+            raise ParameterError("the same recording is given twice")
+        label = (
+            use.label if isinstance(use, Recording) else use.scenario.name if isinstance(use, WalkResult) else str(use)
+        )
+        # Walks of one scenario with other overrides have one name.
+        alike = sum(name == label or name.startswith(f"{label} (") for name in uses)
+        uses[f"{label} ({alike + 1})" if alike else label] = use
     found = {}
     for name, use in uses.items():
         gas = walk_gas(use) if isinstance(use, WalkResult) else None

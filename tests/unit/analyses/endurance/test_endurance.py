@@ -172,3 +172,7 @@ def test_the_verb_takes_recordings_one_or_several() -> None:
     assert [use.draw.mass_per_stride for use in several.found.uses.values()] == pytest.approx([1e-3, 2e-3])
     with pytest.raises(ParameterError, match="the same recording is given twice"):
         endurance([one, one])
+    # Two walks of one scenario with other overrides have one name.
+    alike = endurance([one, two], rest=60.0).found
+    assert isinstance(alike, Endurances)
+    assert list(alike.uses) == [one.label, f"{one.label} (2)"]
