@@ -117,11 +117,11 @@ class Result:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Reasons why the run is of little use, a sentence each: coarse valves, a loop that misses its reference."""
+        """Reasons why the run is of little use, a sentence each: a loop that misses its reference, coarse valves."""
         from ppafo.simulation.tracking.pair_step import coarse_pair
 
         verdict = self.tracking
-        said = (coarse_pair(self.scenario), "" if verdict is None else verdict.sentence)
+        said = ("" if verdict is None else verdict.sentence, coarse_pair(self.scenario))
         return tuple(sentence for sentence in said if sentence)
 
     def __repr__(self) -> str:

@@ -10,7 +10,14 @@ import pytest
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import batch_of, state_row_numbers
 from ppafo.errors import IdentificationError
-from ppafo.identification.trajectory import Experiment, FreeParameter, TrajectoryFit, TrajectoryProblem, fit, fitting
+from ppafo.identification.trajectory import (
+    FittedExperiment,
+    FreeParameter,
+    TrajectoryFit,
+    TrajectoryProblem,
+    fit,
+    fitting,
+)
 from ppafo.identification.trajectory.numbers import number_at, with_numbers
 from ppafo.identification.trajectory.problem import numbers_of
 from ppafo.identification.trajectory.runs import FIT_TOLERANCE, prepare, run_with, signals_of
@@ -25,12 +32,12 @@ FLOW = FreeParameter("valve.discharge_coefficient", start=0.10)
 DAMPING = FreeParameter("friction.viscous_damping", start=0.025)
 
 
-def fitted(experiment: Experiment, *parameters: FreeParameter) -> TrajectoryFit:
+def fitted(experiment: FittedExperiment, *parameters: FreeParameter) -> TrajectoryFit:
     return fit(TrajectoryProblem(parameters, (experiment,)))
 
 
 @pytest.fixture(scope="module")
-def three(experiment: Experiment) -> TrajectoryFit:
+def three(experiment: FittedExperiment) -> TrajectoryFit:
     """Flow, inertia and damping from one step response."""
     return fitted(experiment, FLOW, INERTIA, DAMPING)
 
@@ -45,7 +52,7 @@ def test_three_planted_values_are_found_and_called_identified(three: TrajectoryF
         assert estimate.recordings == ("synthetic step-response",)
 
 
-def test_the_noise_that_was_put_on_the_samples_is_found(three: TrajectoryFit, experiment: Experiment) -> None:
+def test_the_noise_that_was_put_on_the_samples_is_found(three: TrajectoryFit, experiment: FittedExperiment) -> None:
     assert len(three.channels) == 3
     for channel in three.channels:
         assert channel.noise == pytest.approx(experiment.noise[channel.channel], rel=0.12)
@@ -86,7 +93,7 @@ def test_an_estimate_is_found_by_the_short_path_of_the_valve(three: TrajectoryFi
         three.estimate("foot_plate.inertias")
 
 
-def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: Experiment) -> None:
+def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: FittedExperiment) -> None:
     numbers = numbers_of(TrajectoryProblem((INERTIA,), (experiment,)))
     prepared = prepare(experiment, {})
     (signals,) = signals_of([prepared], numbers, np.array([[0.010, 0.0084]]))
@@ -99,7 +106,7 @@ def test_columns_are_the_runs_that_simulate_makes_with_less_error(experiment: Ex
     assert np.abs(signals["angle"][:, 0] - clean["angle"]).max() > 0.01
 
 
-def test_area_and_discharge_coefficient_are_not_identifiable_together(experiment: Experiment) -> None:
+def test_area_and_discharge_coefficient_are_not_identifiable_together(experiment: FittedExperiment) -> None:
     found = fitted(experiment, FLOW, FreeParameter("valve.area"), INERTIA)
     assert [one.verdict for one in found.estimates] == ["not identifiable", "not identifiable", "identified"]
     assert "trades off against valves.proportional.area" in found.estimates[0].explanation
@@ -107,7 +114,7 @@ def test_area_and_discharge_coefficient_are_not_identifiable_together(experiment
     assert product == pytest.approx(31.6e-6 * 0.113, rel=3e-3)
 
 
-def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: Experiment) -> None:
+def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: FittedExperiment) -> None:
     # Chamber 2 would start at the pressure of its regulator; with a start of its own, it never meets that regulator.
     start = {"initial.pressure_2": experiment.scenario.initial.pressure_2}
     apart = dataclasses.replace(experiment, scenario=with_numbers(experiment.scenario, start))
@@ -118,7 +125,7 @@ def test_a_number_that_does_nothing_is_not_identifiable_and_says_so(experiment: 
     assert found.estimate("foot_plate.inertia").verdict == "identified"
 
 
-def test_a_bound_that_keeps_the_truth_out_is_named(experiment: Experiment) -> None:
+def test_a_bound_that_keeps_the_truth_out_is_named(experiment: FittedExperiment) -> None:
     found = fitted(experiment, FLOW, FreeParameter("foot_plate.inertia", start=0.012, low=0.010, high=0.02))
     inertia = found.estimate("foot_plate.inertia")
     assert inertia.verdict == "at its bound"
@@ -126,7 +133,7 @@ def test_a_bound_that_keeps_the_truth_out_is_named(experiment: Experiment) -> No
     assert inertia.value == pytest.approx(0.010, rel=1e-6)
 
 
-def test_a_model_that_lacks_something_holds_for_itself_only(experiment: Experiment) -> None:
+def test_a_model_that_lacks_something_holds_for_itself_only(experiment: FittedExperiment) -> None:
     loaded = load_scenario(
         "step-response", ["motion.kind=free", "run.duration=0.35 s", "foot_plate.gravity_torque=0.4 N m"]
     )
@@ -137,7 +144,7 @@ def test_a_model_that_lacks_something_holds_for_itself_only(experiment: Experime
     assert "fitted alone, " in poor.conflict
 
 
-def test_a_prior_decides_where_the_recordings_are_silent(experiment: Experiment) -> None:
+def test_a_prior_decides_where_the_recordings_are_silent(experiment: FittedExperiment) -> None:
     found = fitted(experiment, FLOW, FreeParameter("valve.area", start=31.6e-6, deviation=0.316e-6))
     area = found.estimate("valve.area")
     assert area.value == pytest.approx(31.6e-6, rel=1e-3)
@@ -146,7 +153,7 @@ def test_a_prior_decides_where_the_recordings_are_silent(experiment: Experiment)
     assert "valves.proportional.area" in found.estimate("valve.discharge_coefficient").explanation
 
 
-def test_an_initial_pressure_of_one_recording_is_found(experiment: Experiment) -> None:
+def test_an_initial_pressure_of_one_recording_is_found(experiment: FittedExperiment) -> None:
     start = FreeParameter("initial.pressure_2", start=4.4e5, low=4.0e5, high=5.2e5, recordings=("step",))
     (estimate,) = fitted(experiment, start).estimates
     assert (estimate.path, estimate.unit) == ("initial.pressure_2 of step", "Pa")
@@ -155,14 +162,14 @@ def test_an_initial_pressure_of_one_recording_is_found(experiment: Experiment) -
 
 
 def test_a_number_limited_to_one_recording_leaves_the_other_alone(
-    experiment: Experiment, step: Scenario, recorded: Callable[..., Recording]
+    experiment: FittedExperiment, step: Scenario, recorded: Callable[..., Recording]
 ) -> None:
     start = f"initial.pressure_2={step.initial.pressure_2} Pa_a"
     low = load_scenario(
         "step-response", ["motion.kind=free", "run.duration=0.35 s", "supply.pressure=45 psi_g", start, "name=low"]
     )
     # The model of the second starts there too, and not at the supply that is fitted.
-    second = Experiment(
+    second = FittedExperiment(
         "low", load_scenario("step-response", ["motion.kind=free", "run.duration=0.35 s", start]), recorded(low)
     )
     supplies = tuple(FreeParameter("supply.pressure", recordings=(label,)) for label in ("step", "low"))
@@ -172,19 +179,19 @@ def test_a_number_limited_to_one_recording_leaves_the_other_alone(
     assert less == pytest.approx(number_at(low, "supply.pressure"), rel=1e-3)
 
 
-def test_a_far_start_ends_where_a_near_one_does(experiment: Experiment) -> None:
+def test_a_far_start_ends_where_a_near_one_does(experiment: FittedExperiment) -> None:
     far = [FreeParameter("foot_plate.inertia", start=0.0042), FreeParameter("valve.discharge_coefficient", start=0.3)]
     assert fitted(experiment, *far).values["foot_plate.inertia"] == pytest.approx(0.0084, rel=0.01)
 
 
-def test_the_same_problem_gives_the_same_numbers(experiment: Experiment) -> None:
+def test_the_same_problem_gives_the_same_numbers(experiment: FittedExperiment) -> None:
     first, second = (fitted(experiment, FLOW, INERTIA) for _ in range(2))
     assert first.values == second.values
 
 
 def test_a_cylinder_is_fitted_as_a_vane_is(recorded: Callable[..., Recording]) -> None:
     scenario = load_scenario("step-response", ["device.set=cylinder-lever", "motion.kind=free", "run.duration=0.35 s"])
-    experiment = Experiment("cylinder", scenario, recorded(scenario))
+    experiment = FittedExperiment("cylinder", scenario, recorded(scenario))
     path = "valve.sonic_conductance" if hasattr(scenario.device.valve.orifice, "sonic_conductance") else FLOW.path
     truth = number_at(scenario, path)
 
