@@ -54,6 +54,7 @@ _FAR_ABOVE = 2.0
 """Largest pressure in a chamber over its supply, both absolute, above which it is said; healthy wearers stay below."""
 
 
+@in_units(lambda worn: worn.scenario.device.shown)
 def safety_remarks(worn: WalkResult) -> list[str]:
     """Return what is fitted, torques above the limit, pressures far above the supply, pauses, stop, strides helped."""
     scenario, supply = worn.scenario, worn.scenario.device.supply

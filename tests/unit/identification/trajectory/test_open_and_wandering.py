@@ -67,7 +67,7 @@ def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_t
     found = wandering_by(experiment, 6000.0)
 
     assert "what is left of pressure_1 wanders by" in found.conflict
-    assert "its zero by 2.1 kPa at most; the model lacks something" in found.conflict
+    assert "its zero by 0.3 psi at most; the model lacks something" in found.conflict
     assert found.estimates[0].verdict == "holds for this model only"
 
 
