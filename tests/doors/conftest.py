@@ -8,6 +8,7 @@ import pytest
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.exports.fmu import platforms
 from ppafo.model.catalog import ACTUATORS
+from tests.doors.of_python import compiled_result, scenario_of
 from tests.doors.table import ROOT
 from tests.page_code import write_package
 
@@ -40,3 +41,6 @@ def _installed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
             del kinds[name]
     for name in [name for name in sys.modules if name.split(".")[0] in ("my_actuators", "my_laws")]:
         del sys.modules[name]
+    # What was kept of these modules is not that of the next ones.
+    for kept in (scenario_of, compiled_result):
+        kept.cache_clear()

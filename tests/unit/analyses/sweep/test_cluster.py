@@ -20,6 +20,7 @@ from ppafo import plugins
 from ppafo.analyses.sweep import cluster
 from ppafo.analyses.sweep.solve import LOG, sweep
 from ppafo.errors import KindError, StudyError
+from ppafo.metrics import METRICS
 from ppafo.plugins import Plugin
 from ppafo.progress import Progress
 from ppafo.storage.files import LEFT_ASIDE
@@ -158,6 +159,8 @@ def test_workers_get_the_modules_of_the_person(
     (tmp_path / "my_number.py").write_text("NAME = 'own'\n", encoding="utf-8")
     monkeypatch.setattr(plugins, "_named", {})
     monkeypatch.setenv(plugins.VARIABLE, "")
+    # The metric goes with this test.
+    monkeypatch.setattr(METRICS, "_kinds", {**METRICS.loaded()})
     small["outputs"]["metrics"] = ["my_metric:KIND"]
     sweep(small, out=tmp_path / "here", threads=1, plugins=[tmp_path / "my_metric.py"])
     monkeypatch.setattr(cluster, "work_on_chunk", _on_another_computer)
