@@ -138,8 +138,8 @@ class FindResult:
     ``values`` (values,) ascend, ``metrics`` are the metric at each, nan where the run failed, and ``spread`` its
     standard deviation over ``noise_streams``. ``judged`` is what the condition is asked of: the metric, where the loop
     oscillates on the hold the larger one of it and of the RMS error there, and nan where it turns all the time.
-    ``is_met`` tells which meet the condition: none that does not follow its
-    reference, of which ``follows`` tells. ``value`` is the outermost that meets the condition, None where none does,
+    ``is_met`` is true where the condition is met and the run follows its reference, which ``follows`` holds for
+    each value. ``value`` is the outermost that meets the condition, None where none does,
     and ``beyond`` its neighbour on the outer side, None at the end of the range.
     """
 

@@ -36,7 +36,7 @@ class ConventionOf(Protocol):
 
 
 class FileTest(Protocol):
-    """Test that tells files of a form from others with their suffix."""
+    """Content check for a gait form whose file suffix is shared with other forms."""
 
     def __call__(self, path: str | Path, /) -> bool:
         """Return whether a file is of the form, by its content."""

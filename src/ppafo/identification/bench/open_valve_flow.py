@@ -114,7 +114,7 @@ _MOST = 1.0
 
 
 def _doubted(result: BenchResult, path: str, area: float) -> BenchResult:
-    """Return a result that tells of a discharge coefficient above 1, which has one of three causes."""
+    """Return the result with a remark on a discharge coefficient above 1 and its three possible causes."""
     found = next((one for one in result.estimates if one.path == path and one.unit == ""), None)
     if found is None or found.low <= _MOST:
         return result
@@ -172,9 +172,9 @@ def open_readings(
     # A log that begins before the air is on says nothing there, and no column of it is wrong.
     limit = tolerances.zero_of_flow * float(np.abs(flow[is_open]).max())
     rests = is_open & (downstream >= upstream) & (np.abs(flow) <= limit)
-    told: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
     if rests.sum() > is_open.sum() // 10 and (is_open & ~rests).sum() >= MINIMUM_SAMPLES:
-        told = (f"left out: {rests.sum()} of {is_open.sum()} readings without flow and pressure difference",)
+        remarks = (f"left out: {rests.sum()} of {is_open.sum()} readings without flow and pressure difference",)
         is_open = is_open & ~rests
     upstream, downstream, flow = upstream[is_open], downstream[is_open], flow[is_open]
     wrong = np.flatnonzero(downstream >= upstream)
@@ -192,4 +192,4 @@ def open_readings(
     read = meter_readings(sources, PROCEDURE, direction, tolerances.zero_of_flow, is_open)
     possible = read.possible[is_open]
     kept = [label for label, is_kept in zip(recordings_of(sources), read.possible.tolist(), strict=True) if is_kept]
-    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, (*told, *read.remarks)
+    return upstream[possible], downstream[possible], np.abs(flow[possible]), kept, (*remarks, *read.remarks)
