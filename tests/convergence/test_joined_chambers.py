@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     begin_still_gas,
@@ -70,7 +71,7 @@ def stepped(*overrides: str) -> Course:
     valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.RecyclingState()
     angle = math.radians(75.0)
     state = state_with_volumes(plant, angle, 0.0, *chamber_volumes(plant, angle), ROOM, ROOM)
-    held = held_chambers(plant, state.angle)
+    held = held_chambers(plant, state.angle, parts=VANE_FUNCTIONS)
     rows = []
     for number in range(round(0.6 / STEP) + 1):
         time = number * STEP

@@ -71,6 +71,8 @@ class PythonFunctions:
             return self.of(value)
         if isinstance(value, Mapping):
             return {key: self._part(part) for key, part in value.items()}
+        if is_made_of(value):
+            return type(value)(*map(self._part, value))
         if is_dataclass(value) and not isinstance(value, type):
             changed = {part.name: self._part(getattr(value, part.name)) for part in fields(value) if part.init}
             return replace(value, **changed)
@@ -118,11 +120,7 @@ class PythonFunctions:
 
     def _named_defaults(self, function: FunctionType) -> dict[str, Any]:
         """Defaults of the parameters by name, and in its parts what the program has in the place of functions."""
-
-        def linked(part: Any) -> Any:
-            return type(part)(*map(linked, part)) if is_made_of(part) else self.of(part, function)
-
-        return {name: linked(value) for name, value in (function.__kwdefaults__ or {}).items()}
+        return {name: self._part(value) for name, value in (function.__kwdefaults__ or {}).items()}
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """Return the law of an effect, called as its port is, with the present rows of the effect."""
@@ -167,9 +165,9 @@ def in_program(
     rows = {effect.name: row for effect, row in zip(program.effects, effects, strict=True)}
     own = functions_of(program, rows, operations).of(function)
 
-    def called(states: Mapping[str, Any], *arguments: Any) -> Any:
+    def called(states: Mapping[str, Any], *arguments: Any, **named: Any) -> Any:
         rows.update(states)
-        return own(*arguments)
+        return own(*arguments, **named)
 
     return called
 

@@ -18,7 +18,6 @@ from ppafo.engine.step.lane import Now
 from ppafo.engine.step.phases import hold_chambers
 from ppafo.engine.step.sample import fill_signals, remember_readings, sense
 from ppafo.gym.tasks import Goal, Memory, Outcome, Requested, Task, finite, reward_of
-from ppafo.model.plant import chamber_pressures, joint_torque
 
 
 class Action(NamedTuple):
@@ -105,8 +104,10 @@ def observe(
     time = now.step * lane.timing.step
     torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
     wanted = Requested(torque_wanted, rate)
-    pressure_1, pressure_2 = chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
-    torque = joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
+    pressure_1, pressure_2 = parts.actuator.pressures(
+        lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2
+    )
+    torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     gas = lane.state.supplied_mass - lane.memory.supplied_mass
     lane.memory = task.kept(lane.memory, lane.state.supplied_mass, lane.seen, time)
     lane.view = task.observed(lane.seen, lane.goal, lane.memory, wanted, lane.result.command, time)

@@ -10,6 +10,7 @@ import pytest
 
 import ppafo
 from ppafo.engine.loading import BACKEND_VARIABLE
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.sensors import Measurement, measure
@@ -213,7 +214,9 @@ def test_replayed_commands_of_a_law_have_the_bits_of_its_walk_and_its_sensors_ar
     pressures = recording["pressure_1"], recording["pressure_2"]
     for sample in (late, 400, 700):
         then = sample - late
-        seen = measure(sensors, recording["angle"][then], *(item[then] for item in pressures), plant, then)
+        seen = measure(
+            sensors, recording["angle"][then], *(item[then] for item in pressures), plant, then, parts=VANE_FUNCTIONS
+        )
         shown = (seen.angle, seen.pressure_1 / BAR, seen.pressure_2 / BAR, seen.torque)
         assert np.array_equal(observations[sample][:4], np.array(shown, dtype=np.float32))
 
