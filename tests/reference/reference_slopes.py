@@ -16,7 +16,7 @@ from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
 from ppafo.model.binding import made_of
-from ppafo.model.effects.kind import Moment
+from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
@@ -316,7 +316,7 @@ def slope_lines(program: Program, collector: SourceCollector) -> list[str]:
     lines += [f"valve_state_moves = {add(program.valve.rates)}(valve, valve_state, command)"]
     if program.stated:
         seen = "angle, rate, pressure_1, pressure_2, gas.supplied, gas.vented, command"
-        lines.append(f"now = {add(Moment)}({seen})")
+        lines.append(f"now = {add(PlantSnapshot)}({seen})")
     for name, kind in program.stated.items():
         lines.append(f"{name}_state_moves = {add(kind.slopes)}({name}, {name}_state, now)")
     lines += [f"{cell.replace('y', 'slopes', 1)} = {_moves(path)}" for path, cell in state_cells(program).items()]

@@ -12,7 +12,7 @@ from ppafo.model.plant import PlantParameters
 from ppafo.model.valves.kind import valve_problem
 
 
-class Linked(Protocol):
+class LinkCollector(Protocol):
     """Collector of the functions that replace model functions."""
 
     links: dict[Any, Any]
@@ -24,7 +24,7 @@ class Linked(Protocol):
     """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
 
 
-def link_program(program: Program, collector: Linked) -> None:
+def link_program(program: Program, collector: LinkCollector) -> None:
     """Let a collector call what the components of a program have in the place of functions of the model.
 
     ProgramError for an effect that cannot act, or whose name other rows of the program have.
@@ -54,7 +54,7 @@ def link_program(program: Program, collector: Linked) -> None:
     link_effects(program.effects, collector)
 
 
-def link_effects(effects: Sequence[Effect], collector: Linked) -> None:
+def link_effects(effects: Sequence[Effect], collector: LinkCollector) -> None:
     """Let a collector call the laws of effects at their ports. ProgramError for an effect that cannot act."""
     for effect in effects:
         problem = effect_problem(effect)
