@@ -23,12 +23,12 @@ from ppafo.engine.continuous_time import (
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
-from ppafo.engine.loading import load_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
 from ppafo.errors import SimulationError
 from ppafo.model.ports import at_valve, friction_at_rest, shown_signals
 from ppafo.model.sensors import Measurement, measure
+from tests.interpreted import load_source
 from tests.reference.reference_slopes import (
     PLANT_UNKNOWNS,
     gas_unknowns,

@@ -63,18 +63,18 @@ class PythonFunctions:
         """All that a program says of itself, worked out once."""
         names = [name for name in dir(program) if not name.startswith("_")]
         values = {name: getattr(program, name) for name in names}
-        return SimpleNamespace(**{name: self._part(value) for name, value in values.items()})
+        return SimpleNamespace(**{name: self.part(value) for name, value in values.items()})
 
-    def _part(self, value: Any) -> Any:
-        """A part of a program, with the functions that stand for its own."""
+    def part(self, value: Any) -> Any:
+        """A part of a program or an argument, with the functions that stand for its own."""
         if isinstance(value, FunctionType | ModuleType):
             return self.of(value)
         if isinstance(value, Mapping):
-            return {key: self._part(part) for key, part in value.items()}
+            return {key: self.part(part) for key, part in value.items()}
         if is_made_of(value):
-            return type(value)(*map(self._part, value))
+            return type(value)(*map(self.part, value))
         if is_dataclass(value) and not isinstance(value, type):
-            changed = {part.name: self._part(getattr(value, part.name)) for part in fields(value) if part.init}
+            changed = {part.name: self.part(getattr(value, part.name)) for part in fields(value) if part.init}
             return replace(value, **changed)
         return value
 
@@ -120,7 +120,7 @@ class PythonFunctions:
 
     def _named_defaults(self, function: FunctionType) -> dict[str, Any]:
         """Defaults of the parameters by name, and in its parts what the program has in the place of functions."""
-        return {name: self._part(value) for name, value in (function.__kwdefaults__ or {}).items()}
+        return {name: self.part(value) for name, value in (function.__kwdefaults__ or {}).items()}
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """Return the law of an effect, called as its port is, with the present rows of the effect."""
@@ -396,11 +396,6 @@ def quotient(dividend: float, divisor: float) -> float:
 def whole_part(value: float) -> int:
     """Return a number without its fraction; ``LOWEST_INTEGER`` for NaN and for what 64 bits do not hold."""
     return int(value) if LOWEST_INTEGER <= value < -LOWEST_INTEGER else LOWEST_INTEGER
-
-
-def power(base: float, exponent: float) -> float:
-    """Return a power as the C library has it: NaN for a root of a negative number, where Python's is complex."""
-    return float(MATH.pow(base, exponent))
 
 
 def _square_root(value: float) -> float:
