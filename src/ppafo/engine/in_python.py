@@ -27,7 +27,7 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import COMPILED_BUILTINS
+from ppafo.engine.source_text import COMPILED_BUILTINS, MadeFrom, Read
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
@@ -58,6 +58,7 @@ class PythonFunctions:
     ) -> None:
         self._links, self._effects, self._rows, self._operations = links, effects, rows, operations
         self._made: dict[Any, Any] = {}
+        self.made_from = MadeFrom()
 
     def parts(self, program: Program) -> Any:
         """All that a program says of itself, worked out once."""
@@ -106,6 +107,7 @@ class PythonFunctions:
             given = function.__globals__
             # A module has many more names than a function asks for.
             read = {name: given[name] for name in _names_of(function.__code__) if name in given}
+            self.made_from.reads += [Read(given, name, value) for name, value in read.items()]
             scope: dict[str, Any] = {"__builtins__": given["__builtins__"], "__name__": function.__module__}
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
             rows = self._effects.get(function, ())
@@ -201,14 +203,40 @@ def over_samples(function: PlainFunction, *arguments: Any) -> Any:
 
     What is the same for all samples may stay one number.
     """
-    return _over_samples(lambda operations: PythonFunctions({}, {}, {}, operations).of(function), arguments)
+    return _over_samples(partial(_with_operations, function), arguments)
+
+
+def _with_operations(function: PlainFunction, operations: "Operations | None") -> PlainFunction:
+    """A function of the model with other operations, made anew where a name in it stands for something else by now."""
+    if operations is not COLUMNS:
+        own: PlainFunction = PythonFunctions({}, {}, {}, operations).of(function)
+        return own
+    functions, own = _for_columns(function)
+    if functions.made_from.is_current():
+        return own
+    _for_columns.cache_clear()
+    return _for_columns(function)[1]
+
+
+@lru_cache(maxsize=256)
+def _for_columns(function: PlainFunction) -> tuple[PythonFunctions, PlainFunction]:
+    functions = PythonFunctions({}, {}, {}, COLUMNS)
+    return functions, functions.of(function)
 
 
 def over_samples_in(
     program: Program, effects: Sequence[Any], function: PlainFunction, states: Mapping[str, Any], *arguments: Any
 ) -> Any:
     """Value of a function of the model as a program has it, with parameters and states of effects, over samples."""
+    if not _reaches_law(program, function):
+        return over_samples(function, *arguments)
     return _over_samples(partial(in_program, function, program, effects), (states, *arguments))
+
+
+@lru_cache(maxsize=256)
+def _reaches_law(program: Program, function: PlainFunction) -> bool:
+    """True where a law of an effect acts in a function."""
+    return functions_of(program, {}).of(function) is not function
 
 
 def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
