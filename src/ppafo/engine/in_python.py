@@ -157,15 +157,13 @@ def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ..
     return collector.links, collector.effects
 
 
-def in_program(
-    function: PlainFunction, program: Program, effects: Sequence[Any], operations: "Operations | None" = None
-) -> PlainFunction:
+def in_program(function: PlainFunction, program: Program, effects: Sequence[Any]) -> PlainFunction:
     """Return a function of the model as a program has it, with parameters of its effects.
 
     Before its own arguments it takes the states of effects by name, an empty mapping where there are none.
     """
     rows = {effect.name: row for effect, row in zip(program.effects, effects, strict=True)}
-    own = functions_of(program, rows, operations).of(function)
+    own = functions_of(program, rows).of(function)
 
     def called(states: Mapping[str, Any], *arguments: Any) -> Any:
         rows.update(states)

@@ -38,10 +38,10 @@ _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
 
 
-def _first_cell(path: str | Path, delimiters: str = ",;\t") -> str:
+def _first_cell(path: str | Path) -> str:
     """First cell of a text file; empty for a file that is no text."""
     line = next((line for line in lines_of(path) if line.strip()), "")
-    return re.split(f"[{delimiters}]", line, maxsplit=1)[0].strip().strip('"').strip()
+    return re.split(r"[,;\t]", line, maxsplit=1)[0].strip().strip('"').strip()
 
 
 def _bare(label: str) -> str:
