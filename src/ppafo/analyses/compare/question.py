@@ -96,7 +96,7 @@ def compare(
     comparison = compared(chosen, reference, overrides_by_task(taken_tasks(tasks)), loaded, requested)
     if draws is not None and not comparison.draws:
         raise StudyError(
-            f"draws = {draws}: nothing is drawn here; give a study, or sensors with noise, or leave it out"
+            f"draws = {draws}: nothing in this comparison is random; give a study or sensors with noise, or omit draws"
         )
     finding = finding_of(comparison)
     if not check:
