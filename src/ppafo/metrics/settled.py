@@ -14,7 +14,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
 from ppafo.model.columns import larger, root
 from ppafo.model.controlled import value_in
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 SHORTEST_HOLD = 0.1
 """Share of a run that a hold must last to be judged as one [-]."""
@@ -46,7 +46,7 @@ class SettledSums(NamedTuple):
     bottom: float
 
 
-def start_settled(course: Course, sample: Sample) -> SettledSums:
+def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     """Sums of the first sample."""
     value = value_in(sample)
     error = value - sample.reference
@@ -70,7 +70,7 @@ def start_settled(course: Course, sample: Sample) -> SettledSums:
     )
 
 
-def update_settled(state: SettledSums, course: Course, sample: Sample) -> SettledSums:
+def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
     """Sums with one more sample; they begin anew where half of the run, or of the hold, is over."""
     value = value_in(sample)
     error = value - sample.reference

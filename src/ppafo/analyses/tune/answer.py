@@ -354,7 +354,7 @@ def _remarks(
     ]
     printed = after.fresh or after.values
     said += [
-        f"the loop oscillates on the hold, and {name} is one instant of that: it is judged by "
+        f"the loop oscillates on the hold, and {name} is one instant of that: what counts is "
         f"{_number(name, judged)}, {metric_words(ONE_INSTANT[name][0])}"
         for name, judged in after.judged.items()
         if judged > printed[name]
