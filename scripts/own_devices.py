@@ -49,7 +49,7 @@ FAR = 2.0
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class RandomValue:
     """A device in words and as overrides of the walk ``proportional``."""
 
     words: str
@@ -71,14 +71,14 @@ class Cell:
         return f"{self.gas:.2f} {self.error:.2f}{'!' if self.oscillates else ''}{'x' if self.stopped else ''}"
 
 
-def draw_device(draw: random.Random) -> Drawn:
+def draw_device(draw: random.Random) -> RandomValue:
     """A vane with a proportional valve between a toy and a hoist; the law asks for no more than the supply holds."""
     constant, gauge = draw.uniform(9.0, 47.0), draw.uniform(3.3, 6.9)
     dead_1, dead_2 = (draw.uniform(2.0, 37.0) for _ in range(2))
     conductance, delay = 0.2 * 12.0 ** draw.random(), draw.uniform(1.0, 13.0)
     species = draw.choice(("air", "CO2"))
     torque = min(5.0, 0.08 * constant * gauge)
-    return Drawn(
+    return RandomValue(
         f"K {constant:.0f} cm^3, dead {dead_1:.0f} and {dead_2:.0f} cm^3, C {conductance:.2f} L/(s bar), "
         f"{delay:.1f} ms, {species}, {gauge:.1f} bar",
         (
@@ -104,7 +104,7 @@ def main_gain(scenario: Scenario) -> tuple[str, bool]:
     return f"controller.{item.name}", BOUNDARY in item.follows
 
 
-def walk_law(law: str, device: Drawn, seconds: float) -> Cell:
+def walk_law(law: str, device: RandomValue, seconds: float) -> Cell:
     """A law on a device with the gains of the rule, against the best of its multiples."""
     scenario = load_walk("proportional", [f"controller.kind={law}", f"run.duration={seconds!r} s", *device.overrides])
     path, slower = main_gain(scenario)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.page.workbench import openings_of
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
@@ -28,7 +28,7 @@ NAME = "the paper's 9 oz bottle of CO₂"
 def minutes_of_bottle() -> dict[str, Any]:
     """Return name, flows [kg/s] and minutes: what ``ppafo bottle`` says of a steady gas use without rest."""
     bottle, schedule = load_bottle(PAPER_BOTTLE), Schedule(walk=_LONGEST, rest=0.0, longest=_LONGEST)
-    draws = [draw_of_numbers(flow, 1.0, None) for flow in FLOWS.tolist()]
+    draws = [demand_of_numbers(flow, 1.0, None) for flow in FLOWS.tolist()]
     lasting = [follow_bottle(bottle, draw, schedule).discharge.walking_time for draw in draws]
     return {
         "name": NAME,

@@ -89,7 +89,7 @@ def pytest_configure(config: pytest.Config) -> None:
         "markers", "thorough: `make test-all` and `make test-long` run it, continuous integration does not"
     )
     config.addinivalue_line("markers", "short: `make test` runs it too, whatever it costs")
-    kept.Wanted.compile = counted(kept.Wanted.compile)  # type: ignore[method-assign]
+    kept.RequestedProgram.compile = counted(kept.RequestedProgram.compile)  # type: ignore[method-assign]
     if not hasattr(config, "workerinput"):
         config.pluginmanager.register(Table(config), "table of costs")
 

@@ -34,7 +34,7 @@ _BATCH = 50
 
 
 @dataclass(frozen=True)
-class Ran:
+class FinishedRun:
     """What a module gave for one run: checked settings, status, samples that hold, metrics, columns of channels."""
 
     checked: int
@@ -45,20 +45,20 @@ class Ran:
 
 
 @dataclass(frozen=True)
-class Given:
+class NumberWithUnit:
     """What a module gave for many: each alone, and statuses, metrics and traces of all as an ensemble.
 
     ``traces`` are those of one channel (runs, places), ``every_trace`` those of all (runs, channels, places).
     """
 
-    runs: list[Ran]
+    runs: list[FinishedRun]
     statuses: Floats
     metrics: Floats
     traces: Floats
     every_trace: Floats
 
 
-def driven(module: WasmModule, settings: Floats, channel: int = 0, places: int = 100) -> Given:
+def driven(module: WasmModule, settings: Floats, channel: int = 0, places: int = 100) -> NumberWithUnit:
     """Run a module under node for settings (runs, settings)."""
     counts = {key: len(module.description[key]) for key in ("settings", "channels", "metrics")}
     traced = {"channel": channel, "every": EVERY, "places": places}
@@ -82,7 +82,7 @@ def driven(module: WasmModule, settings: Floats, channel: int = 0, places: int =
         checked, samples, status, good = map(int, take(4))
         metrics = take(counts["metrics"])
         columns = take(samples * counts["channels"]).reshape(counts["channels"], samples)
-        runs.append(Ran(checked, status, good, metrics, columns))
+        runs.append(FinishedRun(checked, status, good, metrics, columns))
     ended, *statuses = take(1 + len(settings))
     assert ended == COMPLETED
     metrics = take(counts["metrics"] * len(settings)).reshape(len(settings), -1)
@@ -90,7 +90,7 @@ def driven(module: WasmModule, settings: Floats, channel: int = 0, places: int =
     channels = counts["channels"] - 1
     every_trace = take(places * len(settings) * channels).reshape(len(settings), channels, places)
     assert taken == numbers.size
-    return Given(runs, np.array(statuses), metrics, traces, every_trace)
+    return NumberWithUnit(runs, np.array(statuses), metrics, traces, every_trace)
 
 
 def drawn(module: WasmModule, draws: int, spread: tuple[float, float] = (0.7, 1.4), seed: int = 16) -> Floats:
@@ -201,7 +201,7 @@ def _results(name: str, module: WasmModule, rows: Floats) -> Sequence[Result | W
     return [None if scenario is None else next(results) for scenario in scenarios]
 
 
-def _compared_run(module: WasmModule, ran: Ran, row: Floats, result: Result | WalkResult | None) -> str:
+def _compared_run(module: WasmModule, ran: FinishedRun, row: Floats, result: Result | WalkResult | None) -> str:
     if result is None:
         # A module does not know all contradictions of a walk, nor whether an angle that is wanted is beyond the stops.
         is_walk = module.description["kind"] == "walk"
@@ -216,7 +216,7 @@ def _wants_a_place(module: WasmModule) -> bool:
     return module.description["document"].get("reference", {}).get("of", "torque") != "torque"
 
 
-def assert_same(module: WasmModule, ran: Ran, result: Result | WalkResult) -> None:
+def assert_same(module: WasmModule, ran: FinishedRun, result: Result | WalkResult) -> None:
     """A run has the bits of Python in every sample of every channel, and its metrics but for rounding.
 
     One that was not completed has no metrics.
@@ -237,7 +237,7 @@ def assert_same(module: WasmModule, ran: Ran, result: Result | WalkResult) -> No
         assert np.isnan(ran.metrics).all()
 
 
-def _leaves_the_stops(module: WasmModule, ran: Ran, row: Floats) -> bool:
+def _leaves_the_stops(module: WasmModule, ran: FinishedRun, row: Floats) -> bool:
     """True for an ankle that is moved to the stops or beyond: no file may have it, a module runs it."""
     names = [item["name"] for item in module.description["channels"]]
     settings = dict(zip([item["key"] for item in module.description["settings"]], row.tolist(), strict=True))
@@ -259,7 +259,7 @@ def _assert_near(metrics: Sequence[dict[str, str]], values: Floats, result: Resu
     assert compared >= min(3, len(result.metrics))
 
 
-def assert_alike(given: Given) -> None:
+def assert_alike(given: NumberWithUnit) -> None:
     """The runs of an ensemble have the bits of each alone."""
     for place, ran in enumerate(given.runs):
         assert given.statuses[place] == ran.status

@@ -45,7 +45,7 @@ RECORDINGS = ("step-response", "torque-task-solenoid", "torque-task-proportional
 
 
 @dataclasses.dataclass
-class Ran:
+class FinishedRun:
     """One run: its folder, and what it printed."""
 
     folder: Path
@@ -54,17 +54,17 @@ class Ran:
 
 
 @pytest.fixture(scope="module")
-def ran(tmp_path_factory: pytest.TempPathFactory) -> Ran:
+def ran(tmp_path_factory: pytest.TempPathFactory) -> FinishedRun:
     """A run that the tests below only read."""
     folder = tmp_path_factory.mktemp("reproduce") / "out"
     said, progress = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(said), contextlib.redirect_stderr(progress):
         assert main(["reproduce", "--out", str(folder)]) == 0
-    return Ran(folder, said.getvalue(), progress.getvalue())
+    return FinishedRun(folder, said.getvalue(), progress.getvalue())
 
 
 @pytest.fixture
-def out(ran: Ran) -> Path:
+def out(ran: FinishedRun) -> Path:
     """The folder of that run."""
     return ran.folder
 
@@ -120,7 +120,7 @@ def test_the_recordings_can_be_read_again(out: Path) -> None:
         assert {"angle", "pressure_1", "pressure_2", "torque", "supplied_mass"} <= set(recording.names)
 
 
-def test_the_command_prints_table_and_path_and_its_progress_aside(ran: Ran) -> None:
+def test_the_command_prints_table_and_path_and_its_progress_aside(ran: FinishedRun) -> None:
     lines = ran.said.splitlines()
     assert all(any(line.startswith(f"{name} ") for line in lines) for name in IDS)
     assert lines[-1] == f"report: {ran.folder / 'report.html'}"

@@ -16,7 +16,7 @@ import pytest
 from ppafo.model import plant, ports, sensors
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.declaration import Quantity
-from ppafo.model.effects.kind import Effect, Moment
+from ppafo.model.effects.kind import Effect, PlantSnapshot
 from ppafo.parameters import declaration, device
 from ppafo.signals.recording import CHANNELS
 
@@ -79,8 +79,9 @@ def nomenclature() -> Iterator[tuple[str, str]]:
     """Name and unit of every row of the nomenclature; a row may have several names, and a unit for each."""
     for line in (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")]
-        names = re.findall(r"`(\w+)`", cells[1]) if line.startswith("| ") and len(cells) == 5 else []
-        units = cells[2].split(", ") if names else []
+        place = next((number for number, cell in enumerate(cells[:2]) if "`" in cell and line.startswith("| ")), None)
+        names = [] if place is None else re.findall(r"`(\w+)`", cells[place])
+        units = [] if place is None else cells[place + 1].split(", ")
         units = units * len(names) if len(units) == 1 else units
         yield from zip(names, units, strict=True)
 
@@ -164,10 +165,16 @@ def test_no_name_of_the_nomenclature_is_listed_twice() -> None:
     assert sorted({name for name in names if names.count(name) > 1}) == []
 
 
-def test_every_row_of_the_nomenclature_says_where_its_symbol_stands() -> None:
-    rows = re.findall(r"^\| .*`.*$", (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8"), re.MULTILINE)
+def test_every_row_of_the_nomenclature_or_the_line_above_its_table_says_where_its_symbol_stands() -> None:
+    sections = (ROOT / "docs" / "nomenclature.md").read_text(encoding="utf-8").split("\n## ")[1:]
+    rows = {
+        row: section.partition("\n|")[0] for section in sections for row in re.findall(r"^\| .*`.*$", section, re.M)
+    }
     assert len(rows) > 100
-    assert [row for row in rows if not re.search(r"\| \[[^\]]+\]\(\S+\.md\S*\) \|$", row)] == []
+    page = r"\[[^\]]+\]\(\S+\.md\S*\)"
+    assert [
+        row for row, head in rows.items() if not re.search(rf"\| {page} \|$", row) and not re.search(page, head)
+    ] == []
 
 
 def test_every_name_of_the_nomenclature_is_a_parameter_or_field_or_declared_value() -> None:
@@ -222,7 +229,7 @@ def test_an_effect_has_its_lines_in_nomenclature_and_equations(effect: Effect) -
 def test_the_page_on_effects_lists_every_field_of_a_moment_and_every_place() -> None:
     page = (ROOT / "docs" / "how-to" / "extend.md").read_text(encoding="utf-8")
     laws = [name for name, law in inspect.getmembers(ports, inspect.isfunction) if law.__module__ == ports.__name__]
-    assert [name for name in (*Moment._fields, *laws) if f"`{name}" not in page] == []
+    assert [name for name in (*PlantSnapshot._fields, *laws) if f"`{name}" not in page] == []
 
 
 def test_units_of_the_nomenclature_are_the_declared_ones() -> None:

@@ -47,7 +47,7 @@ ALLOWED_IN_PAGES: Mapping[str, tuple[str, str]] = {
     "SECURITY.md": ("answer", "a reply to a person"),
     "docs/architecture.md": ("lane|lanes|pieces", "lanes of a processor, in the engine"),
     "docs/decisions/0001-batched-runs.md": ("lanes", "lanes of a processor, in the engine"),
-    "docs/evidence.md": ("Free vanes|answered", "a group of benchmarks, by its name"),
+    "docs/evidence.md": ("FitVariable vanes|answered", "a group of benchmarks, by its name"),
     "docs/measured.md": ("printed", "by a 3D printer"),
 }
 """By page: words that stand there for something else, and for what."""

@@ -126,7 +126,7 @@ def mapped(table: Table, names: list[str]) -> str:
 
 
 @dataclass(frozen=True)
-class Ran:
+class FinishedRun:
     """How a command ended."""
 
     code: int
@@ -135,14 +135,14 @@ class Ran:
     first_line: int
 
 
-Run = Callable[[str, Table, bool], Ran]
+Run = Callable[[str, Table, bool], FinishedRun]
 
 
 @pytest.fixture
 def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
     """Run a command on a table as a file with a header, or without one and through a column map."""
 
-    def command(name: str, table: Table, through_map: bool) -> Ran:
+    def command(name: str, table: Table, through_map: bool) -> FinishedRun:
         (tmp_path / "bench.csv").write_text(text(table, not through_map))
         whole = list((decay() if name == "identify" else step()).columns)
         maps = mapped(table, whole)
@@ -158,7 +158,7 @@ def run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Run:
             words += ["--columns", str(tmp_path / "maps.toml")] if through_map else []
         code = main(words)
         printed = capsys.readouterr()
-        return Ran(code, printed.out, printed.err, 1 if through_map else 2)
+        return FinishedRun(code, printed.out, printed.err, 1 if through_map else 2)
 
     return command
 

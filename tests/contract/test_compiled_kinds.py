@@ -18,7 +18,7 @@ from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
 from ppafo.model.catalog import EFFECTS, VALVES
-from ppafo.model.effects.kind import Moment
+from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.sensors import (
     Fault,
     GaitMeasurement,
@@ -31,7 +31,7 @@ from ppafo.model.sensors import (
 )
 from ppafo.parameters.loading import load_device
 from ppafo.parameters.plant import plant_parameters
-from ppafo.signals.meter import Course, EnergySample, FootSample, GasSample, MeterKind, Sample, StrideSample
+from ppafo.signals.meter import EnergySample, FootSample, GasSample, MeterKind, ReferenceSummary, Sample, StrideSample
 from tests.compilers_here import first_compiler
 
 ROUNDING = 1.0e-12
@@ -152,7 +152,9 @@ def effects(draw: random.Random) -> Iterator[Entry]:
         if effect.state is None:
             continue
         row, state = effect.parameters, effect.state.row
-        moments = [(numbers(row), numbers(state), numbers(Moment), numbers(Moment), 1e-3) for _ in range(50)]
+        moments = [
+            (numbers(row), numbers(state), numbers(PlantSnapshot), numbers(PlantSnapshot), 1e-3) for _ in range(50)
+        ]
         if effect.state.start is not None:
             yield Entry(f"{effect.name}_start", effect.state.start, [(given[0], given[2]) for given in moments])
         yield Entry(f"{effect.name}_advance", effect.state.advance, moments)
@@ -161,7 +163,7 @@ def effects(draw: random.Random) -> Iterator[Entry]:
 
 def meters(draw: random.Random) -> Iterator[Entry]:
     """What is worked out sample by sample for the metrics."""
-    course = Course(2.0, 2.0, 1.0e-6, 20.0)
+    course = ReferenceSummary(2.0, 2.0, 1.0e-6, 20.0)
     samples = []
     for number in range(60):
         drawn = [draw.uniform(-2.0, 2.0) for _ in range(6)]

@@ -114,7 +114,9 @@ def test_a_verb_that_is_mistyped_is_refused_with_the_nearest_one(capsys: pytest.
         assert said in capsys.readouterr().err
 
 
-def plain(name: str, times: int, *, files: Sequence[Path] = (), share: float = 0.5, loud: bool = False) -> output.Said:
+def plain(
+    name: str, times: int, *, files: Sequence[Path] = (), share: float = 0.5, loud: bool = False
+) -> output.CommandOutput:
     """Say what was given.
 
     name: who
@@ -124,7 +126,7 @@ def plain(name: str, times: int, *, files: Sequence[Path] = (), share: float = 0
     loud: whether to say it aloud
     """
     given = {"name": name, "times": times, "files": [str(file) for file in files], "share": share, "loud": loud}
-    return output.Said(repr(given), given)
+    return output.CommandOutput(repr(given), given)
 
 
 def test_a_function_with_plain_types_is_a_command(capsys: pytest.CaptureFixture[str]) -> None:

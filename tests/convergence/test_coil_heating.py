@@ -14,7 +14,7 @@ from ppafo.model.effects.coil_heating import (
     prepare,
     slower,
 )
-from ppafo.model.effects.kind import Moment
+from ppafo.model.effects.kind import PlantSnapshot
 
 SETTINGS = CoilSettings(steady_rise=80.0, time_constant=0.2, pull_in_share=0.6)
 
@@ -30,7 +30,7 @@ def test_the_parabola_is_the_opening_time_of_a_coil_with_resistance_and_inductan
 
 
 def test_a_coil_that_is_on_warms_and_the_other_cools() -> None:
-    row, now = prepare(SETTINGS, SimpleNamespace()), Moment(0.0, 0.0, 1e5, 1e5, 0.0, 0.0, 1.0)
+    row, now = prepare(SETTINGS, SimpleNamespace()), PlantSnapshot(0.0, 0.0, 1e5, 1e5, 0.0, 0.0, 1.0)
     after = advance(row, CoilRises(10.0, 10.0), now, now, 0.1)
     kept = np.exp(-0.5)
     assert after == pytest.approx((80.0 + (10.0 - 80.0) * kept, 10.0 * kept), rel=1e-9)

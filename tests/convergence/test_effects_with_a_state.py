@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.model.catalog import EFFECTS
 from ppafo.model.declaration import Number
-from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.effects.kind import Effect, PlantSnapshot, State
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
@@ -58,18 +58,20 @@ class Amount(NamedTuple):
     amount: float
 
 
-def started(_runaway: Runaway, _now: Moment) -> Amount:
+def started(_runaway: Runaway, _now: PlantSnapshot) -> Amount:
     """One."""
     return Amount(1.0)
 
 
-def advanced(runaway: Runaway, runaway_state: Amount, _before: Moment, _after: Moment, step: float) -> Amount:
+def advanced(
+    runaway: Runaway, runaway_state: Amount, _before: PlantSnapshot, _after: PlantSnapshot, step: float
+) -> Amount:
     """More than any float in a few steps."""
     grown = runaway_state.amount * (1.0 + step * runaway.rate)
     return Amount(grown * grown * grown)
 
 
-def grows(runaway: Runaway, runaway_state: Amount, _now: Moment) -> Amount:
+def grows(runaway: Runaway, runaway_state: Amount, _now: PlantSnapshot) -> Amount:
     """Its rate [1/s]."""
     return Amount(runaway.rate * runaway_state.amount)
 

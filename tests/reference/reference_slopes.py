@@ -15,7 +15,7 @@ from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
 from ppafo.model.actuators.vane import chambers
-from ppafo.model.effects.kind import Moment
+from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
@@ -292,7 +292,7 @@ def slope_lines(program: Program, collector: SourceCollector) -> list[str]:
     lines += [f"valve_state_moves = {add(program.valve.rates)}(valve, valve_state, command)"]
     if program.stated:
         seen = "angle, rate, pressure_1, pressure_2, gas.supplied, gas.vented, command"
-        lines.append(f"now = {add(Moment)}({seen})")
+        lines.append(f"now = {add(PlantSnapshot)}({seen})")
     for name, kind in program.stated.items():
         lines.append(f"{name}_state_moves = {add(kind.slopes)}({name}, {name}_state, now)")
     lines += [f"{cell.replace('y', 'slopes', 1)} = {_moves(path)}" for path, cell in state_cells(program).items()]

@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.compilers import Effort
-from ppafo.engine.lanes import Advancing, BatchResult, LaneBlock, run_batch, write_source
+from ppafo.engine.lanes import BatchResult, LaneBlock, RunnableProgram, run_batch, write_source
 from ppafo.golden_bits import digest, golden_hashes, names, plain_batch
 from ppafo.simulation.loading import list_scenarios
 from ppafo.walking import list_walks
@@ -49,7 +49,7 @@ def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, mon
 def test_a_quickly_compiled_program_has_the_golden_bits(name: str) -> None:
     batch = plain_batch(name)
     module = load_generated(write_source(batch.program)[1], first_compiler().with_effort(Effort.QUICK))
-    block = LaneBlock(cast(Advancing, module), batch.program, batch.clock, batch.parameters, batch.states)
+    block = LaneBlock(cast(RunnableProgram, module), batch.program, batch.clock, batch.parameters, batch.states)
     block.advance(batch.clock.step_count)
     assert digest(block.result()) == golden_hashes()[name]["run"]
 

@@ -44,4 +44,4 @@ def test_every_analysis_returns_a_finding_which_prints_saves_and_draws_itself() 
     found = {name for name, words in returned.items() if all("Finding[" in part for part in words.split(" | "))}
     assert len(found) >= FEWEST_ANALYSES
     others = {name: words for name, words in returned.items() if name not in found}
-    assert set(others.values()) == {"Said"}, others
+    assert set(others.values()) == {"CommandOutput"}, others

@@ -129,13 +129,13 @@ ABOVE_ZERO = NumberRange(above=0.0)
 FROM_ZERO = NumberRange(lowest=0.0)
 
 
-class Given(float):
+class NumberWithUnit(float):
     """A number in SI with the unit in which it was given, in which people are shown it again."""
 
     __slots__ = ("unit",)
     unit: str
 
-    def __new__(cls, value: float, unit: str) -> "Given":
+    def __new__(cls, value: float, unit: str) -> "NumberWithUnit":
         """Return the number with its unit."""
         given = super().__new__(cls, value)
         given.unit = unit
@@ -146,7 +146,7 @@ def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
     """Return the units of the numbers given with a unit, by unit in SI; a pressure also sets its differences."""
     units: dict[str, str] = {}
     for si_unit, value in by_si_unit.items():
-        if isinstance(value, Given) and value.unit != SI:
+        if isinstance(value, NumberWithUnit) and value.unit != SI:
             units |= units_beside(si_unit, value.unit)
     return units
 
@@ -170,7 +170,7 @@ def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]
             raise ArgumentError(f"{text}: {error}") from error
         if value not in allowed:
             raise ArgumentError(f"{text}: must be {allowed.words(si_unit)}")
-        return Given(value, split_number(text)[1]) if si_unit in _SHOWN_AGAIN else value
+        return NumberWithUnit(value, split_number(text)[1]) if si_unit in _SHOWN_AGAIN else value
 
     return value_of
 
@@ -275,7 +275,7 @@ def taken_number(allowed: NumberRange = ANY, read: Callable[[str], float] | None
             raise ValueError
         if float(given) not in allowed:
             raise ValueError
-        return given if isinstance(given, Given) else float(given)
+        return given if isinstance(given, NumberWithUnit) else float(given)
 
     return take
 

@@ -252,8 +252,8 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
         library: TomlKind | None = kind_at(command.library) if command.library else None
         noun = command.listed or (library.noun if library is not None else "")
         if command.listing:
-            listed: output.Said | list[dict[str, Any]] = kind_at(command.listing)()
-            listing = listed if isinstance(listed, output.Said) else output.listing(noun, listed)
+            listed: output.CommandOutput | list[dict[str, Any]] = kind_at(command.listing)()
+            listing = listed if isinstance(listed, output.CommandOutput) else output.listing(noun, listed)
         else:
             assert library is not None
             files = {name: library.parse(library.read(name), name) for name in library.names()}

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ppafo.arguments import Name
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text
 from ppafo.errors import DataError, SimulationError, nearest_name
 
@@ -42,7 +42,7 @@ def doctor(
     bits: bool = False,
     programs: bool = False,
     schema: Name | None = None,
-) -> Said:
+) -> CommandOutput:
     """Show compilers and compiled models of this computer, check its bits; print the schema of a file.
 
     Exit code 1 where a run has other bits than on every other computer.
@@ -71,7 +71,7 @@ def doctor(
             hint = nearest_name(schema, FORMATS)
             raise DataError(f"there is no file format '{schema}'{hint}; available: {', '.join(FORMATS)}")
         document = importlib.import_module(FORMATS[schema]).json_schema()
-        return Said(json_text(document), document, f"{schema}.schema")
+        return CommandOutput(json_text(document), document, f"{schema}.schema")
     if bits:
         return _bits()
     folder = cache_folder()
@@ -85,10 +85,10 @@ def doctor(
 
         compile_models(load_scenario(name) for name in list_scenarios())
     document = models_document(folder, why_not) | ({"freed": cleared} if clear else {})
-    return Said(models_text(document, programs), document, "doctor")
+    return CommandOutput(models_text(document, programs), document, "doctor")
 
 
-def _bits() -> Said:
+def _bits() -> CommandOutput:
     """Return which runs have their golden bits here."""
     from ppafo.engine.loading import compilers_to_try
     from ppafo.golden_bits import found_bits
@@ -101,7 +101,7 @@ def _bits() -> Said:
         text,
         *(f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others),
     ]
-    return Said(
+    return CommandOutput(
         "\n".join(lines), {"compiler": by, "same_bits": found}, "bits", EXIT_CHECK_FAILED if others else EXIT_GOOD
     )
 

@@ -7,7 +7,7 @@ from importlib import resources
 from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
-from ppafo.cli.output import Said, listing
+from ppafo.cli.output import CommandOutput, listing
 from ppafo.errors import DataError, nearest_name
 
 _FOLDER = resources.files("ppafo") / "examples"
@@ -48,7 +48,7 @@ def _contents(folder: Traversable, path: PurePosixPath) -> list[tuple[PurePosixP
     return found
 
 
-def list_examples() -> Said:
+def list_examples() -> CommandOutput:
     """Return the examples with what each shows."""
     said = listing(
         "example", [{"name": name, **one.document()} for name, one in load_examples().items()], ("name", "summary")
@@ -56,7 +56,7 @@ def list_examples() -> Said:
     return replace(said, text=f"{said.text}\n\nppafo new example NAME writes one into a new folder.")
 
 
-def write_example(name: str, folder: Path) -> Said:
+def write_example(name: str, folder: Path) -> CommandOutput:
     """Write the files of an example, all or none, into a folder that is not there yet, and say what to run."""
     from ppafo.storage.files import replace_folder
 
@@ -72,4 +72,4 @@ def write_example(name: str, folder: Path) -> Said:
     lines = [f"written: {folder}, {', '.join(map(str, files))}", f"page: {example.page}"]
     lines += ["run there:", *(f"  {command}" for command in example.commands)]
     document = {"name": name, "folder": str(folder), "files": [str(path) for path in files], **example.document()}
-    return Said("\n".join(lines), document)
+    return CommandOutput("\n".join(lines), document)

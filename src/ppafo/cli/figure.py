@@ -2,13 +2,13 @@
 
 from ppafo.arguments import File, Folder
 from ppafo.cli import output
-from ppafo.cli.output import Said
+from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
 
 _FORMATS = ("png", "svg")
 
 
-def export_figure(folder: Folder, *, out: File | None = None) -> Said:
+def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     """Redraw the figures of a result folder.
 
     Where the folder has its figures already, it is said which.
@@ -42,7 +42,7 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
         said, document = what_is_there(folder, names)
         if out is not None:
             raise DataError(f"--out {out}: nothing is drawn anew: {said}")
-        return Said(said, document)
+        return CommandOutput(said, document)
     if out is not None and len(drawn) > 1:
         raise DataError(
             f"--out {out}: {folder} has {len(drawn)} figures, {', '.join(drawn)}; without --out each is "
@@ -59,4 +59,4 @@ def export_figure(folder: Folder, *, out: File | None = None) -> Said:
         }
         add_to_folder(folder, files)
         written = [str(folder / name) for name in files]
-    return Said(f"written: {', '.join(written)}", {"files": written})
+    return CommandOutput(f"written: {', '.join(written)}", {"files": written})

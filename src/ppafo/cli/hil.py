@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from ppafo.arguments import Count, Folder, Overrides, Patience, Port, Scenario, Word, counting_number
 from ppafo.cli import output
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_INTERRUPTED, Said
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_INTERRUPTED, CommandOutput
 from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ def hil(
     patience: Patience = 10.0,
     overrides: Overrides = (),
     out: Folder | None = None,
-) -> Said:
+) -> CommandOutput:
     """Run a scenario's plant in real time against a controller at a serial port or over UDP.
 
     Exit code 1 where it was vented or diverged, 130 where Ctrl-C stopped it.
@@ -74,7 +74,7 @@ def hil(
 
 
 @in_units(lambda ran, *_: ran.result.scenario.device.shown)
-def _said(ran: "HardwareRun", port: str, folder: Path) -> Said:
+def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
     """Return what is said of a run that is written."""
     from ppafo.report.display_units import metrics_lines
 
@@ -92,11 +92,11 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> Said:
     text, document = "\n".join(lines), {**ran.outcome(port), "folder": str(folder)}
     if exchange.is_stopped:
         aside = f"stopped at {exchange.vented_at:.6g} s and vented; {folder} is whole"
-        return Said(text, document, exit_code=EXIT_INTERRUPTED, aside=aside)
+        return CommandOutput(text, document, exit_code=EXIT_INTERRUPTED, aside=aside)
     if ran.is_good:
-        return Said(text, document)
+        return CommandOutput(text, document)
     aside = f"{result.scenario.name}: {exchange.vented or result.status.message}"
-    return Said(text, document, exit_code=EXIT_CHECK_FAILED, aside=aside)
+    return CommandOutput(text, document, exit_code=EXIT_CHECK_FAILED, aside=aside)
 
 
 def _say(text: str) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from ppafo.arguments import File, Name, Word
-from ppafo.cli.output import Said
+from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError, nearest_name, one_line
 from ppafo.kinds import kind_at
 
@@ -86,7 +86,7 @@ def new(
     *,
     source: Annotated[str, Word("SOURCE", option="--from")] | None = None,
     out: File | None = None,
-) -> Said:
+) -> CommandOutput:
     """Write an input file to start from: a template, or a copy of a shipped one; or the files of an example.
 
     kind: scenario, set, study, walk, task-sequence, gait-map, bottle, parts, or example: the files of a how-to page
@@ -132,7 +132,7 @@ def new(
             path.unlink(missing_ok=True)
     command = chosen.command.replace("FILE", shlex.quote(str(path))).replace("NAME", name)
     document = {"kind": kind, "name": name, "file": str(path), "next": command}
-    return Said(f"written: {path}; next: {command}", document)
+    return CommandOutput(f"written: {path}; next: {command}", document)
 
 
 def list_kinds() -> list[dict[str, str]]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from ppafo.arguments import Folder, Gait, Mass, Minutes, Overrides, Word, times
 from ppafo.cli import output
-from ppafo.cli.output import Said
+from ppafo.cli.output import CommandOutput
 from ppafo.errors import DataError
 
 COMMAND = "export opensim"
@@ -29,7 +29,7 @@ def export_opensim(
     body_mass: Mass | None = None,
     overrides: Overrides = (),
     out: Folder,
-) -> Said:
+) -> CommandOutput:
     """Write a walk, a recording or a result in the names and signs of OpenSim (.sto).
 
     walk: name of a walk, or a .toml file; or a recording (.csv, .nc) or result folder
@@ -68,7 +68,7 @@ def _next(out: Path, file: str) -> str:
     return f"load {shlex.quote(str(out / file))} in OpenSim; its header says units and signs"
 
 
-def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> Said:
+def _recorded(path: Path, side: Side, mass: float | None, out: Path) -> CommandOutput:
     from ppafo.exports.opensim import files_of_recording
 
     # Known once the files are made, and said after that.

@@ -60,7 +60,7 @@ def blame_out_option() -> Iterator[None]:
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class CommandOutput:
     """Output of a command that solves no question: text, JSON document, files.
 
     ``name`` is the stem of the files in the folder of ``--out``, in which ``draw`` makes a figure. ``finish`` draws and
@@ -82,7 +82,7 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
 
     ``has_written`` is true of a verb which writes itself; what it found names the folder.
     """
-    if isinstance(found, Said):
+    if isinstance(found, CommandOutput):
         if out is not None:
             write_files(out, said_files(found), command)
         if found.finish is None:
@@ -124,7 +124,7 @@ def deliver(found: Any, as_json: bool, out: Path | None, command: str, *, has_wr
     return EXIT_GOOD if found.passed else EXIT_CHECK_FAILED
 
 
-def said_files(said: Said) -> dict[str, bytes]:
+def said_files(said: CommandOutput) -> dict[str, bytes]:
     """Return text, JSON document and figure as the files of a result folder."""
     contents = {f"{said.name}.txt": said.text, f"{said.name}.json": json_text(said.document)}
     files = {file: f"{content}\n".encode() for file, content in contents.items()}
@@ -186,7 +186,7 @@ def export(
     make: Callable[[], Mapping[str, bytes]],
     following: Callable[[Sequence[str]], str],
     **more: Any,
-) -> Said:
+) -> CommandOutput:
     """Write the files of a scenario for another tool, and return which they are and what to do next with them."""
     # Before the files are made: a folder that is refused must not cost their making.
     check_output(out, command)
@@ -195,10 +195,10 @@ def export(
     files = list(contents)
     said = following(files)
     document = {"folder": str(out), **more, "files": files, "next": said}
-    return Said(f"written: {out} ({', '.join(files)}); next: {said}", document)
+    return CommandOutput(f"written: {out} ({', '.join(files)}); next: {said}", document)
 
 
-def export_file(out: Path, make: Callable[[], bytes], following: str) -> Said:
+def export_file(out: Path, make: Callable[[], bytes], following: str) -> CommandOutput:
     """Write the one file of a scenario for another tool, where none is yet, and return what to do next with it."""
     from ppafo.storage.files import check_files_can_be_added, write_file
 
@@ -206,10 +206,10 @@ def export_file(out: Path, make: Callable[[], bytes], following: str) -> Said:
     with blame_out_option():
         check_files_can_be_added(out.parent, [out.name])
     write_file(out, make())
-    return Said(f"written: {out}; next: {following}", {"file": str(out), "next": following})
+    return CommandOutput(f"written: {out}; next: {following}", {"file": str(out), "next": following})
 
 
-def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> Said:
+def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str] = ()) -> CommandOutput:
     """Return a list of what there is: a row each, of these columns (all without), and all of it as data."""
     from ppafo.report.writing import align_columns
 
@@ -220,7 +220,7 @@ def listing(noun: str, rows: Sequence[Mapping[str, Any]], columns: Sequence[str]
         for row in shown
     ]
     plural = f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
-    return Said("\n".join(align_columns(cells, len(cells[0]))), {plural: list(rows)}, plural)
+    return CommandOutput("\n".join(align_columns(cells, len(cells[0]))), {plural: list(rows)}, plural)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.arguments import Folder, Overrides, Scenario
 from ppafo.cli import output
-from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, Said
+from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text
 from ppafo.units.shown import in_units
 
@@ -23,7 +23,9 @@ CHECK_FILE = "check.json"
 FIGURE = "figure"
 
 
-def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = (), out: Folder | None = None) -> Said:
+def simulate(
+    scenario: Scenario, *, check: bool = False, overrides: Overrides = (), out: Folder | None = None
+) -> CommandOutput:
     """Run a scenario and write its recording, metrics and figure.
 
     Exit code 1 where it diverged, or a check finds it numerically sensitive, or its reference not followed.
@@ -46,7 +48,7 @@ def simulate(scenario: Scenario, *, check: bool = False, overrides: Overrides = 
 
 
 @in_units(lambda scenario, *_: scenario.device.shown)
-def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
+def _run(chosen: "Configured", folder: Path, check: bool) -> CommandOutput:
     from ppafo.running import gains, tried
     from ppafo.simulation.simulate import simulate
     from ppafo.simulation.tracking.pair_step import coarse_pair
@@ -78,7 +80,7 @@ def _run(chosen: "Configured", folder: Path, check: bool) -> Said:
     # A reference that is not followed makes the result useless, and a check fails.
     is_useful = verdict is None or not verdict.is_useless
     is_good = result.status.is_completed and (checked is None or (checked.is_determined and is_useful))
-    return Said(
+    return CommandOutput(
         _text(result, error, checked, follows, tuned),
         document,
         finish=partial(_write, result, checked, follows, tuned, folder),

@@ -119,7 +119,7 @@ class Knot(NamedTuple):
     value: float
 
 
-class Tabulated(NamedTuple):
+class TabulatedProfile(NamedTuple):
     """Level that is added to all values, length of a repetition [s], value of the first knot, and the other knots.
 
     A knot at or after the end of a repetition is not used; from the last one a line leads to the first.
@@ -151,7 +151,7 @@ def next_segment(segment: ProfileSegment, place: float, time: float, value: floa
     )
 
 
-def segment_at(profile: Tabulated, place: float) -> ProfileSegment:
+def segment_at(profile: TabulatedProfile, place: float) -> ProfileSegment:
     """The segment in which a place [s] of a repetition lies; its end is later than the place."""
     # Every knot is looked at: a search would branch, and 32 selects cost little in vector code.
     segment = ProfileSegment(start=0.0, first=profile.value_01, end=profile.knots[0].time, last=profile.knots[0].value)
@@ -168,7 +168,7 @@ def segment_at(profile: Tabulated, place: float) -> ProfileSegment:
     )
 
 
-def table_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
+def table_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
     """Value, rate and second derivative (0 also at the corners) at a time [s] from 0 on."""
     place = time - profile.period * float(int(time / profile.period))
     segment = segment_at(profile, place)
@@ -176,19 +176,19 @@ def table_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
     return profile.level + segment.first + rate * (place - segment.start), rate, 0.0
 
 
-def used_knots(profile: Tabulated) -> list[tuple[float, float]]:
+def used_knots(profile: TabulatedProfile) -> list[tuple[float, float]]:
     """Times [s] and values, without the level, of the knots that are used."""
     knots = [(0.0, profile.value_01), *((knot.time, knot.value) for knot in profile.knots)]
     return [knot for knot in knots if knot[0] < profile.period]
 
 
-def table_bounds(profile: Tabulated) -> tuple[float, float]:
+def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """The lowest and the highest value [N m or rad] of the knots that are used, with the level."""
     values = [value for _, value in used_knots(profile)]
     return profile.level + min(values), profile.level + max(values)
 
 
-class Stretch(NamedTuple):
+class KnotWindow(NamedTuple):
     """Four knots around a place, times [s] and values: the one before, both ends of the stretch, the one after."""
 
     earlier: Knot
@@ -197,11 +197,11 @@ class Stretch(NamedTuple):
     later: Knot
 
 
-def next_stretch(stretch: Stretch, place: float, knot: Knot) -> Stretch:
+def next_stretch(stretch: KnotWindow, place: float, knot: Knot) -> KnotWindow:
     """The stretch, or the next one, after which ``knot`` comes, where ``place`` [s] has passed its end."""
     passed = place >= stretch.end.time
     earlier, start, end, later = stretch.start, stretch.end, stretch.later, knot
-    return Stretch(
+    return KnotWindow(
         earlier=Knot(
             earlier.time if passed else stretch.earlier.time, earlier.value if passed else stretch.earlier.value
         ),
@@ -211,7 +211,7 @@ def next_stretch(stretch: Stretch, place: float, knot: Knot) -> Stretch:
     )
 
 
-def repeated_knot(profile: Tabulated, before: Knot, knot: Knot) -> Knot:
+def repeated_knot(profile: TabulatedProfile, before: Knot, knot: Knot) -> Knot:
     """A knot; the first or second knot of the next repetition where this one has no more."""
     is_used = knot.time < profile.period
     is_first = before.time < profile.period
@@ -225,7 +225,7 @@ def repeated_knot(profile: Tabulated, before: Knot, knot: Knot) -> Knot:
     )
 
 
-def last_knot(profile: Tabulated) -> Knot:
+def last_knot(profile: TabulatedProfile) -> Knot:
     """The last knot that is used, a repetition earlier."""
     time, value = 0.0, profile.value_01
     for knot in profile.knots:
@@ -234,12 +234,12 @@ def last_knot(profile: Tabulated) -> Knot:
     return Knot(time - profile.period, value)
 
 
-def stretch_at(profile: Tabulated, place: float) -> Stretch:
+def stretch_at(profile: TabulatedProfile, place: float) -> KnotWindow:
     """The stretch in which a place [s] of a repetition lies; its end is later than the place."""
     first = Knot(0.0, profile.value_01)
     second = repeated_knot(profile, first, profile.knots[0])
     third = repeated_knot(profile, second, profile.knots[1])
-    stretch = Stretch(earlier=last_knot(profile), start=first, end=second, later=third)
+    stretch = KnotWindow(earlier=last_knot(profile), start=first, end=second, later=third)
     before = third
     for knot in profile.knots[2:]:
         found = repeated_knot(profile, before, knot)
@@ -250,7 +250,7 @@ def stretch_at(profile: Tabulated, place: float) -> Stretch:
     return next_stretch(stretch, place, repeated_knot(profile, closing, Knot(profile.period, profile.value_01)))
 
 
-def smooth_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
+def smooth_value(profile: TabulatedProfile, time: float) -> tuple[float, float, float]:
     """Value, rate and second derivative at a time [s] from 0 on, of cubic curves through the knots.
 
     Each has at its ends the slope of the parabola through a knot and its two neighbours, so that the rate has no jump.
@@ -272,13 +272,13 @@ def smooth_value(profile: Tabulated, time: float) -> tuple[float, float, float]:
     return profile.level + value, rate, 2.0 * bend + 6.0 * here * twist
 
 
-def until_knot(profile: Tabulated, time: float) -> float:
+def until_knot(profile: TabulatedProfile, time: float) -> float:
     """Time [s] from one at 0 or later to the next knot, where the second derivative of the cubic curves jumps."""
     place = time - profile.period * float(int(time / profile.period))
     return stretch_at(profile, place).end.time - place
 
 
-def smooth_bounds(profile: Tabulated) -> tuple[float, float]:
+def smooth_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """The lowest and the highest value [N m or rad] of the cubic curves, which may go beyond their knots."""
     lowest, highest = table_bounds(profile)
     knots = used_knots(profile)
@@ -324,7 +324,7 @@ TABLE = ProfileKind(
         _quantity("value_01"),
         *(_quantity(f"{name}_{number:02}") for number in range(2, KNOTS + 1) for name in ("time", "value")),
     ),
-    parameters=Tabulated,
+    parameters=TabulatedProfile,
     value=table_value,
     bounds=table_bounds,
     differences=_VALUES,
@@ -334,7 +334,7 @@ SMOOTH = ProfileKind(
     name="smooth",
     summary="Up to 32 knots, the first at time 0, joined by cubic curves without corners and repeated.",
     quantities=TABLE.quantities,
-    parameters=Tabulated,
+    parameters=TabulatedProfile,
     value=smooth_value,
     bounds=smooth_bounds,
     differences=_VALUES,

@@ -46,7 +46,7 @@ _MARK = "@entry("
 
 
 @runtime_checkable
-class Packing(Protocol):
+class PackedEntry(Protocol):
     """An entry that is quicker where its arrays are handed over once."""
 
     def with_arrays(self, *arrays: NDArray[np.float64]) -> Callable[..., None]:
@@ -58,7 +58,7 @@ def with_arrays(entry: Callable[..., None], *arrays: NDArray[np.float64]) -> Cal
 
     A call then costs what one with a few numbers costs.
     """
-    return entry.with_arrays(*arrays) if isinstance(entry, Packing) else partial(entry, *arrays)
+    return entry.with_arrays(*arrays) if isinstance(entry, PackedEntry) else partial(entry, *arrays)
 
 
 def entry_text(name: str, parameters: Mapping[str, str], lines: Iterable[str]) -> str:

@@ -23,7 +23,7 @@ from ppafo.model.declaration import PlainFunction
 
 
 @dataclass(slots=True)
-class Composed:
+class ComposedFunction:
     """A function of the step in the module."""
 
     function: FunctionType
@@ -64,7 +64,7 @@ class StepText:
     states: dict[str, Any] = field(init=False)
     parameters: dict[str, Any] = field(init=False)
     of_step: dict[str, Any] = field(init=False)
-    composed: dict[FunctionType, Composed] = field(default_factory=dict)
+    composed: dict[FunctionType, ComposedFunction] = field(default_factory=dict)
     kept: dict[str, Any] = field(default_factory=dict)
     given: set[str] = field(default_factory=set)
     """Groups of a step that a phase has set so far, in the order of the loop."""
@@ -80,7 +80,7 @@ class StepText:
         """Classes of the groups that have rows."""
         return {**self.parameters, **self.states, **self.of_step, **self.further}
 
-    def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> Composed:
+    def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> ComposedFunction:
         """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
         assert isinstance(function, FunctionType), "it is no other callable"
         phase = self._composed(function, known or {}, is_phase=True)
@@ -119,7 +119,7 @@ class StepText:
         """Keep that a name was looked up."""
         self.collector.note_read(scope, name, scope[name])
 
-    def refuse_unkept(self, name: str, asking: Composed) -> ProgramError:
+    def refuse_unkept(self, name: str, asking: ComposedFunction) -> ProgramError:
         """The error for a phase that asks for a group that nothing keeps for it: the line, and what to do."""
         known = [function for function, composed in self.composed.items() if name in composed.effects.reads]
         reads = ((item, node) for item in [asking.function, *known] for node in uses_of_group(item, name, ast.Load))
@@ -140,7 +140,7 @@ class StepText:
             )
         return refusal(function.__code__.co_filename, node, problem)
 
-    def refuse_unset(self, name: str, asking: Composed) -> ProgramError:
+    def refuse_unset(self, name: str, asking: ComposedFunction) -> ProgramError:
         """The error for a phase that needs a group of the step before any phase has set it on every path."""
         uses = (
             (function, node)
@@ -185,7 +185,7 @@ class StepText:
         """The name in the module of what a function of the step calls."""
         return self.composed[called].name if called in self.composed else self.collector.add_inside(function, called)
 
-    def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
+    def _composed(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
         """A function of the step in the module, composed once. ProgramError where it is called in two ways."""
         composed = self.composed.get(function)
         if composed is None:
@@ -194,7 +194,7 @@ class StepText:
             raise ProgramError(f"{function.__name__} stands in one step for two different functions")
         return composed
 
-    def _compose(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> Composed:
+    def _compose(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:
         """Reduce a function of the step and put it into the module, where it returns what it sets.
 
         ProgramError where it gives a value and sets groups of its lane.
@@ -214,7 +214,7 @@ class StepText:
         parameters = [argument.arg for argument in tree.args.args]
         # The groups that it reads come before its own parameters.
         handed = tuple(name for name in parameters if name in effects.reads or name == NUMBER)
-        return Composed(
+        return ComposedFunction(
             function=function,
             name=self._written(function, tree, handed, {*effects.reads, *effects.groups}),
             effects=effects,

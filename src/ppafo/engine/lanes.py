@@ -101,7 +101,7 @@ class BatchResult:
     record: Floats
 
 
-class Advancing(Protocol):
+class RunnableProgram(Protocol):
     """A program that can be run: compiled, or by Python itself."""
 
     @property
@@ -115,7 +115,7 @@ def effort_for(batch: Batch) -> Effort:
     return Effort.QUICK if is_short else Effort.FULL
 
 
-def load_program(program: Program, effort: Effort = Effort.FULL) -> Advancing:
+def load_program(program: Program, effort: Effort = Effort.FULL) -> RunnableProgram:
     """The compiled module of a program, from the disk cache where it is there; or the program as Python runs it.
 
     A program is written anew where a number or function that it was made from stands for something else by now. It is
@@ -231,7 +231,7 @@ def run_blocks(
             stop.set()
 
 
-def _run_block(module: Advancing, batch: Batch, members: slice, stop: threading.Event) -> BatchResult | None:
+def _run_block(module: RunnableProgram, batch: Batch, members: slice, stop: threading.Event) -> BatchResult | None:
     """Run some members of a batch to their end; None where another thread has said stop before."""
     clock = batch.clock
     block = LaneBlock(module, batch.program, clock, batch.parameters[:, members], batch.states[:, members])
@@ -272,7 +272,9 @@ def _row_counts(program: Program) -> tuple[int, int]:
 class LaneBlock:
     """Block of runs in progress; ``states`` (rows, runs) may be read and written between calls of ``advance``."""
 
-    def __init__(self, module: Advancing, program: Program, clock: Clock, parameters: Floats, states: Floats) -> None:
+    def __init__(
+        self, module: RunnableProgram, program: Program, clock: Clock, parameters: Floats, states: Floats
+    ) -> None:
         given, kept = _row_counts(program)
         if (len(parameters), len(states)) != (given, kept):
             check_rows(len(parameters), program.parameter_rows(), Role.PARAMETER)

@@ -12,7 +12,7 @@ from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
 from ppafo.model.valves.kind import valve_problem
 
 
-class Linked(Protocol):
+class LinkCollector(Protocol):
     """Collector of the functions that replace model functions."""
 
     links: dict[Any, Any]
@@ -24,7 +24,7 @@ class Linked(Protocol):
     """Laws of effects, each with the effect's structs that it takes, by the names of its parameters."""
 
 
-def link_program(program: Program, collector: Linked) -> None:
+def link_program(program: Program, collector: LinkCollector) -> None:
     """Let a collector call what the components of a program have in the place of functions of the model.
 
     ProgramError for an effect that cannot act, or whose name other rows of the program have.
@@ -56,7 +56,7 @@ def link_program(program: Program, collector: Linked) -> None:
     link_effects(program.effects, collector, own)
 
 
-def link_effects(effects: Sequence[Effect], collector: Linked, own: Mapping[Any, Any] | None = None) -> None:
+def link_effects(effects: Sequence[Effect], collector: LinkCollector, own: Mapping[Any, Any] | None = None) -> None:
     """Let a collector call the laws of effects at their ports, of which an actuator may have its ``own``.
 
     ProgramError for an effect that cannot act.

@@ -11,7 +11,7 @@ from types import FunctionType
 from typing import NamedTuple, Protocol
 
 from ppafo.engine.entries import indent, parse_expression
-from ppafo.engine.generator import Composed, StepText
+from ppafo.engine.generator import ComposedFunction, StepText
 from ppafo.engine.lane_rows import HANDED, lanes_of
 from ppafo.engine.reduction import HISTORIES, NUMBER, TRACE, Slot, group_of_name, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
@@ -20,7 +20,7 @@ from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 class Call(NamedTuple):
     """A call of a phase in a loop over lanes."""
 
-    phase: Composed
+    phase: ComposedFunction
     arguments: Mapping[str, str]
     """The phase's own arguments as text, by their names."""
 

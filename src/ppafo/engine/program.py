@@ -22,7 +22,7 @@ from ppafo.model.plant import PlantParameters, PlantState, SinglePort
 from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
-from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, Course, FootSample, MeterKind
+from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, FootSample, MeterKind, ReferenceSummary
 
 if TYPE_CHECKING:
     from ppafo.engine.step.lane import Lane, Now
@@ -466,7 +466,7 @@ def groups_of(program: Program) -> Groups:
         **{effect.name: given(effect.parameters) for effect in program.effects},
         **{name: kept(row) for name, row in program.effect_states.items()},
         # What only some blocks have comes last: its rows are added to those of a run.
-        "course": kept(Course if program.follows_reference else NoParameters),
+        "course": kept(ReferenceSummary if program.follows_reference else NoParameters),
         **{group: kept(kind.state) for group, kind in program.meter_groups.items()},
         **({"start": kept(LaneStart)} if program.starts_apart else {}),
     }

@@ -72,7 +72,7 @@ class Effects:
         return [*self.groups, *self.slots]
 
 
-class Gathering(Protocol):
+class FunctionCollector(Protocol):
     """Collector of composed functions, as the reduction uses it."""
 
     @property
@@ -179,7 +179,7 @@ def _definitions(file: str) -> dict[int, ast.FunctionDef]:
 class Reduction:
     """Reduces one function; ``known`` are names whose values are known, ``parts`` among them."""
 
-    def __init__(self, collector: Gathering, function: FunctionType, known: Mapping[str, Any]) -> None:
+    def __init__(self, collector: FunctionCollector, function: FunctionType, known: Mapping[str, Any]) -> None:
         self.collector, self.function = collector, function
         self.definition = definition_of(function)
         self.scope: dict[str, Any] = function.__globals__

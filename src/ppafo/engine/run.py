@@ -16,7 +16,7 @@ from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoParameters
 from ppafo.model.columns import larger, truncated
-from ppafo.model.effects.kind import Moment
+from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.orifice import ExactOrifice
 from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
@@ -281,15 +281,15 @@ def states_at_start(run: Run) -> list[Any]:
     ]
 
 
-def moment_at_start(plant: PlantParameters, initial: PlantState) -> Moment:
+def moment_at_start(plant: PlantParameters, initial: PlantState) -> PlantSnapshot:
     """State of the plant that effects depend on, at the start of the run."""
     pressure_1, pressure_2 = chamber_pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
     return _at_rest(initial, pressure_1, pressure_2)
 
 
-def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> Moment:
+def _at_rest(initial: PlantState, pressure_1: float, pressure_2: float) -> PlantSnapshot:
     """The moment of a state with absolute pressures [Pa], before anything flows."""
-    return Moment(
+    return PlantSnapshot(
         angle=initial.angle,
         angular_velocity=initial.angular_velocity,
         pressure_1=pressure_1,

@@ -59,7 +59,7 @@ class EpisodeStarts:
 
 
 @dataclass(frozen=True, slots=True)
-class Judging:
+class RewardWeights:
     """Weights of the reward for squared error and gas, and bounds (2, observed) of what is observed."""
 
     error_weight: float
@@ -104,7 +104,7 @@ class EnvironmentBlock(NamedTuple):
 class Environments:
     """Some environments of one program side by side, each a lane with an episode of its own."""
 
-    def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: Judging) -> None:
+    def __init__(self, program: Program, clock: Clock, task: Task, count: int, judging: RewardWeights) -> None:
         self.count = count
         self._clock, self._judging = clock, judging
         self._program, self._task = program, task

@@ -14,7 +14,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError, SimulationError, nearest_name
-from ppafo.gym.lanes import BatchStep, Environments, EpisodeStarts, FromOutside, Judging, Places, episode_program
+from ppafo.gym.lanes import BatchStep, Environments, EpisodeStarts, FromOutside, Places, RewardWeights, episode_program
 from ppafo.gym.scenario_episodes import Ranges, ScenarioEpisodes, scenario_episodes
 from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Goal, Task
 from ppafo.model.controlled import TORQUE
@@ -229,7 +229,7 @@ class World:
         varied = VARIED.get(task, {}) if settings.vary is None and is_usual else settings.vary or {}
         self.episodes = _EPISODES[task](file, words, varied, settings)
         bounds = observed_bounds(self.task, self.episodes.base.device)
-        self.judging = Judging(
+        self.judging = RewardWeights(
             error_weight=self.task.error_weight if settings.error_weight is None else settings.error_weight,
             gas_weight=self.task.gas_weight if settings.gas_weight is None else settings.gas_weight,
             bounds=bounds,

@@ -20,7 +20,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import Conflict, conflict_of, too_smooth
 from ppafo.identification.intervals import interval_ends, unidentified
 from ppafo.identification.noise import HIGHEST_ORDER, Noise
-from ppafo.identification.residuals import FitRuns, Free, Indices, ResidualBlock, Residuals
+from ppafo.identification.residuals import FitRuns, FitVariable, Indices, ResidualBlock, Residuals
 from ppafo.identification.whitened import Linear, cost_of, linear_at
 from ppafo.linear_algebra import on_one_thread
 from ppafo.progress import Progress, Report, report_nothing
@@ -42,7 +42,7 @@ class Fit:
     and -1 for below; a search that ends there has not converged.
     """
 
-    numbers: tuple[Free, ...]
+    numbers: tuple[FitVariable, ...]
     values: Floats
     covariance: Floats
     low: Floats
@@ -98,7 +98,7 @@ _OTHER_STARTS = 32
 @on_one_thread
 def fit(
     residuals: Residuals,
-    numbers: Sequence[Free],
+    numbers: Sequence[FitVariable],
     blocks: Sequence[ResidualBlock],
     confidence: float = 0.95,
     report: Report = report_nothing,

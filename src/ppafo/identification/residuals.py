@@ -18,7 +18,7 @@ Residuals = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True, slots=True)
-class Free:
+class FitVariable:
     """A number that the fit moves: start, bounds and typical size ``scale``, SI units.
 
     ``deviation`` is the standard deviation of its prior about its start; infinite for a number that is sought, finite
@@ -65,7 +65,7 @@ class FitRuns:
     def __init__(
         self,
         residuals: Residuals,
-        numbers: tuple[Free, ...],
+        numbers: tuple[FitVariable, ...],
         blocks: tuple[ResidualBlock, ...],
         report: Report,
         memory: int,

@@ -58,7 +58,7 @@ def source_of(path: Path, recording: Recording, trial: str = "") -> RecordingSou
 
 
 @dataclass(frozen=True, slots=True)
-class Use:
+class UsedRecording:
     """A recording as it is used: by what, the file's trace, the channels that count, first and last time [s]."""
 
     by: str
@@ -68,7 +68,7 @@ class Use:
     first: float
     last: float
 
-    def overlaps(self, other: "Use") -> bool:
+    def overlaps(self, other: "UsedRecording") -> bool:
         """Tell whether both uses share samples of a channel, if they are of the same recording.
 
         Without channels all of them count.
@@ -77,7 +77,7 @@ class Use:
         return is_alike and self.first < other.last and other.first < self.last
 
 
-def double_use(uses: Iterable[Use], others: Iterable[Use] | None = None) -> str:
+def double_use(uses: Iterable[UsedRecording], others: Iterable[UsedRecording] | None = None) -> str:
     """Return why some samples would count twice, in ``uses`` or also in ``others``; an empty text where none do.
 
     Recordings are the same where the hash of their numbers is, under whatever names their files go.

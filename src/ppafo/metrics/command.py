@@ -15,7 +15,7 @@ from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import MID_STANCE
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
-from ppafo.signals.meter import REQUESTED, WALK, Course, MeterKind, Sample
+from ppafo.signals.meter import REQUESTED, WALK, MeterKind, ReferenceSummary, Sample
 
 Masks = NDArray[np.bool_]
 
@@ -36,12 +36,12 @@ def way_of(command: float) -> float:
     return (1.0 if HALF_OPEN < command <= VENTS_ABOVE else 0.0) - (1.0 if command < -HALF_OPEN else 0.0)
 
 
-def start_reversals(_course: Course, sample: Sample) -> Reversals:
+def start_reversals(_course: ReferenceSummary, sample: Sample) -> Reversals:
     """No reversal at the first sample."""
     return Reversals(way_of(sample.command), sample.stride.phase, 0.0)
 
 
-def update_reversals(state: Reversals, _course: Course, sample: Sample) -> Reversals:
+def update_reversals(state: Reversals, _course: ReferenceSummary, sample: Sample) -> Reversals:
     """Count a reversal if the command changes direction within the task."""
     command, task = sample.command, sample.stride.phase
     begins = task != state.task or command > VENTS_ABOVE
@@ -71,12 +71,12 @@ class Peak(NamedTuple):
     torque: float
 
 
-def start_peak(_course: Course, sample: Sample) -> Peak:
+def start_peak(_course: ReferenceSummary, sample: Sample) -> Peak:
     """The torque of the first sample."""
     return Peak(abs(sample.torque))
 
 
-def update_peak(state: Peak, _course: Course, sample: Sample) -> Peak:
+def update_peak(state: Peak, _course: ReferenceSummary, sample: Sample) -> Peak:
     """Peak after one more sample."""
     return Peak(max(state.torque, abs(sample.torque)))
 
@@ -89,7 +89,7 @@ def peak_torque(recording: Recording) -> float:
     return float(np.max(np.abs(recording["torque"])))
 
 
-class Asked(NamedTuple):
+class RequestedTorqueSums(NamedTuple):
     """Sums over the samples in which a walking controller requests a torque, and their number.
 
     Squared torque errors and squared requested torques [N^2 m^2].
@@ -105,22 +105,22 @@ def is_asked(command: float, task: float) -> bool:
     return command <= VENTS_ABOVE and task != MID_STANCE
 
 
-def start_asked(_course: Course, _sample: Sample) -> Asked:
+def start_asked(_course: ReferenceSummary, _sample: Sample) -> RequestedTorqueSums:
     """Zero sums at the start of a walk."""
-    return Asked(0.0, 0.0, 0.0)
+    return RequestedTorqueSums(0.0, 0.0, 0.0)
 
 
-def update_asked(state: Asked, _course: Course, sample: Sample) -> Asked:
+def update_asked(state: RequestedTorqueSums, _course: ReferenceSummary, sample: Sample) -> RequestedTorqueSums:
     """Add a sample to the sums, if a torque is requested."""
     error, counts = sample.reference - sample.torque, is_asked(sample.command, sample.stride.phase)
-    return Asked(
+    return RequestedTorqueSums(
         state.squares + (error * error if counts else 0.0),
         state.requested + (sample.reference * sample.reference if counts else 0.0),
         state.samples + (1.0 if counts else 0.0),
     )
 
 
-ASKED = MeterKind("asked", Asked, start_asked, update_asked)
+ASKED = MeterKind("asked", RequestedTorqueSums, start_asked, update_asked)
 
 
 def asked_samples(recording: Recording) -> Masks:

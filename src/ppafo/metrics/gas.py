@@ -10,7 +10,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt
 from ppafo.model.columns import Numeric, choose
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
-from ppafo.signals.meter import NO_ENERGY, NO_GAS, Course, EnergySample, GasSample, MeterKind, Sample
+from ppafo.signals.meter import NO_ENERGY, NO_GAS, EnergySample, GasSample, MeterKind, ReferenceSummary, Sample
 
 
 def gained(recording: Recording, channels: tuple[str, ...], function: PlainFunction | None = None) -> float:
@@ -74,12 +74,12 @@ class GasGains(NamedTuple):
     gained: GasSample
 
 
-def start_gas(course: Course, sample: Sample) -> GasGains:
+def start_gas(course: ReferenceSummary, sample: Sample) -> GasGains:
     """Zero gains at the first sample."""
     return GasGains(sample.gas, NO_GAS)
 
 
-def update_gas(state: GasGains, course: Course, sample: Sample) -> GasGains:
+def update_gas(state: GasGains, course: ReferenceSummary, sample: Sample) -> GasGains:
     """Gains after one more sample."""
     # A run may go on after its last sample, to the end of a step: what passes there is in no recording.
     gained = GasSample(
@@ -102,12 +102,12 @@ class EnergyGains(NamedTuple):
     gained: EnergySample
 
 
-def start_energy(course: Course, sample: Sample) -> EnergyGains:
+def start_energy(course: ReferenceSummary, sample: Sample) -> EnergyGains:
     """Zero gains at the first sample."""
     return EnergyGains(sample.energy, NO_ENERGY)
 
 
-def update_energy(state: EnergyGains, course: Course, sample: Sample) -> EnergyGains:
+def update_energy(state: EnergyGains, course: ReferenceSummary, sample: Sample) -> EnergyGains:
     """Gains after one more sample."""
     gained = EnergySample(
         gas_energy=sample.energy.gas_energy - state.first.gas_energy,
@@ -128,12 +128,12 @@ class LargestPressure(NamedTuple):
     pressure: float
 
 
-def start_largest_pressure(course: Course, sample: Sample) -> LargestPressure:
+def start_largest_pressure(course: ReferenceSummary, sample: Sample) -> LargestPressure:
     """The larger pressure of the first sample."""
     return LargestPressure(max(sample.pressure_1, sample.pressure_2))
 
 
-def update_largest_pressure(state: LargestPressure, course: Course, sample: Sample) -> LargestPressure:
+def update_largest_pressure(state: LargestPressure, course: ReferenceSummary, sample: Sample) -> LargestPressure:
     """Largest pressure after one more sample."""
     return LargestPressure(max(state.pressure, sample.pressure_1, sample.pressure_2))
 
@@ -147,12 +147,12 @@ class LowestTemperature(NamedTuple):
     temperature: float
 
 
-def start_lowest_temperature(course: Course, sample: Sample) -> LowestTemperature:
+def start_lowest_temperature(course: ReferenceSummary, sample: Sample) -> LowestTemperature:
     """The lower temperature of the first sample."""
     return LowestTemperature(min(sample.temperature_1, sample.temperature_2))
 
 
-def update_lowest_temperature(state: LowestTemperature, course: Course, sample: Sample) -> LowestTemperature:
+def update_lowest_temperature(state: LowestTemperature, course: ReferenceSummary, sample: Sample) -> LowestTemperature:
     """Lowest temperature after one more sample."""
     return LowestTemperature(min(state.temperature, sample.temperature_1, sample.temperature_2))
 
@@ -170,12 +170,12 @@ class Work(NamedTuple):
     work: float
 
 
-def start_work(course: Course, sample: Sample) -> Work:
+def start_work(course: ReferenceSummary, sample: Sample) -> Work:
     """No work at the first sample."""
     return Work(sample.torque, sample.angle, 0.0)
 
 
-def update_work(state: Work, course: Course, sample: Sample) -> Work:
+def update_work(state: Work, course: ReferenceSummary, sample: Sample) -> Work:
     """Add one interval by the trapezoidal rule over the angle."""
     piece = 0.5 * (state.torque + sample.torque) * (sample.angle - state.angle)
     return Work(sample.torque, sample.angle, state.work + piece)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, nearest_name
 from ppafo.model.columns import choose
-from ppafo.model.controlled import CONTROLLED, TORQUE, Controlled
+from ppafo.model.controlled import CONTROLLED, TORQUE, ControlledQuantity
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
@@ -154,7 +154,7 @@ def for_each_reference(kinds: tuple[MetricKind, ...], rename: Callable[[str, str
     return (*(replace(kind, of_reference=TORQUE) for kind in kinds), *others)
 
 
-def controlled_in(recording: Recording) -> Controlled | None:
+def controlled_in(recording: Recording) -> ControlledQuantity | None:
     """Return what the reference of a recording is of; None where it has none."""
     return next((kind for kind in CONTROLLED.values() if kind.reference in recording), None)
 

@@ -8,7 +8,7 @@ import numpy as np
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less
 from ppafo.model.columns import root
 from ppafo.signals import Recording
-from ppafo.signals.meter import LED_SHANK, Course, MeterKind, Sample
+from ppafo.signals.meter import LED_SHANK, MeterKind, ReferenceSummary, Sample
 
 TRAVEL_FRACTION = 0.01
 """A move has begun when this fraction of its travel is done, and has arrived when this fraction is left."""
@@ -51,12 +51,12 @@ class Extremes(NamedTuple):
     speed: float
 
 
-def start_extremes(course: Course, sample: Sample) -> Extremes:
+def start_extremes(course: ReferenceSummary, sample: Sample) -> Extremes:
     """Angle and speed of the first sample."""
     return Extremes(sample.angle, sample.angle, abs(sample.angular_velocity))
 
 
-def update_extremes(state: Extremes, course: Course, sample: Sample) -> Extremes:
+def update_extremes(state: Extremes, course: ReferenceSummary, sample: Sample) -> Extremes:
     """The extremes with the next sample among them."""
     return Extremes(
         smallest=min(state.smallest, sample.angle),
@@ -100,13 +100,13 @@ class FootError(NamedTuple):
     lowest: float
 
 
-def start_foot_error(course: Course, sample: Sample) -> FootError:
+def start_foot_error(course: ReferenceSummary, sample: Sample) -> FootError:
     """The error of the first sample."""
     error = sample.foot.angle - sample.foot.measured_angle
     return FootError(error * error, 0.0, sample.foot.toe_difference)
 
 
-def update_foot_error(state: FootError, course: Course, sample: Sample) -> FootError:
+def update_foot_error(state: FootError, course: ReferenceSummary, sample: Sample) -> FootError:
     """Add one interval."""
     error = sample.foot.angle - sample.foot.measured_angle
     square = error * error

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, time_if_any
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.helping import HELPS, PUSH_OFF
-from ppafo.signals.meter import REQUESTED, STEADY, WALK, Course, MeterKind, Sample, StrideSample
+from ppafo.signals.meter import REQUESTED, STEADY, WALK, MeterKind, ReferenceSummary, Sample, StrideSample
 
 SETTLING = 2
 """First strides that are left out of averages: the controller learns the stride time in them."""
@@ -140,7 +140,7 @@ def begun_stride(sample: StrideSample, is_whole: float, on_toes: float) -> Curre
     )
 
 
-def _start(_course: Course, sample: Sample) -> StrideMeter:
+def _start(_course: ReferenceSummary, sample: Sample) -> StrideMeter:
     no_sums = StrideTotals(
         gas=0.0, positive_push_off_work=0.0, net_push_off_work=0.0, toe_clearance=0.0, toe_landing=0.0
     )
@@ -154,7 +154,7 @@ def _start(_course: Course, sample: Sample) -> StrideMeter:
     )
 
 
-def _update(strides: StrideMeter, _course: Course, sample: Sample) -> StrideMeter:
+def _update(strides: StrideMeter, _course: ReferenceSummary, sample: Sample) -> StrideMeter:
     # Counts are floats in the state of a run: half way between two of them is safe from rounding.
     is_strike = sample.stride.strides - strides.strikes > 0.5
     on_toes = sample.stride.toe_landings - strides.current.at_strike.toe_landing

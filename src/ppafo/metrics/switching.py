@@ -30,7 +30,7 @@ from ppafo.model.columns import choose, larger, truncated
 from ppafo.model.controlled import value_in
 from ppafo.model.valves.kind import VENTS_ABOVE
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 OSCILLATION_THRESHOLD = 0.05
 """Smallest swing that counts as an oscillation, as a fraction of how far the reference goes."""
@@ -96,13 +96,13 @@ def ordered_positions(command: float) -> tuple[float, float]:
     return (1.0 if command > SHUT and command < VENTS_ABOVE else 0.0), (1.0 if command < -SHUT else 0.0)
 
 
-def start_switchings(course: Course, sample: Sample) -> Switchings:
+def start_switchings(course: ReferenceSummary, sample: Sample) -> Switchings:
     """No change at the first sample."""
     position_a, position_b = ordered_positions(sample.command)
     return Switchings(position_a, position_b, 0.0)
 
 
-def update_switchings(state: Switchings, course: Course, sample: Sample) -> Switchings:
+def update_switchings(state: Switchings, course: ReferenceSummary, sample: Sample) -> Switchings:
     """Count each valve that the command orders to change."""
     position_a, position_b = ordered_positions(sample.command)
     changes = abs(position_a - state.position_a) + abs(position_b - state.position_b)
@@ -152,13 +152,13 @@ class Oscillations(NamedTuple):
     turns_on_ramp: float
 
 
-def start_oscillations(course: Course, sample: Sample) -> Oscillations:
+def start_oscillations(course: ReferenceSummary, sample: Sample) -> Oscillations:
     """No reversal at the first sample."""
     value = value_in(sample)
     return Oscillations(Swing(value, UNDECIDED, value), UNDECIDED)
 
 
-def update_oscillations(state: Oscillations, course: Course, sample: Sample) -> Oscillations:
+def update_oscillations(state: Oscillations, course: ReferenceSummary, sample: Sample) -> Oscillations:
     """Add one sample; the first sample of the hold is also the last one of the ramp."""
     value = value_in(sample)
     swing = next_swing(state.swing, value, OSCILLATION_THRESHOLD * course.largest)

@@ -10,7 +10,7 @@ from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, followed,
 from ppafo.model.columns import root
 from ppafo.model.controlled import CONTROLLED, TORQUE, value_in
 from ppafo.signals import Recording
-from ppafo.signals.meter import Course, MeterKind, Sample
+from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 _NEEDED = ("torque", "reference")
 
@@ -65,13 +65,13 @@ class SquaredError(NamedTuple):
     on_hold: float
 
 
-def start_squared_error(course: Course, sample: Sample) -> SquaredError:
+def start_squared_error(course: ReferenceSummary, sample: Sample) -> SquaredError:
     """The squared error of the first sample."""
     error = sample.reference - value_in(sample)
     return SquaredError(error * error, 0.0, 0.0)
 
 
-def update_squared_error(state: SquaredError, course: Course, sample: Sample) -> SquaredError:
+def update_squared_error(state: SquaredError, course: ReferenceSummary, sample: Sample) -> SquaredError:
     """Add one interval."""
     error = sample.reference - value_in(sample)
     square = error * error
@@ -94,13 +94,13 @@ class AbsoluteError(NamedTuple):
     last: float
 
 
-def start_absolute_error(course: Course, sample: Sample) -> AbsoluteError:
+def start_absolute_error(course: ReferenceSummary, sample: Sample) -> AbsoluteError:
     """The error of the first sample."""
     error = abs(sample.reference - value_in(sample))
     return AbsoluteError(error, error)
 
 
-def update_absolute_error(state: AbsoluteError, course: Course, sample: Sample) -> AbsoluteError:
+def update_absolute_error(state: AbsoluteError, course: ReferenceSummary, sample: Sample) -> AbsoluteError:
     """The larger one of that and the error of the next sample, and this one."""
     error = abs(sample.reference - value_in(sample))
     return AbsoluteError(max(state.largest, error), error)

@@ -104,7 +104,7 @@ def _in_order(one: Any, other: Any) -> tuple[Any, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class Controlled:
+class ControlledQuantity:
     """Something that a reference can be a value of.
 
     ``words`` name it in a sentence, ``level`` declares a value of it, ``difference`` is the unit of a difference of two
@@ -167,11 +167,11 @@ class Controlled:
 
 _PRESSURE = Quantity("level", "Pa_a", "", None, 1.0e3, 1.0e8)
 
-CONTROLLED: dict[str, Controlled] = {
+CONTROLLED: dict[str, ControlledQuantity] = {
     item.name: item
     for item in (
-        Controlled(TORQUE, "torque", Quantity("level", "N m", "", None, -1.0e4, 1.0e4), "N m", controlled),
-        Controlled(
+        ControlledQuantity(TORQUE, "torque", Quantity("level", "N m", "", None, -1.0e4, 1.0e4), "N m", controlled),
+        ControlledQuantity(
             ANGLE,
             "angle",
             Quantity("level", "rad", "", None, -10.0, 10.0),
@@ -180,7 +180,7 @@ CONTROLLED: dict[str, Controlled] = {
             reach=stops,
             limits="the stops",
         ),
-        Controlled(
+        ControlledQuantity(
             "pressure_1",
             "chamber 1 pressure",
             _PRESSURE,
@@ -189,7 +189,7 @@ CONTROLLED: dict[str, Controlled] = {
             1.0e5,
             reach=reach_of_pressure_1,
         ),
-        Controlled(
+        ControlledQuantity(
             "pressure_2",
             "chamber 2 pressure",
             _PRESSURE,
@@ -199,7 +199,7 @@ CONTROLLED: dict[str, Controlled] = {
             -1.0,
             reach=reach_of_pressure_2,
         ),
-        Controlled(
+        ControlledQuantity(
             "pressure_difference",
             "pressure difference",
             Quantity("level", "Pa_d", "", None, -1.0e8, 1.0e8),

@@ -356,7 +356,7 @@ class AngleMotion(NamedTuple):
     acceleration: float
 
 
-class Pace(NamedTuple):
+class PhaseMotion(NamedTuple):
     """Phase [turns], strides per second [Hz], stride [-] and their time derivatives; load, tilt, scuff as in a part.
 
     Slope of the ground [rad] with its derivatives.
@@ -424,7 +424,7 @@ def part_at(sequence: TimedSequence, time: float) -> SequencePart:
     return found
 
 
-def pace_in(part: SequencePart, time: float) -> Pace:
+def pace_in(part: SequencePart, time: float) -> PhaseMotion:
     """Phase, strides per second and stride in a part at a time [s] within it."""
     passed = time - part.start
     fraction = min(passed / part.length, 1.0)
@@ -432,7 +432,7 @@ def pace_in(part: SequencePart, time: float) -> Pace:
     square = fraction * fraction
     # Integral of the blend, x^4 (2.5 - 3 x + x^2): the phase is the integral of the cadence.
     integral = square * square * (2.5 + fraction * (fraction - 3.0))
-    return Pace(
+    return PhaseMotion(
         turns=part.turns + part.frequency * passed + part.frequency_gain * part.length * integral,
         frequency=part.frequency + part.frequency_gain * shape.value,
         frequency_rate=part.frequency_gain * shape.rate / part.length,
@@ -450,7 +450,7 @@ def pace_in(part: SequencePart, time: float) -> Pace:
     )
 
 
-def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing: float) -> AngleMotion:
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> AngleMotion:
     """An angle between its value in standing [rad] and the gait's."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
@@ -463,7 +463,7 @@ def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: Pace, standing
     )
 
 
-def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> AngleMotion:
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> AngleMotion:
     """Forward lean of the shank for a strike with the toes: largest at the strike, zero at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
     # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.
@@ -481,7 +481,7 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: Pace) -> AngleMotion:
     )
 
 
-def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: Pace) -> Marks:
+def marks_at(timing: GaitTiming, leg: LegParameters, phase: float, pace: PhaseMotion) -> Marks:
     """The marks at a phase; none in a part without a scuff and a tilt."""
     since = phase - timing.toe_off - SCUFF_AT * (1.0 - timing.toe_off)
     # The scuff lasts for a time, while the phase counts turns: the cadence is between them.

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from ppafo.arguments import File, Overrides, Scenario
 
 if TYPE_CHECKING:
-    from ppafo.cli.output import Said
+    from ppafo.cli.output import CommandOutput
 
 
 def workbench(
     scenarios: Sequence[Scenario] = (), *, overrides: Overrides = (), out: File = Path("out/workbench.html")
-) -> Said:
+) -> CommandOutput:
     """Write scenarios as one page that simulates them while sliders are dragged.
 
     scenarios: names of scenarios and walks, or .toml files; default: the torque task, step response and a walk
@@ -23,7 +23,7 @@ def workbench(
     >>> print(workbench(["step-response"], out=Path("page.html")).text)
     written: page.html (... kB, step-response)
     """
-    from ppafo.cli.output import Said, check_new_file
+    from ppafo.cli.output import CommandOutput, check_new_file
     from ppafo.page.html import is_page
     from ppafo.page.workbench import DEFAULT, workbench
     from ppafo.storage.files import write_file
@@ -34,4 +34,4 @@ def workbench(
     page = workbench(names, overrides=overrides)
     write_file(out, page)
     document = {"file": str(out), "bytes": len(page), "scenarios": names}
-    return Said(f"written: {out} ({len(page) / 1e3:.0f} kB, {', '.join(names)})", document)
+    return CommandOutput(f"written: {out} ({len(page) / 1e3:.0f} kB, {', '.join(names)})", document)

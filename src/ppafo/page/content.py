@@ -50,7 +50,7 @@ _NICE = (1.0, 2.0, 2.5, 5.0, 10.0)
 
 
 @dataclass(frozen=True, slots=True)
-class Simulated:
+class PageSimulation:
     """A scenario or walk and the module that simulates it; ``label`` distinguishes it from others of its tab."""
 
     scenario: Scenario
@@ -58,7 +58,7 @@ class Simulated:
     label: str
 
 
-def program_content(simulated: Simulated, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
+def program_content(simulated: PageSimulation, module: str, intervals: Mapping[str, Interval]) -> dict[str, Any]:
     """Return what the page knows of a scenario; ``module`` is the element that holds its program."""
     described = simulated.module.description
     gauge = _gauge_texts(simulated.scenario, described["settings"])

@@ -5,7 +5,7 @@ from collections.abc import Collection, Mapping
 from typing import Any, ClassVar, Protocol, final
 
 from ppafo.report.style import PAGE_LOOKS
-from ppafo.simulation.declaration import OF_A_VANE, Declared
+from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
 from ppafo.simulation.motion_kind import VANE, WALK
 from ppafo.simulation.scenario import Scenario, vane_motion
 
@@ -20,7 +20,7 @@ class ShownMotion(Protocol):
     claims: ClassVar[str]
     """Section of ``words.toml`` with the claims of a page about it."""
 
-    def declared(self) -> Declared:
+    def declared(self) -> DeclaredContent:
         """Return what its file can hold."""
 
     def look(self, scenario: Scenario, /) -> int:
@@ -43,7 +43,7 @@ class ShownMotion(Protocol):
 class _VaneAlone:
     claims: ClassVar[str] = "claims"
 
-    def declared(self) -> Declared:
+    def declared(self) -> DeclaredContent:
         return OF_A_VANE
 
     def look(self, scenario: Scenario) -> int:
@@ -69,7 +69,7 @@ class _VaneAlone:
 class _Walk:
     claims: ClassVar[str] = "claims_of_walks"
 
-    def declared(self) -> Declared:
+    def declared(self) -> DeclaredContent:
         from ppafo.walking.declaration import OF_A_WALK
 
         return OF_A_WALK

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from ppafo.arguments import Overrides, checked
 from ppafo.errors import PpafoError, ScenarioError
 from ppafo.loading import load_scenario
-from ppafo.page.content import Interval, Simulated, page_content, program_content, usual_values
+from ppafo.page.content import Interval, PageSimulation, page_content, program_content, usual_values
 from ppafo.page.html import block_of, packed_once, page_of
 from ppafo.page.motions import shown_motion
 from ppafo.page.opening import computed_opening, first_settings, opening_like, opening_of
@@ -120,7 +120,7 @@ def _content(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str], fo
     return _PageContent(content, {name: text for text, name in names.items()}, stills[0])
 
 
-def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) -> list[Simulated]:
+def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) -> list[PageSimulation]:
     """The scenarios with their programs and labels; ScenarioError for none, too many, or two of one name."""
     if not 1 <= len(scenarios) <= MOST_SCENARIOS:
         raise ScenarioError(f"a workbench has 1 to {MOST_SCENARIOS} scenarios, not {len(scenarios)}")
@@ -133,11 +133,11 @@ def _simulated(scenarios: "Sequence[str | Scenario]", overrides: Sequence[str]) 
     for scenario in loaded:
         # A name of one's own stays as it is.
         label = _LABELS.get(scenario.name, scenario.name)
-        simulated.append(Simulated(scenario, module_of(scenario), label))
+        simulated.append(PageSimulation(scenario, module_of(scenario), label))
     return simulated
 
 
-def _opening(simulated: Simulated, form: str, claims: Sequence[str]) -> dict[str, Any]:
+def _opening(simulated: PageSimulation, form: str, claims: Sequence[str]) -> dict[str, Any]:
     """Opening state of a program, with the metrics in ``claims``; a block opens like the shipped scenario."""
     if form == "block":
         return opening_like(simulated.module)
@@ -148,7 +148,7 @@ def openings_of(names: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Return what ``opening_of`` finds of shipped scenarios and walks as a page opens with them, computed anew."""
     openings = {}
     for name in names:
-        simulated = Simulated(load_scenario(name), module_of(load_scenario(name)), name)
+        simulated = PageSimulation(load_scenario(name), module_of(load_scenario(name)), name)
         content = page_content(TITLE, "page", _tabs([simulated]), [program_content(simulated, "", {})])
         claims = content["tabs"][0]["claims"]
         openings[name] = computed_opening(
@@ -167,8 +167,8 @@ def known_intervals() -> Mapping[str, Interval]:
     return {path: (low, high) for path, (low, high) in described.items()}
 
 
-def _tabs(simulated: Sequence[Simulated]) -> list[dict[str, Any]]:
-    groups: dict[str, list[Simulated]] = {}
+def _tabs(simulated: Sequence[PageSimulation]) -> list[dict[str, Any]]:
+    groups: dict[str, list[PageSimulation]] = {}
     for program in simulated:
         groups.setdefault(shown_motion(program.scenario).tab(program.scenario), []).append(program)
     tabs = []

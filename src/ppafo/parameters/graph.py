@@ -77,7 +77,7 @@ def _term(sources: tuple[str, ...], recipe: Any, *others: Any) -> LinkFunction:
 
 
 @dataclass(frozen=True, slots=True)
-class Follows:
+class LinkedDefault:
     """Default of a number as a function of others, in SI units: the sum of terms and a gap.
 
     ``when_set``: only where the first source is given itself, not where that one only follows another in its turn.
@@ -104,12 +104,12 @@ class Follows:
         return total + self.gap if self.gap else total
 
 
-def follows(source: str, gap: float = 0.0, when_set: bool = False) -> Follows:
+def follows(source: str, gap: float = 0.0, when_set: bool = False) -> LinkedDefault:
     """Return the link to one number, with what is added to it."""
-    return Follows((LinkFunction((source,)),), gap, when_set)
+    return LinkedDefault((LinkFunction((source,)),), gap, when_set)
 
 
-Graph = Mapping[str, tuple[Follows, ...]]
+Graph = Mapping[str, tuple[LinkedDefault, ...]]
 """Links by the path of what follows; of several the first whose sources change counts. Sources stand before those."""
 
 
@@ -128,19 +128,19 @@ def fixed_zero(path: str) -> float | None:
     return None if path.startswith(_COUNTS_FROM_ATMOSPHERE) else STANDARD_ATMOSPHERE
 
 
-def gauge_link(path: str, value: float, unit: str) -> tuple[Follows, ...]:
+def gauge_link(path: str, value: float, unit: str) -> tuple[LinkedDefault, ...]:
     """Return the link of a pressure level that is given in gauge to the atmosphere; none for any other number."""
     if not unit.endswith(_GAUGE) or path == ATMOSPHERE_PATH or not path.startswith(_COUNTS_FROM_ATMOSPHERE):
         return ()
     return (follows(ATMOSPHERE_PATH, to_si(value, unit, _LEVEL, 0.0)),)
 
 
-def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = ()) -> dict[str, Follows]:
+def acting(graph: Graph, set_paths: Collection[str], turned: Collection[str] = ()) -> dict[str, LinkedDefault]:
     """Return the links by which numbers change where those at some paths are given, in the order to resolve them.
 
     Those at the paths of ``turned`` follow by other terms than before, whatever is given.
     """
-    found: dict[str, Follows] = {}
+    found: dict[str, LinkedDefault] = {}
     for path, links in graph.items():
         if path in set_paths:
             continue
@@ -192,7 +192,7 @@ def in_other_forms(graph: Graph, orifices: Collection[str]) -> Graph:
     }
 
 
-def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[Follows, ...]]:
+def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return the links that remain once numbers are given: links of what is given go, as do links that it replaces."""
     changed = acting(graph, replaced)
     return {
@@ -202,18 +202,18 @@ def left(graph: Graph, replaced: Collection[str]) -> dict[str, tuple[Follows, ..
     }
 
 
-def outside(graph: Graph, *sections: str) -> dict[str, tuple[Follows, ...]]:
+def outside(graph: Graph, *sections: str) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return the links of the numbers that are in none of some sections, such as ``controller``, which are left out."""
     return {path: links for path, links in graph.items() if path.partition(".")[0] not in sections}
 
 
-def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[Follows, ...]]:
+def holding(graph: Graph, present: Mapping[str, Any]) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return the links that are still true of numbers which may have been changed by other means since."""
     links_held = {path: tuple(link for link in links if _holds(path, link, present)) for path, links in graph.items()}
     return {path: links for path, links in links_held.items() if links}
 
 
-def _holds(path: str, link: Follows, present: Mapping[str, Any]) -> bool:
+def _holds(path: str, link: LinkedDefault, present: Mapping[str, Any]) -> bool:
     number, followed = present[path], link.number(present.__getitem__)
     if link.when_set:
         return bool(np.all(np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0)))
@@ -221,9 +221,9 @@ def _holds(path: str, link: Follows, present: Mapping[str, Any]) -> bool:
     return bool(np.all(number == followed))
 
 
-def joined(parts: Iterable[Graph]) -> dict[str, tuple[Follows, ...]]:
+def joined(parts: Iterable[Graph]) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return several graphs as one; links of sources come first."""
-    links: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[LinkedDefault, ...]] = {}
     for part in parts:
         links |= part
     return links

@@ -20,7 +20,7 @@ from ppafo.parameters.graph import (
     SAME_PRESSURE,
     SECOND_PRESSURE_PATH,
     TORQUE_CONSTANT_PATH,
-    Follows,
+    LinkedDefault,
     follows,
     gauge_link,
 )
@@ -227,7 +227,7 @@ def atmospheric_pressure(parameter_set: ParameterSet) -> float:
 
 def links_of_set(
     parameter_set: ParameterSet, set_paths: Collection[str] = (), atmosphere: float | None = None
-) -> dict[str, tuple[Follows, ...]]:
+) -> dict[str, tuple[LinkedDefault, ...]]:
     """Return how numbers of a set follow others: gauge pressures the atmosphere, the second regulator the first.
 
     The second regulator does where the set has one pressure for both, unless it was ``given`` by an override and the

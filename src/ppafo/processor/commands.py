@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from ppafo.arguments import Count, Folder, Name, Overrides, Scenario
 from ppafo.cli import output
-from ppafo.cli.output import Said
+from ppafo.cli.output import CommandOutput
 from ppafo.errors import ScenarioError, nearest_name
 
 MOST_SAMPLES = 10_000_000
@@ -24,7 +24,7 @@ def export_firmware(
     table: bool = False,
     overrides: Overrides = (),
     out: Folder | None = None,
-) -> Said:
+) -> CommandOutput:
     """Write the controller of a scenario as firmware for a small processor, or run it on the simulator of that one.
 
     Exit code 1 where any decision on the simulator differs.
@@ -75,13 +75,13 @@ def export_firmware(
     else:
         tried = words.tried(scenarios, target or TARGETS[0], samples, tuple(overrides))
     code = output.EXIT_GOOD if tried.agrees else output.EXIT_CHECK_FAILED
-    said = Said(tried.text, tried.document, "processor", code, draw=tried.draw)
+    said = CommandOutput(tried.text, tried.document, "processor", code, draw=tried.draw)
     if out is not None:
         output.write_files(out, output.said_files(said), COMMAND)
     return said
 
 
-def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> Said:
+def export_controller(scenario: Scenario, *, overrides: Overrides = (), out: Folder) -> CommandOutput:
     """Write a scenario's integer controller in C behind the protocol of 'ppafo hil'.
 
     scenario: name of a scenario, or a .toml file

@@ -134,7 +134,7 @@ def draw_panels(
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
         grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
-        drawn = [_Drawn(axes, panel, _draw(axes, panel)) for axes, panel in zip(grid, panels, strict=False)]
+        drawn = [_DrawnPanel(axes, panel, _draw(axes, panel)) for axes, panel in zip(grid, panels, strict=False)]
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
         for upper, lower, panel, other in zip(grid, grid[across:], panels, panels[across:], strict=False):
@@ -184,7 +184,7 @@ def _draw(axes: "Axes", panel: Panel) -> Any:
     return mapped
 
 
-class _Drawn(NamedTuple):
+class _DrawnPanel(NamedTuple):
     """A panel that is drawn: its axes, and what of it has colours that stand for numbers, if anything has."""
 
     axes: "Axes"
@@ -192,7 +192,7 @@ class _Drawn(NamedTuple):
     coloured: Any
 
 
-def _share_scales(figure: "Figure", drawn: Sequence[_Drawn]) -> None:
+def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel]) -> None:
     """Give panels that follow each other with one scale the same limits and one bar."""
     for scale, group in groupby(drawn, key=lambda each: each.panel.scale):
         members = list(group)

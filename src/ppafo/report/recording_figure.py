@@ -19,7 +19,7 @@ from ppafo.report.style import (
     GREY,
     ORANGE,
     REFERENCE,
-    Look,
+    DrawingStyle,
     look_of_valve,
     render_figure,
 )
@@ -50,7 +50,7 @@ class _Quantity(NamedTuple):
     """
 
     kind: Kind
-    lines: Mapping[str, tuple[str, Look]]
+    lines: Mapping[str, tuple[str, DrawingStyle]]
     smallest_span: float
     always_shown: tuple[float, ...] = ()
 
@@ -86,8 +86,8 @@ _QUANTITIES = (
         kind=Kind("Gas since the start", "kg", "gas mass"),
         lines={
             "supplied_mass": ("supplied", ACTUAL),
-            "vented_mass": ("vented", Look(ORANGE)),
-            "leaked_mass": ("leaked between the chambers", Look(GREY, "--")),
+            "vented_mass": ("vented", DrawingStyle(ORANGE)),
+            "leaked_mass": ("leaked between the chambers", DrawingStyle(GREY, "--")),
         },
         smallest_span=1.0e-5,
     ),

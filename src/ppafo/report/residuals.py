@@ -19,7 +19,7 @@ _HOLLOW = {"linestyle": "", "markerfacecolor": "none"}
 _READING = {"linestyle": "none", "markersize": 5, "markeredgewidth": 1.1}
 
 
-class _Look(NamedTuple):
+class _ReadingStyle(NamedTuple):
     """Style of readings: colour, largest number drawn, keywords of Matplotlib.
 
     A page with every sample would have some megabytes.
@@ -31,11 +31,11 @@ class _Look(NamedTuple):
 
 
 _LOOKS = {
-    "rising": _Look(BLUE, 1200, {"marker": "x", **_READING}),
-    "falling": _Look(VERMILION, 1200, {"marker": "o", "markerfacecolor": "none", **_READING}),
-    "measured": _Look(BLUE, 1200, {"marker": ".", "linestyle": "none", "markersize": 4}),
-    "circles": _Look(BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
-    "dots": _Look(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
+    "rising": _ReadingStyle(BLUE, 1200, {"marker": "x", **_READING}),
+    "falling": _ReadingStyle(VERMILION, 1200, {"marker": "o", "markerfacecolor": "none", **_READING}),
+    "measured": _ReadingStyle(BLUE, 1200, {"marker": ".", "linestyle": "none", "markersize": 4}),
+    "circles": _ReadingStyle(BLACK, 90, {"marker": "o", "markersize": 3.6, "markeredgewidth": 0.7, **_HOLLOW}),
+    "dots": _ReadingStyle(BLACK, 400, {"marker": ".", "markersize": 2.6, "linestyle": ""}),
 }
 """Looks of readings by name."""
 _ROUNDING = 1.0e-9

@@ -25,7 +25,7 @@ COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
 """The order in which lines of one kind take colours."""
 
 
-class Look(NamedTuple):
+class DrawingStyle(NamedTuple):
     """Style of one item in every figure, and on the page that simulates: colour, line and marker."""
 
     colour: str
@@ -33,14 +33,14 @@ class Look(NamedTuple):
     marker: str = "o"
 
 
-PROPORTIONAL = Look(BLUE)
-SOLENOID = Look(VERMILION, marker="s")
-CHAMBER_1 = Look(GREEN, marker="^")
-CHAMBER_2 = Look(PURPLE, marker="v")
-REFERENCE = Look(BLACK, line="--")
-EXPERIMENT = Look(GREY, marker=".")
+PROPORTIONAL = DrawingStyle(BLUE)
+SOLENOID = DrawingStyle(VERMILION, marker="s")
+CHAMBER_1 = DrawingStyle(GREEN, marker="^")
+CHAMBER_2 = DrawingStyle(PURPLE, marker="v")
+REFERENCE = DrawingStyle(BLACK, line="--")
+EXPERIMENT = DrawingStyle(GREY, marker=".")
 """Style of measurements, from a bench or from the simulated test bench."""
-ACTUAL = Look(BLUE)
+ACTUAL = DrawingStyle(BLUE)
 """Style of a device irrespective of its valve."""
 _VALVES = MappingProxyType({"proportional": PROPORTIONAL, "solenoid": SOLENOID, "solenoid_recycling": SOLENOID})
 PAGE_COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
@@ -49,7 +49,7 @@ PAGE_LOOKS = MappingProxyType({kind: PAGE_COLOURS.index(look.colour) + 1 for kin
 """Index of the page's colour for the curves of each kind of valve."""
 
 
-def look_of_valve(kind: str) -> Look:
+def look_of_valve(kind: str) -> DrawingStyle:
     """Return how a device with this kind of valve looks."""
     return _VALVES.get(kind, ACTUAL)
 

@@ -31,7 +31,7 @@ from ppafo.rig.stretches import Distances, RigInterval, Slopes, absolute_toleran
 # The controller of a run on the rig: what it decides sample by sample, and its commands on the way to the valve.
 
 
-class CommandUnderWay(NamedTuple):
+class PendingCommand(NamedTuple):
     """A command [-] and the time [s] at which the valve gets it."""
 
     arrival: float
@@ -52,7 +52,7 @@ class Commands:
         self._run, self._period, self._delay, self._hysteresis = run, period, delay, hysteresis
         self._controller_state = self._controller.initial
         self._spool = 0.0
-        self._under_way: list[CommandUnderWay] = []
+        self._under_way: list[PendingCommand] = []
         self.decided = 0.0
         self.at_valve = 0.0
 
@@ -65,7 +65,7 @@ class Commands:
             run.controller, self._controller_state, reference, measurement, run.period
         )
         self._spool = spool_position(self._spool, self.decided, self._hysteresis)
-        self._under_way.append(CommandUnderWay(time + self._delay, self._spool))
+        self._under_way.append(PendingCommand(time + self._delay, self._spool))
 
     def arrive(self, time: float) -> None:
         """Hand over to the valve what has arrived by a time [s]."""

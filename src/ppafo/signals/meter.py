@@ -91,7 +91,7 @@ class Sample(NamedTuple):
     stride: StrideSample
 
 
-class Course(NamedTuple):
+class ReferenceSummary(NamedTuple):
     """Summary of the whole reference, in its unit, and the start of its rest.
 
     Its last value; the farthest that it goes over all samples, from 0 or, where it is no torque, from what is
@@ -114,11 +114,11 @@ def is_away(reference: float, last: float, tolerance: float) -> bool:
     return abs(reference - last) > tolerance
 
 
-def advance_course(course: Course, sample: Sample) -> Course:
+def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary:
     """Course of a monotone reference after one more sample: away from its last value first, then at rest."""
     # Sample by sample, because a run is not kept; the last value and the largest are known from the profile before.
     away = is_away(sample.reference, course.last, course.tolerance)
-    return Course(
+    return ReferenceSummary(
         last=course.last,
         largest=course.largest,
         tolerance=course.tolerance,
@@ -137,7 +137,7 @@ class MeterKind:
 
     name: str
     state: type
-    start: Callable[[Course, Any], Any]
-    update: Callable[[Any, Course, Any], Any]
+    start: Callable[[ReferenceSummary, Any], Any]
+    update: Callable[[Any, ReferenceSummary, Any], Any]
     needs_course: bool = False
     of_motion: bool = False

@@ -204,7 +204,7 @@ class Check:
         return {"is_determined": self.is_determined, "sentence": self.sentence, **document, **judged}
 
 
-class Ran(Protocol):
+class FinishedRun(Protocol):
     """A finished run, as its check needs it."""
 
     @property
@@ -224,7 +224,7 @@ class Ran(Protocol):
         """End of the run, a ``Status``."""
 
 
-Again = Callable[[Sequence[Run]], Sequence[Ran]]
+Again = Callable[[Sequence[Run]], Sequence[FinishedRun]]
 """Function that runs other plans of the same scenario."""
 
 
@@ -240,7 +240,7 @@ def finer(run: Run) -> Run:
     )
 
 
-def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
+def estimated_error(result: FinishedRun, fine: FinishedRun) -> ErrorEstimate:
     """The estimated error of a result, from the same run with finer steps; inf where that diverged."""
     courses = [_COURSES[name] for name in _courses_of(result)]
     if not fine.status.is_completed:
@@ -273,12 +273,12 @@ def estimated_error(result: Ran, fine: Ran) -> ErrorEstimate:
     )
 
 
-def _courses_of(result: Ran) -> list[str]:
+def _courses_of(result: FinishedRun) -> list[str]:
     """Channels of a run that are compared over time: temperatures if recorded."""
     return [name for name, channels in _COURSES.items() if all(channel in result.recording for channel in channels)]
 
 
-def _shares(result: Ran, errors: Mapping[str, float]) -> dict[str, float]:
+def _shares(result: FinishedRun, errors: Mapping[str, float]) -> dict[str, float]:
     """Errors of metrics over their values or the ranges of their quantities [-]; those that have either."""
     pressures = _pressure_range(result)
     scales = {
@@ -289,7 +289,7 @@ def _shares(result: Ran, errors: Mapping[str, float]) -> dict[str, float]:
     return {name: errors[name] / scale for name, scale in scales.items() if 0.0 < scale < math.inf}
 
 
-def _pressure_range(result: Ran) -> float:
+def _pressure_range(result: FinishedRun) -> float:
     """Highest less lowest pressure [Pa] that the chambers had or are connected to; the atmosphere's if there is one."""
     supply = result.scenario.device.supply
     outside = [supply.pressure, supply.dorsiflexion_pressure, supply.atmospheric_pressure]
@@ -297,7 +297,7 @@ def _pressure_range(result: Ran) -> float:
     return float(np.ptp(values)) or supply.atmospheric_pressure
 
 
-def checked(result: Ran, run: Run, again: Again) -> Check:
+def checked(result: FinishedRun, run: Run, again: Again) -> Check:
     """Return whether a result can be repeated, from its plan.
 
     SimulationError for a Python controller that gives a different run each time: every change would be its own.
@@ -375,7 +375,7 @@ def _measurements_moved(run: Run, pressures: float) -> list[Run]:
     ]
 
 
-def _metrics(result: Ran, repeats: list[tuple[str, Ran]], pressures: float) -> tuple[NumberCheck, ...]:
+def _metrics(result: FinishedRun, repeats: list[tuple[str, FinishedRun]], pressures: float) -> tuple[NumberCheck, ...]:
     names = dict.fromkeys(name for one in (result, *(repeat for _, repeat in repeats)) for name in one.metrics)
     rows = []
     for name in names:
@@ -387,7 +387,7 @@ def _metrics(result: Ran, repeats: list[tuple[str, Ran]], pressures: float) -> t
     return tuple(rows)
 
 
-def _value(result: Ran, name: str) -> float:
+def _value(result: FinishedRun, name: str) -> float:
     return result.metrics[name].value if name in result.metrics else math.nan
 
 
@@ -407,7 +407,7 @@ def _largest(changes: Iterable[tuple[str, float]]) -> dict[str, float]:
     return largest
 
 
-def _metric_range(result: Ran, name: str, unit: str, pressures: float) -> float:
+def _metric_range(result: FinishedRun, name: str, unit: str, pressures: float) -> float:
     """Range of the quantity of a metric; 1 for a number of events, 0 for a unit that has none."""
     scenario, recording = result.scenario, result.recording
     actuator = scenario.device.actuator
@@ -443,7 +443,7 @@ def _largest_differences(one: Recording, other: Recording, channels: Iterable[st
     return np.asarray(np.max([np.abs(one[name][:count] - other[name][:count]) for name in channels], axis=0))
 
 
-def _course(name: str, repeats: list[tuple[str, Ran]], result: Ran, pressures: float) -> NumberCheck:
+def _course(name: str, repeats: list[tuple[str, FinishedRun]], result: FinishedRun, pressures: float) -> NumberCheck:
     device = result.scenario.device
     span, unit, promised = {
         "angle over time": (device.actuator.angle_max - device.actuator.angle_min, "rad", LARGEST_OF_ANGLE),

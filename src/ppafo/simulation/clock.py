@@ -5,7 +5,7 @@ from typing import Any
 
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Numeric, choose, larger, rounded_up, smaller, truncated
-from ppafo.parameters.graph import Follows, Graph, LinkFunction
+from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.parameters.overrides import read_overrides
 from ppafo.simulation.declaration import PERIOD, RATE, RUN, DocumentReader, value_at
 from ppafo.simulation.motion_kind import RunTimes
@@ -71,7 +71,7 @@ def read_clock(reading: DocumentReader) -> RunTimes:
 def links_of_times(document: Mapping[str, Any]) -> Graph:
     """Return which times of a document follow others because it does not give them: step and output interval."""
     step, output = (value_at(document, path) is not None for path in (_STEP_PATH, _OUTPUT_PATH))
-    found: dict[str, tuple[Follows, ...]] = {}
+    found: dict[str, tuple[LinkedDefault, ...]] = {}
     if not step:
         sources = (_DURATION_PATH, _PERIOD_PATH)
         term = (
@@ -79,10 +79,10 @@ def links_of_times(document: Mapping[str, Any]) -> Graph:
             if output
             else LinkFunction(sources, step_unless_given)
         )
-        found[_STEP_PATH] = (Follows((term,)),)
+        found[_STEP_PATH] = (LinkedDefault((term,)),)
     if not output:
         found[_OUTPUT_PATH] = (
-            Follows((LinkFunction((_DURATION_PATH, _PERIOD_PATH, _STEP_PATH), output_unless_given),)),
+            LinkedDefault((LinkFunction((_DURATION_PATH, _PERIOD_PATH, _STEP_PATH), output_unless_given),)),
         )
     return found
 

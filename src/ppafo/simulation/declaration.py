@@ -101,7 +101,7 @@ TEXTS = ("name", "description", "device.set", "device.valve")
 
 
 @dataclass(frozen=True, slots=True)
-class Declared:
+class DeclaredContent:
     """Possible content of the files of one kind of scenario, for the kinds that a document names.
 
     ``texts`` are paths, ``quantities`` the declarations of numbers by path; ``find_kinds`` loads the kinds of other
@@ -324,7 +324,7 @@ def line_paths() -> dict[str, Quantity]:
     }
 
 
-OF_A_VANE = Declared(
+OF_A_VANE = DeclaredContent(
     find_kinds, texts, lambda document: quantities(document) | line_paths(), check_motion=check_motion_kind
 )
 """Possible content of the file of a vane alone; a file without supply lines can be given some."""

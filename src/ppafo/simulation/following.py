@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
-from ppafo.parameters.graph import Follows, Graph, LinkFunction
+from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.parameters.plant import number_under
 from ppafo.simulation.declaration import SUPPLY_LINES, DocumentReader, line_paths, value_at
 
@@ -26,7 +26,7 @@ def read_followers(
     ``terms`` are what a default may follow, by name; ``present`` has numbers by path beside the device's.
     """
     settings: dict[str, float] = {}
-    links: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[LinkedDefault, ...]] = {}
 
     def number(path: str) -> float:
         known = settings if path in settings else present
@@ -38,7 +38,7 @@ def read_followers(
             # A setting of this list may follow one before it; what no number of the device decides is to be given.
             is_decided = quantity.follows and terms.keys() >= set(quantity.follows)
             if is_decided and value_at(reading.document, path) is None:
-                link = Follows(tuple(terms[name] for name in quantity.follows), quantity.default or 0.0)
+                link = LinkedDefault(tuple(terms[name] for name in quantity.follows), quantity.default or 0.0)
                 links[path] = (link,)
                 read = replace(quantity, default=float(link.number(number)))
             settings[path] = reading.number(path, read)

@@ -20,7 +20,7 @@ from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters.declaration import RELIEVING_PATH
 from ppafo.parameters.device import Device, Supply
-from ppafo.parameters.graph import Follows, Graph, follows, gauge_link
+from ppafo.parameters.graph import Graph, LinkedDefault, follows, gauge_link
 from ppafo.parameters.overrides import (
     FORMS,
     Override,
@@ -55,7 +55,7 @@ from ppafo.simulation.declaration import (
     THERMAL,
     THERMAL_GAS,
     WALL_AREA,
-    Declared,
+    DeclaredContent,
     DocumentReader,
     changes_reach,
     controlled_in,
@@ -271,7 +271,7 @@ def _initial(reading: DocumentReader, supply: Supply) -> tuple[Initial, Graph]:
     Each is a number or a word; a word follows its pressure, a number in gauge the atmosphere.
     """
     pressures: list[float] = []
-    links: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[LinkedDefault, ...]] = {}
     for quantity in INITIAL:
         path = f"initial.{quantity.name}"
         value = value_at(reading.document, path)
@@ -467,7 +467,7 @@ class Layout:
     """
 
     file: TomlKind
-    declared: Declared
+    declared: DeclaredContent
     model: Callable[[Mapping[str, Any]], type[BaseModel]]
     whole: Callable[[Mapping[str, Any]], type[BaseModel]]
     build: Callable[[ScenarioRequest, OverriddenDocument], Scenario]

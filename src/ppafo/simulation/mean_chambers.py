@@ -45,7 +45,7 @@ class MeanChambers(NamedTuple):
     growth_2: float
 
 
-class StillPlant(NamedTuple):
+class RestingPlant(NamedTuple):
     """Resting plant of an actuator alone (``ShapedPlant``), as a kind may read it."""
 
     shape: Any
@@ -72,7 +72,7 @@ class ShapedParts(NamedTuple):
     torque: Callable[[Any, float, float, float], float]
 
 
-class UsualParts(NamedTuple):
+class ChamberParts(NamedTuple):
     """Chambers of an actuator at an angle [rad]."""
 
     at: Callable[[Any, Range, Surroundings, float], MeanChambers]
@@ -111,7 +111,7 @@ def vane_at(settings: VaneSettings, stops: Range, _around: Surroundings, angle: 
 def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *, parts: ShapedParts) -> MeanChambers:
     """Both chambers of another kind at an angle [rad], half filled."""
     room = around.atmospheric_pressure
-    plant = StillPlant(
+    plant = RestingPlant(
         shape=parts.shape(settings, stops),
         gas_product=1.0,
         supply_pressure=around.supply_pressure,
@@ -138,7 +138,7 @@ def shaped_at(settings: Any, stops: Range, around: Surroundings, angle: float, *
     )
 
 
-def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: UsualParts) -> MeanChambers:
+def usual_chambers(settings: Any, stops: Range, around: Surroundings, *, parts: ChamberParts) -> MeanChambers:
     """Both chambers where nobody knows where the joint is."""
     return parts.at(settings, stops, around, usual_place(stops.angle_min, stops.angle_max))
 
@@ -180,14 +180,14 @@ def chambers_of(device: Device) -> ChambersOf:
         for quantity in quantities_of(row)
     )
     if actuator.kind == VANE:
-        usual = made_of(usual_chambers, "usual_chambers_of_vane", UsualParts(vane_at))
+        usual = made_of(usual_chambers, "usual_chambers_of_vane", ChamberParts(vane_at))
         return ChambersOf(function=usual, at=vane_at, growth=vane_growth, sources=sources, rows=rows)
     name, model, shape = actuator.kind, kind.model, kind.model.prepare
     if actuator.table is not None:
         shape = made_of(measured_shape_of, f"shape_of_{name}", MeasuredParts(model.prepare, actuator.table))
     shaped = ShapedParts(shape, model.chambers, model.torque)
     at = made_of(shaped_at, f"chambers_at_of_{name}", shaped)
-    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", UsualParts(at))
+    middle = made_of(usual_chambers, f"usual_chambers_of_{name}", ChamberParts(at))
     growth = made_of(shaped_growth, f"growth_of_{name}", shaped)
     return ChambersOf(function=middle, at=at, growth=growth, sources=sources, rows=rows)
 

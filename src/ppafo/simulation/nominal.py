@@ -100,24 +100,24 @@ def time_of_joint(joining: float, holding: float) -> float:
     return joining + holding
 
 
-class BelievedParts(NamedTuple):
+class NominalParts(NamedTuple):
     """Chambers of the actuator in the middle of its range."""
 
     mean_chambers: Callable[[Any, Range, Surroundings], MeanChambers]
 
 
-def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: BelievedParts) -> float:
+def torque_per_pressure(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
     """Torque per pressure of chamber 1 [m^3] in the middle of the range."""
     return parts.mean_chambers(settings, stops, around).torque_per_pressure_1
 
 
-def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: BelievedParts) -> float:
+def dead_volume_1(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 1 is as large in the middle of the range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_1, mean.torque_per_pressure_1, stops)
 
 
-def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: BelievedParts) -> float:
+def dead_volume_2(settings: Any, stops: Range, around: Surroundings, *, parts: NominalParts) -> float:
     """Dead volume [m^3] of a vane whose chamber 2 is as large in the middle of the range."""
     mean = parts.mean_chambers(settings, stops, around)
     return rest_of(mean.volume_2, mean.torque_per_pressure_1, stops)
@@ -208,7 +208,7 @@ def _chamber_terms(device: Device) -> dict[str, LinkFunction]:
     chambers = chambers_of(device)
 
     def term(frame: Callable[..., float]) -> LinkFunction:
-        made = made_of(frame, f"{frame.__name__}_of_device", BelievedParts(chambers.function))
+        made = made_of(frame, f"{frame.__name__}_of_device", NominalParts(chambers.function))
         return LinkFunction(chambers.sources, made, chambers.rows)
 
     return own | {

@@ -16,7 +16,7 @@ from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
 from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
-from ppafo.simulation.declaration import OF_A_VANE, Declared, value_at
+from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent, value_at
 from ppafo.units import SI, number_text
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -36,7 +36,7 @@ class OverriddenDocument:
 
 
 def apply_overrides(
-    document: Mapping[str, Any], overrides: Iterable[Override], file: str, declared: Declared = OF_A_VANE
+    document: Mapping[str, Any], overrides: Iterable[Override], file: str, declared: DeclaredContent = OF_A_VANE
 ) -> OverriddenDocument:
     """Return a changed copy of a document; ``file`` is what messages call it.
 
@@ -77,7 +77,7 @@ def over_layer(
     earlier: Sequence[Override],
     later: Sequence[Override],
     file: str,
-    declared: Declared,
+    declared: DeclaredContent,
     valve: str = "",
 ) -> tuple[Override, ...]:
     """Return two layers of overrides of a document as one set: the later ones replace by path, form and kind.
@@ -114,7 +114,7 @@ def chosen_by(path: str, choosing: Iterable[str]) -> list[str]:
 
 
 def _choose_kinds(
-    document: dict[str, Any], overrides_of: Mapping[str, Override], file: str, declared: Declared
+    document: dict[str, Any], overrides_of: Mapping[str, Override], file: str, declared: DeclaredContent
 ) -> tuple[str, ...]:
     """Set the kinds that are given, outer sections first, and return the paths that remain.
 
@@ -146,7 +146,7 @@ def _unused(path: str, overrides_of: Mapping[str, Override], known: tuple[str, .
     )
 
 
-def _with_one_path_each(document: Mapping[str, Any], file: str, declared: Declared) -> dict[str, Any]:
+def _with_one_path_each(document: Mapping[str, Any], file: str, declared: DeclaredContent) -> dict[str, Any]:
     """Return a copy of a document where each value stands at the one path that the document keeps."""
     changed = copy.deepcopy(dict(document))
     for path, kept in declared.same.items():
@@ -182,7 +182,7 @@ def unknown_value(override: Override, known: tuple[str, ...], who_has: str) -> S
     return ScenarioError(f"override '{override}': {who_has} no value '{override.typed}'{hint}")
 
 
-def _set(document: dict[str, Any], path: str, text: str, file: str, declared: Declared) -> None:
+def _set(document: dict[str, Any], path: str, text: str, file: str, declared: DeclaredContent) -> None:
     section, _, name = path.rpartition(".")
     table = document
     for part in section.split(".") if section else ():
@@ -211,7 +211,7 @@ def _set(document: dict[str, Any], path: str, text: str, file: str, declared: De
     table[name] = f"{text} {quantity.unit}" if quantity is not None and is_gain and _NUMBER.fullmatch(text) else text
 
 
-def _setting_names(document: dict[str, Any], section: str, declared: Declared) -> frozenset[str]:
+def _setting_names(document: dict[str, Any], section: str, declared: DeclaredContent) -> frozenset[str]:
     """Return the keys that a section can have beside its kind."""
     prefix = f"{section}."
     paths = [path.removeprefix(prefix) for path in declared.paths(document) if path.startswith(prefix)]

@@ -9,7 +9,7 @@ from ppafo.engine.in_python import over_samples
 from ppafo.engine.rows import rebuilt
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import at, over_runs
-from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, Controlled, Ends
+from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE, ControlledQuantity, Ends
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import DocumentReader, kind_at, profile_settings
@@ -82,7 +82,7 @@ def stops_of(device: Device) -> Limits:
     return limits_of(device, CONTROLLED[ANGLE])
 
 
-def limits_of(device: Device, followed: Controlled) -> Limits:
+def limits_of(device: Device, followed: ControlledQuantity) -> Limits:
     """Between what a device can bring what a reference is of; a torque has no limits here."""
     actuator, supply = device.actuator, device.supply
     ends = Ends(

@@ -8,7 +8,7 @@ import numpy as np
 
 from ppafo.control.kind import PythonController
 from ppafo.engine.in_python import in_program
-from ppafo.engine.lanes import Advancing, Batch, BatchResult, LaneBlock, effort_for, load_program, samples_in
+from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
 from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
@@ -21,7 +21,7 @@ from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 class SampledRun:
     """A batch of one in progress, whose command [-] somebody else gives sample by sample."""
 
-    def __init__(self, batch: Batch, module: Advancing | None = None) -> None:
+    def __init__(self, batch: Batch, module: RunnableProgram | None = None) -> None:
         program, clock = batch.program, batch.clock
         self.samples = math.ceil(clock.step_count / clock.steps_per_sample)
         self.taken = 0

@@ -59,7 +59,7 @@ class RunMetrics(NamedTuple):
     ended: str
 
 
-class Measuring:
+class DeferredResult:
     """Recording, metrics and end of a run, computed on first use: of many runs they are never read."""
 
     __slots__ = ("_measured",)
@@ -75,13 +75,13 @@ class Measuring:
         return self._measured
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Measuring) and self() == other()
+        return isinstance(other, DeferredResult) and self() == other()
 
     __hash__ = None  # type: ignore[assignment]  # recordings have no hash
 
-    def __reduce__(self) -> tuple[type["Measuring"], tuple[RunMetrics]]:
+    def __reduce__(self) -> tuple[type["DeferredResult"], tuple[RunMetrics]]:
         """Copy and pickle what was measured: the program of the run stays in this process."""
-        return Measuring, (self(),)
+        return DeferredResult, (self(),)
 
 
 def _units_of(result: "Result", *_: object, **__: object) -> Mapping[str, str]:
@@ -96,7 +96,7 @@ class Result:
     status: Status
     versions: Mapping[str, str]
     engine: Mapping[str, float | int | str]
-    measured: Measuring
+    measured: DeferredResult
 
     @property
     def recording(self) -> Recording:
@@ -247,10 +247,10 @@ def result_of(scenario: Scenario, run: Run, outcome: BatchResult) -> Result:
         measured = _measured(scenario, run, times[:kept], record[:kept], rows)
         if status.is_completed:
             status = replace(status, message=measured.ended)
-        return Result(scenario, status, versions, engine, Measuring(measured))
+        return Result(scenario, status, versions, engine, DeferredResult(measured))
     shown = {path: row for path, row in rows.items() if not path.startswith(_OF_STEPS)}
     measure = partial(_measured, scenario, run, times[:kept], record[:kept], shown)
-    return Result(scenario, status, versions, engine, Measuring(measure))
+    return Result(scenario, status, versions, engine, DeferredResult(measure))
 
 
 def _measured(scenario: Scenario, run: Run, times: Floats, record: Floats, rows: Mapping[str, int]) -> RunMetrics:

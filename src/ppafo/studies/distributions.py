@@ -99,7 +99,7 @@ class LogNormalAround:
 
 
 @dataclass(frozen=True, slots=True)
-class Above:
+class ShiftedDistribution:
     """Another distribution less a number, as an absolute pressure less the atmosphere."""
 
     other: Distribution

@@ -16,7 +16,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
-from ppafo.studies.study import Configuration, Drawn, SamplingPlan, Study, with_followers
+from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
 from ppafo.units import parse_quantity
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
@@ -35,7 +35,7 @@ class Uncertainty:
     their run.
     """
 
-    drawn: tuple[Drawn, ...]
+    drawn: tuple[RandomValue, ...]
     scores: tuple[tuple[float, ...], ...] | None = None
     same: Mapping[str, str] = field(default_factory=dict)
     gauge: frozenset[str] = frozenset()

@@ -29,9 +29,9 @@ from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
-from ppafo.studies.distributions import Above
+from ppafo.studies.distributions import ShiftedDistribution
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
-from ppafo.studies.study import Axis, Configuration, Drawn, SamplingPlan, Study, valid_outputs
+from ppafo.studies.study import Axis, Configuration, RandomValue, SamplingPlan, Study, valid_outputs
 from ppafo.studies.varying import (
     VariedPath,
     axis_or_distribution,
@@ -139,7 +139,7 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
         for entry in parsed.vary
         if not isinstance(entry, declared.SameAs)
     ]
-    drawn = tuple(number for number in independent if isinstance(number, Drawn))
+    drawn = tuple(number for number in independent if isinstance(number, RandomValue))
     scores = _scores(parsed, drawn)
     # A grid alone is run once, with the noise that its scenarios write.
     if drawn:
@@ -243,7 +243,7 @@ def _common_path(
 
 def _axis_or_drawn(
     entry: declared.Varied, varied_path: VariedPath, configurations: Iterable[Configuration]
-) -> Axis | Drawn:
+) -> Axis | RandomValue:
     """Return the values of a grid or a list, or the distribution of a path, in SI units."""
     with refused_as(StudyError, f"vary '{entry.path}'", UnitError):
         if not isinstance(entry, declared.Stated):
@@ -255,7 +255,9 @@ def _axis_or_drawn(
                 "the parameter sets of the configurations state different values; use 'only', or give the values"
             )
         stated = distributions.pop()
-        return Drawn(entry.path, Above(stated, varied_path.atmosphere) if varied_path.is_gauge else stated)
+        return RandomValue(
+            entry.path, ShiftedDistribution(stated, varied_path.atmosphere) if varied_path.is_gauge else stated
+        )
 
 
 def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, VariedPath]) -> dict[str, str]:
@@ -277,7 +279,7 @@ def _followed_paths(parsed: declared.StudyFile, varied_paths: Mapping[str, Varie
     return followed
 
 
-def _units(varied_paths: Mapping[str, VariedPath], drawn: Iterable[Drawn]) -> dict[str, str]:
+def _units(varied_paths: Mapping[str, VariedPath], drawn: Iterable[RandomValue]) -> dict[str, str]:
     """Return the unit in SI of all that varies, by path; the noise, which no [[vary]] has, is a plain number."""
     units = {path: varied.quantity.unit or "-" for path, varied in varied_paths.items()}
     return units | {number.path: "-" for number in drawn if number.path not in units}
@@ -288,7 +290,7 @@ def _varying(entry: declared.Varied, configurations: Iterable[Configuration]) ->
     return [each for each in configurations if not entry.only or each.name in entry.only]
 
 
-def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None:
+def _scores(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Factor | None:
     """Return the lower Cholesky factor of the correlation of the normal scores; None where none are correlated."""
     if not parsed.correlations:
         return None
@@ -319,7 +321,7 @@ def _scores(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> Factor | None
     return factor
 
 
-def _sample(parsed: declared.StudyFile, drawn: Sequence[Drawn]) -> SamplingPlan:
+def _sample(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> SamplingPlan:
     """Return how the distributions are drawn; without any, one run at each point of the grid."""
     if not drawn:
         if parsed.sample is not None:

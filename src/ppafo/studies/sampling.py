@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ppafo.simulation.scenario import LARGEST_SEED, Scenario
 from ppafo.studies.distributions import Floats, WholeNumbersBetween
-from ppafo.studies.study import Drawn, SamplingPlan
+from ppafo.studies.study import RandomValue, SamplingPlan
 
 Words = NDArray[np.uint64]
 Factor = tuple[tuple[float, ...], ...]
@@ -144,8 +144,8 @@ _KEY = 1
 
 
 def with_noise(
-    drawn: tuple[Drawn, ...], scores: Factor | None, scenarios: Iterable[Scenario], paths: Sequence[str]
-) -> tuple[tuple[Drawn, ...], Factor | None]:
+    drawn: tuple[RandomValue, ...], scores: Factor | None, scenarios: Iterable[Scenario], paths: Sequence[str]
+) -> tuple[tuple[RandomValue, ...], Factor | None]:
     """Return distributions and factor with the noise last among them, independent of the others, if there is any.
 
     ``paths`` are all that vary; a seed among them is left as it is.
@@ -158,7 +158,7 @@ def with_noise(
         is_noisy = is_noisy or bool(np.any(np.asarray(level) > 0.0))
     if NOISE in paths or not is_noisy:
         return drawn, scores
-    noise = Drawn(NOISE, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
+    noise = RandomValue(NOISE, WholeNumbersBetween(0.0, float(LARGEST_SEED)))
     if scores is None:
         return (*drawn, noise), None
     alone = (*(0.0,) * len(drawn), 1.0)

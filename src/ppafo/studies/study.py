@@ -112,7 +112,7 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
-class Drawn:
+class RandomValue:
     """A path and the distribution of its values [SI]."""
 
     path: str
@@ -145,7 +145,7 @@ class Study:
     description: str
     configurations: tuple[Configuration, ...]
     axes: tuple[Axis, ...]
-    drawn: tuple[Drawn, ...]
+    drawn: tuple[RandomValue, ...]
     same: Mapping[str, str]
     scores: tuple[tuple[float, ...], ...] | None
     sample: SamplingPlan

@@ -20,19 +20,19 @@ from ppafo.simulation.numbers import declared_numbers, number_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import (
-    Above,
     Distribution,
     LogNormalAround,
     LogUniformBetween,
     NormalAround,
     NormalBetween,
     OneOf,
+    ShiftedDistribution,
     TriangularBetween,
     UniformBetween,
     WholeNumbersBetween,
 )
 from ppafo.studies.sampling import NOISE
-from ppafo.studies.study import Axis, Drawn
+from ppafo.studies.study import Axis, RandomValue
 from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
 from ppafo.units.shown import shown_unit, shown_value
 
@@ -157,7 +157,7 @@ def texts_of(entry: declared.Varied) -> list[object]:
     return [*(getattr(entry, key) for key in keys if hasattr(entry, key)), *getattr(entry, "values", ())]
 
 
-def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | Drawn:
+def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | RandomValue:
     """Return what a table asks for; UnitError with the key where a value is not usable or contradicts another."""
     is_counted, is_whole = entry.path in WHOLE, entry.kind == "whole_numbers"
     if is_whole and not is_counted:
@@ -170,7 +170,7 @@ def axis_or_distribution(entry: declared.Varied, varied: VariedPath) -> Axis | D
         levels = tuple(_level("values", value, varied) for value in entry.values)
         return Axis(entry.path, _all_whole(entry.path, levels))
     if not isinstance(entry, declared.Grid):
-        return Drawn(entry.path, _DISTRIBUTIONS[entry.kind](entry, varied))
+        return RandomValue(entry.path, _DISTRIBUTIONS[entry.kind](entry, varied))
     first, last = _key(entry, "first", varied), _key(entry, "last", varied)
     if first == last:
         raise UnitError(f"first and last are both {entry.first!r}; a grid needs two different ends")
@@ -207,7 +207,7 @@ def _logarithmic(entry: declared.LogUniform | declared.LogNormal, varied: Varied
         if median <= 0.0:
             raise UnitError(f"median = {entry.median!r} must be above 0")
         distribution = LogNormalAround(median, entry.factor)
-    return Above(distribution, varied.atmosphere) if varied.is_gauge else distribution
+    return ShiftedDistribution(distribution, varied.atmosphere) if varied.is_gauge else distribution
 
 
 def _normal(entry: declared.Normal | declared.TruncatedNormal, varied: VariedPath) -> Distribution:

@@ -33,7 +33,7 @@ _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
 
 
 @final
-class Tally:
+class RunCounter:
     """Counts runs for whoever watches, on from those ``done`` earlier; ``runs`` is doubled where there are more."""
 
     def __init__(self, runs: int, progress: Report | None, done: int = 0, failed: int = 0) -> None:
@@ -65,7 +65,7 @@ class Runs:
         self,
         scenario: Scenario,
         metrics: Sequence[str],
-        tally: Tally,
+        tally: RunCounter,
         gauge: Collection[str] = (),
         threads: int | None = None,
     ) -> None:
@@ -95,10 +95,10 @@ class Runs:
             failed = rows.get(FAILED, ~np.any([np.isfinite(rows[name]) for name in metrics], axis=0))
             return {**rows, FAILED: failed}, "diverged" if failed.any() else ""
 
-        runs._begin(metrics, rows, Tally(1, None), _AT_ONCE)
+        runs._begin(metrics, rows, RunCounter(1, None), _AT_ONCE)
         return runs
 
-    def _begin(self, metrics: Sequence[str], rows: _Made, tally: Tally, at_once: int) -> None:
+    def _begin(self, metrics: Sequence[str], rows: _Made, tally: RunCounter, at_once: int) -> None:
         self.metrics, self._rows, self._tally, self._at_once = tuple(metrics), rows, tally, at_once
         self._parts: list[Rows] = []
         self.count, self.failures, self.reason = 0, 0, ""

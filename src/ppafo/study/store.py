@@ -66,7 +66,7 @@ class ChunkTask:
 
 
 @dataclass(frozen=True, slots=True)
-class Finished:
+class FinishedChunk:
     """A chunk that is written: its number, its runs, and how many of them failed."""
 
     number: int
@@ -106,7 +106,7 @@ class StudyStore:
             location.write(STUDY_COPY, study.text)
         return cls(study, location)
 
-    def finished(self) -> list[Finished]:
+    def finished(self) -> list[FinishedChunk]:
         """Return the chunks whose files are as they were written."""
         there, found = self.place.names(), []
         for number in range(chunk_count(self.study)):
@@ -115,7 +115,7 @@ class StudyStore:
                 continue
             try:
                 note = read_document(self.place, note_file(number))
-                finished = Finished(number, int(note["runs"]), int(note["failed"]))
+                finished = FinishedChunk(number, int(note["runs"]), int(note["failed"]))
                 with self.place.open(name) as file:
                     is_whole = hashlib.file_digest(file, "sha256").hexdigest() == note["sha256"][name]
             except (OSError, ValueError, KeyError, TypeError, OverflowError):
@@ -125,7 +125,7 @@ class StudyStore:
                 found.append(finished)
         return found
 
-    def write(self, finished: Finished, content: bytes) -> Finished:
+    def write(self, finished: FinishedChunk, content: bytes) -> FinishedChunk:
         """Write the file of a chunk, and last the note by which it counts as finished; return that."""
         name = chunk_file(finished.number)
         self.place.write(name, content)
@@ -174,7 +174,7 @@ def check_types(table: "pa.Table", name: str) -> None:
             raise DataError(f"{name}: column '{one_line(field.name)}' is of type {kind}")
 
 
-def compute_chunk(task: ChunkTask, number: int) -> tuple[Finished, bytes]:
+def compute_chunk(task: ChunkTask, number: int) -> tuple[FinishedChunk, bytes]:
     """Return the file of a chunk, computed here and not yet written: a row for every run, in SI units, nan for none."""
     study, part = task.study, chunk(task.study, number)
     values = drawn_values(study, np.arange(part.first, part.first + part.runs))
@@ -187,7 +187,7 @@ def compute_chunk(task: ChunkTask, number: int) -> tuple[Finished, bytes]:
     }
     facts = {"study": study.name, "chunk": str(number), "rows": str(part.runs), "every": f"{study.outputs.every!r} s"}
     content = parquet_bytes(table_of(columns, facts))
-    return Finished(number, part.runs, int(np.count_nonzero(result.status))), content
+    return FinishedChunk(number, part.runs, int(np.count_nonzero(result.status))), content
 
 
 def _columns_of_runs(study: Study, part: Chunk, values: dict[str, Floats]) -> dict[str, TableColumn]:
@@ -263,7 +263,7 @@ def _columns_of_traces(study: Study, part: Chunk, result: EnsembleResult) -> dic
     return columns
 
 
-def work_on_chunk(task: ChunkTask, number: int) -> Finished:
+def work_on_chunk(task: ChunkTask, number: int) -> FinishedChunk:
     """Compute and write a chunk: what a worker of a cluster does."""
     take_plugins(task.plugins)
     return StudyStore(task.study, place_at(task.address)).write(*compute_chunk(task, number))

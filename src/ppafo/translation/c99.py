@@ -32,8 +32,8 @@ from ppafo.translation.value_types import (
     Array,
     Items,
     Row,
+    RowReference,
     Scalar,
-    Shared,
     Type,
     is_empty,
     types_in,
@@ -155,7 +155,7 @@ class CTerms:
                 text = self.name(term.detail)
             case "field":
                 kind, sign = term.parts[0].type, "."
-                if isinstance(kind, Shared):
+                if isinstance(kind, RowReference):
                     kind, sign = kind.row, "->"
                 assert isinstance(kind, Row)
                 text = f"{self.term(term.parts[0], _ATOM)}{sign}{member_name(kind, term.detail)}"
@@ -413,7 +413,7 @@ class _Writer:
             return _SCALARS[kind.name]
         if isinstance(kind, Array):
             return "ppafo_array"
-        if isinstance(kind, Shared):
+        if isinstance(kind, RowReference):
             return f"{self.type_name(kind.row)} *"
         if self.reading is not None and isinstance(kind, Row) and kind.name in self.reading.declared:
             return self.reading.declared[kind.name]
@@ -486,8 +486,8 @@ class _Writer:
         changed = writer.scopes.changes.get(id(function.body), {})
         declared = []
         for name, kind in function.parameters:
-            constant = "const " if isinstance(kind, Shared) and name not in changed else ""
-            between = "" if isinstance(kind, Shared) else TIED
+            constant = "const " if isinstance(kind, RowReference) and name not in changed else ""
+            between = "" if isinstance(kind, RowReference) else TIED
             declared.append(f"{constant}{self.type_name(kind)}{between}{writer.name(name)}")
         parameters = ", ".join(declared)
         is_shown = function.is_entry and self.reading is None
@@ -554,7 +554,7 @@ class _Body:
                     kind = self.writer.type_name(statement.value.type)
                     yield from self.line(f"const {kind} {value} = {self.terms.listed(statement.value)};", level)
                 yield from self.line(f"return {value or self.terms.term(statement.value)};", level)
-            case typed.Count():
+            case typed.CountedLoop():
                 yield from self.counted_loop(statement, level)
             case typed.If() | typed.While():
                 word = "while" if isinstance(statement, typed.While) else "if"
@@ -567,18 +567,18 @@ class _Body:
             case _:
                 yield from self.line(self.plain_line(statement), level)
 
-    def plain_line(self, statement: typed.Note | typed.Reserve | typed.Perform | typed.Leave) -> str:
+    def plain_line(self, statement: typed.Note | typed.LocalArray | typed.ProcedureCall | typed.LoopExit) -> str:
         """A statement that is one line as it stands."""
         match statement:
             case typed.Note():
                 return _comment(statement.text)
-            case typed.Reserve():
+            case typed.LocalArray():
                 extents = "".join(f"[{extent}]" for extent in statement.type.shape)
                 return f"PPAFO_ALIGNED double {self.name(statement.name)}{extents};"
-            case typed.Perform():
+            case typed.ProcedureCall():
                 name = self.writer.functions.get(statement.function, statement.function)
                 return f"{name}({', '.join(map(self.terms.term, statement.given))});"
-            case typed.Leave():
+            case typed.LoopExit():
                 return f"{statement.word};"
 
     def line(self, text: str, level: int) -> Iterator[str]:
@@ -596,7 +596,7 @@ class _Body:
             return
         yield from self.line(f"{self.terms.term(store.element)} = {self.terms.term(store.value)};", level)
 
-    def counted_loop(self, loop: typed.Count, level: int) -> Iterator[str]:
+    def counted_loop(self, loop: typed.CountedLoop, level: int) -> Iterator[str]:
         """A loop that counts; a name that lives beyond it gets the number from a counter of its own."""
         name = self.name(loop.name)
         is_own = id(loop) in self.scopes.counted or loop.name not in self.scopes.read

@@ -62,7 +62,7 @@ class Scopes:
     def place(self, name: str, body: Block) -> None:
         """Declare a name in a block in which it is mentioned, or further in."""
         mentions = self.mentions(name, body)
-        if isinstance(mentions[0], typed.Reserve):
+        if isinstance(mentions[0], typed.LocalArray):
             return
         if _begins(mentions[0], name):
             # A name that changes once is const: a reader of exported C need not look for more.
@@ -91,7 +91,7 @@ class Scopes:
     def counts(self, name: str, statement: Statement) -> bool:
         """True for a loop of that name, which does not change it otherwise."""
         return (
-            isinstance(statement, typed.Count)
+            isinstance(statement, typed.CountedLoop)
             and statement.name == name
             and name not in self.changes[id(statement.body)]
             and name not in _names_of(statement)
@@ -118,7 +118,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
             (yes, read), (no, others) = (needed(inner, live, leaving) for inner in _blocks(statement))
             kept.append(replace(statement, body=yes, otherwise=no))
             live = read | others | _names_of(statement)
-        elif isinstance(statement, typed.Count | typed.While):
+        elif isinstance(statement, typed.CountedLoop | typed.While):
             # What one iteration leaves may be read by the next: again until no further name is found to be read.
             live |= _names_of(statement)
             turn, read = needed(statement.body, live, live)
@@ -128,7 +128,7 @@ def needed(body: Block, after: frozenset[str], leaving: frozenset[str] = frozens
             kept.append(replace(statement, body=turn))
         else:
             made = _made(statement)
-            live = leaving if isinstance(statement, typed.Leave) else live
+            live = leaving if isinstance(statement, typed.LoopExit) else live
             live = (live - {made[0]} if made else live) | _names_of(statement)
             kept.append(statement)
     return tuple(kept[::-1]), live
@@ -153,16 +153,16 @@ def _made(statement: Statement) -> tuple[str, Type] | None:
     """The name that a statement gives a value, with its type."""
     if isinstance(statement, typed.Assign):
         return statement.name, statement.value.type
-    if isinstance(statement, typed.Reserve):
+    if isinstance(statement, typed.LocalArray):
         return statement.name, statement.type
-    return (statement.name, INT) if isinstance(statement, typed.Count) else None
+    return (statement.name, INT) if isinstance(statement, typed.CountedLoop) else None
 
 
 def _blocks(statement: Statement) -> list[Block]:
     """Blocks in a statement."""
     if isinstance(statement, typed.If):
         return [statement.body, statement.otherwise]
-    return [statement.body] if isinstance(statement, typed.Count | typed.While) else []
+    return [statement.body] if isinstance(statement, typed.CountedLoop | typed.While) else []
 
 
 def _names_of(statement: Statement) -> frozenset[str]:
@@ -172,9 +172,9 @@ def _names_of(statement: Statement) -> frozenset[str]:
         terms = (statement.value,)
     elif isinstance(statement, typed.Store):
         terms = statement.element, statement.value
-    elif isinstance(statement, typed.Perform):
+    elif isinstance(statement, typed.ProcedureCall):
         terms = statement.given
-    elif isinstance(statement, typed.Count):
+    elif isinstance(statement, typed.CountedLoop):
         terms = statement.start, statement.stop
     elif isinstance(statement, typed.If | typed.While):
         terms = (statement.test,)

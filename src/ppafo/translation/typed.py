@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
-from ppafo.translation.value_types import FLOAT, Array, Items, Row, Scalar, Shared, Type, types_in
+from ppafo.translation.value_types import FLOAT, Array, Items, Row, RowReference, Scalar, Type, types_in
 
 FUNCTIONS = frozenset({"abs", "min", "max", "sqrt"})
 """Functions that every language has; those of a C library may come with them (``engine.compilers.LIBRARY``)."""
@@ -50,7 +50,7 @@ class Assign:
 
 
 @dataclass(frozen=True, slots=True)
-class Reserve:
+class LocalArray:
     """A local array whose elements are not set yet."""
 
     name: str
@@ -75,7 +75,7 @@ class If:
 
 
 @dataclass(frozen=True, slots=True)
-class Count:
+class CountedLoop:
     """A loop of ``name`` from ``start`` by ``step`` up to ``stop``, which it does not reach."""
 
     name: str
@@ -94,7 +94,7 @@ class While:
 
 
 @dataclass(frozen=True, slots=True)
-class Leave:
+class LoopExit:
     """``break`` or ``continue`` of the loop around it."""
 
     word: str
@@ -108,7 +108,7 @@ class Return:
 
 
 @dataclass(frozen=True, slots=True)
-class Perform:
+class ProcedureCall:
     """A call of a function that returns nothing and writes into arrays which it is handed."""
 
     function: str
@@ -122,7 +122,7 @@ class Note:
     text: str
 
 
-Statement: TypeAlias = Note | Assign | Reserve | Store | If | Count | While | Leave | Return | Perform
+Statement: TypeAlias = Note | Assign | LocalArray | Store | If | CountedLoop | While | LoopExit | Return | ProcedureCall
 
 
 class Parameter(NamedTuple):
@@ -171,7 +171,7 @@ def converted(term: Term, kind: Type) -> Term:
 
 def field_of(term: Term, name: str) -> Term:
     """Return the term for a field of a row, by its name."""
-    row = term.type.row if isinstance(term.type, Shared) else term.type
+    row = term.type.row if isinstance(term.type, RowReference) else term.type
     assert isinstance(row, Row)
     # A field of a struct that is just made is the value it was made of: no struct need exist.
     index = [field_name for field_name, _ in row.fields].index(name)

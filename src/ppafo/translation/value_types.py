@@ -48,20 +48,20 @@ class Array:
 
 
 @dataclass(frozen=True, slots=True)
-class Handed:
+class FunctionArgument:
     """A function that was handed over: it is bound when the call is translated."""
 
     name: str
 
 
 @dataclass(frozen=True, slots=True)
-class Shared:
+class RowReference:
     """A row that is handed over by its place: what a function writes into it is seen outside."""
 
     row: Row
 
 
-Type: TypeAlias = Scalar | Row | Items | Array | Handed | Shared
+Type: TypeAlias = Scalar | Row | Items | Array | FunctionArgument | RowReference
 
 
 def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
@@ -75,7 +75,7 @@ def entries_of(source: str) -> dict[str, tuple[Type, ...]]:
 
 def is_empty(kind: Type) -> bool:
     """True for what holds no number: a function, a row or a tuple of nothing."""
-    return all(map(is_empty, types_in(kind))) if isinstance(kind, Items | Row) else isinstance(kind, Handed)
+    return all(map(is_empty, types_in(kind))) if isinstance(kind, Items | Row) else isinstance(kind, FunctionArgument)
 
 
 def types_in(kind: Items | Row) -> tuple[Type, ...]:

@@ -24,11 +24,11 @@ from ppafo.translation.value_types import (
     FLOAT,
     INT,
     Array,
-    Handed,
+    FunctionArgument,
     Items,
     Row,
+    RowReference,
     Scalar,
-    Shared,
     Type,
     entries_of,
     is_empty,
@@ -121,14 +121,14 @@ class Expressions:
         if node.id in self.types:
             return Term("name", self.types[node.id], (), node.id)
         if node.id in self.definitions:
-            return Term("name", Handed(node.id), (), node.id)
+            return Term("name", FunctionArgument(node.id), (), node.id)
         raise self.refused(node, f"'{node.id}' has no value")
 
     def _of_attribute(self, node: ast.Attribute) -> Term:
         if isinstance(node.value, ast.Name) and node.value.id == "math" and node.attr in CONSTANTS:
             return Term("number", FLOAT, (), CONSTANTS[node.attr])
         owner = self.term(node.value)
-        row = owner.type.row if isinstance(owner.type, Shared) else owner.type
+        row = owner.type.row if isinstance(owner.type, RowReference) else owner.type
         if not isinstance(row, Row) or node.attr not in dict(row.fields):
             raise self.mistaken(node, _without_field(ast.unparse(node.value), node.attr, row), f".{node.attr}")
         return typed.field_of(owner, node.attr)
@@ -301,7 +301,7 @@ class Expressions:
         if any(isinstance(argument, ast.Starred) for argument in node.args):
             raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
         handed = self.types.get(name)
-        return handed.name if isinstance(handed, Handed) else name
+        return handed.name if isinstance(handed, FunctionArgument) else name
 
     def _of_call(self, node: ast.Call) -> Term:
         name = self.name_called(node)
@@ -558,7 +558,9 @@ class _FunctionWalk:
             raise self.refused(self.writes, f"'{self.definition.name}' returns a value and writes into an array")
         kept = tuple(Parameter(name, self.types[name]) for name in names if not is_empty(self.types[name]))
         bound = tuple(
-            f"{name} is {kind.name}" for name, kind in zip(names, types, strict=True) if isinstance(kind, Handed)
+            f"{name} is {kind.name}"
+            for name, kind in zip(names, types, strict=True)
+            if isinstance(kind, FunctionArgument)
         )
         is_entry = self.returns is None and self.module.entries.get(self.definition.name) == types
         return Function(name, self.definition.name, kept, self.returns, needed(body, frozenset())[0], bound, is_entry)
@@ -573,10 +575,10 @@ class _FunctionWalk:
             case ast.Pass():
                 return []
             case ast.Continue():
-                return [typed.Leave("continue")]
+                return [typed.LoopExit("continue")]
             case ast.Break():
                 marks = [self.assign(self.flag, Term("number", BOOL, (), True), node)] if self.flag else []
-                return [*marks, typed.Leave("break")]
+                return [*marks, typed.LoopExit("break")]
             case ast.If():
                 test = self.values.condition(node.test)
                 return [typed.If(test, self.block(node.body), self.block(node.orelse))]
@@ -598,7 +600,7 @@ class _FunctionWalk:
         if function.returns is not None:
             raise self.refused(node, f"'{ast.unparse(node)}' throws away what it returns")
         self.writes = node
-        return [typed.Perform(function.name, arguments)]
+        return [typed.ProcedureCall(function.name, arguments)]
 
     def do_return(self, node: ast.Return) -> list[Statement]:
         if node.value is None:
@@ -634,7 +636,7 @@ class _FunctionWalk:
             # Python asks for the end of a range once.
             end = self.fresh(f"{name}_stop", INT)
             before, stop = [self.assign(end, stop, node)], Term("name", INT, (), end)
-        return [*before, *self.loop(node, lambda: typed.Count(name, start, stop, step, self.block(node.body)))]
+        return [*before, *self.loop(node, lambda: typed.CountedLoop(name, start, stop, step, self.block(node.body)))]
 
     def loop_over_items(self, name: str, node: ast.For) -> list[Statement]:
         """A loop over the items of a tuple, or of a part of it, as one that counts."""
@@ -652,7 +654,7 @@ class _FunctionWalk:
         element = Term("item", owner.type.types[0], (owner, Term("name", INT, (), counter)))
         taken = self.assign(name, element, node)
         start, stop = (Term("number", INT, (), bound) for bound in (places.start, places.stop))
-        return self.loop(node, lambda: typed.Count(counter, start, stop, 1, (taken, *self.block(node.body))))
+        return self.loop(node, lambda: typed.CountedLoop(counter, start, stop, 1, (taken, *self.block(node.body))))
 
     def loop(self, node: ast.For | ast.While, make: Callable[[], Statement]) -> list[Statement]:
         """A loop; what follows where it was not left is under a flag, which each ``break`` of it sets."""
@@ -687,7 +689,7 @@ class _FunctionWalk:
             assert isinstance(right, ast.Call)
             kind = Array(2, tuple(map(ast.literal_eval, right.args)))
             self.note_type(target.id, kind, right)
-            return [typed.Reserve(target.id, kind)]
+            return [typed.LocalArray(target.id, kind)]
         value = self.values.term(right)
         return (
             self.assign_items(target, value, node) if isinstance(target, ast.Tuple) else self.put(target, value, node)
@@ -713,7 +715,7 @@ class _FunctionWalk:
         owner = element
         while owner.kind in ("field", "item"):
             owner = owner.parts[0]
-        is_shared = isinstance(owner.type, Shared)
+        is_shared = isinstance(owner.type, RowReference)
         if owner.kind != "name" or element is owner or (owner.detail in self.given and not is_shared):
             raise self.refused(target, f"'{ast.unparse(target)}' on the left")
         if joined(element.type, value.type) != element.type:

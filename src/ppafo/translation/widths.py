@@ -125,12 +125,12 @@ class _Ranges:
                 self.run(function, statement.body, names, results)
                 self.run(function, statement.otherwise, other, results)
                 _join(names, other)
-            elif isinstance(statement, typed.Count) and statement.step == 1:
+            elif isinstance(statement, typed.CountedLoop) and statement.step == 1:
                 self.count(function, statement, names, results)
             else:
                 raise _refused(function, f"'{type(statement).__name__.lower()}'")
 
-    def count(self, function: Function, loop: typed.Count, names: Names, results: list[Range]) -> None:
+    def count(self, function: Function, loop: typed.CountedLoop, names: Names, results: list[Range]) -> None:
         """A loop, turn by turn: after it names hold what they may hold after any number of turns that it can take."""
         start, stop = (self.value(function, part, names) for part in (loop.start, loop.stop))
         assert isinstance(start, IntegerRange)
@@ -262,11 +262,11 @@ class _Narrowing:
                 bodies = (self.block(inner, returns) for inner in (statement.body, statement.otherwise))
                 made.append(typed.If(self.term(statement.test), *bodies))
             else:
-                assert isinstance(statement, typed.Count)
+                assert isinstance(statement, typed.CountedLoop)
                 kind = self.of_name(statement.name, INT)
                 start, stop = (converted(self.term(part), kind) for part in (statement.start, statement.stop))
                 made.append(
-                    typed.Count(statement.name, start, stop, statement.step, self.block(statement.body, returns))
+                    typed.CountedLoop(statement.name, start, stop, statement.step, self.block(statement.body, returns))
                 )
         return tuple(made)
 

@@ -67,7 +67,7 @@ class ResidualCause:
 
 
 @dataclass(frozen=True, slots=True)
-class Causes:
+class Diagnosis:
     """The cause of a disagreement, if one is found; else the ``nearest``; ``tried`` is how many were compared.
 
     ``is_noise`` says that nothing but noise is left without any.
@@ -86,27 +86,27 @@ def causes_of(
     device: Device,
     settings: ReplaySettings,
     report: Report = report_nothing,
-) -> Causes:
+) -> Diagnosis:
     """Return what single cause explains all recordings together; none where nothing but noise is left of them.
 
     ``agreements`` are those of the recordings that were ``read``, one each.
     """
     other_unit = _in_other_unit(read, agreements, device, settings)
     if other_unit is not None:
-        return Causes(other_unit, None, 1)
+        return Diagnosis(other_unit, None, 1)
     records = [
         record_of(measured, agreement, device, settings) for measured, agreement in zip(read, agreements, strict=True)
     ]
     search = CauseSearch(device, settings, records, report)
     none = search.evaluated([ModelChange()])[0]
     if none is None or none.is_noise:
-        return Causes(is_noise=none is not None)
+        return Diagnosis(is_noise=none is not None)
     if settings.motion == "measured":
         # A measured angle is an input, and a delay of the sensors would be one of an input: samples alone are searched.
         tried = search.compared(_samples(records), none)
         explaining = [each for each in tried if each.explains]
         # That no change explains the recordings would say too much.
-        return _explained(search, none, tried, explaining, []) if explaining else Causes()
+        return _explained(search, none, tried, explaining, []) if explaining else Diagnosis()
     names = set.intersection(*(set(measured.recording.names) for measured in read))
     units = _units_of_moving(read, agreements, device)
     # Numbers of the set are compared with sensors: the gain of a command is the area of its valve.
@@ -120,7 +120,7 @@ def causes_of(
         is_late = any(agreement.delay.is_at_limit for agreement in agreements)
         errors = None if is_late else _usual_errors(search, none, of_bench)
         if errors is not None:
-            return Causes(errors, None, len(tried) + len(of_bench))
+            return Diagnosis(errors, None, len(tried) + len(of_bench))
 
         def stages() -> Iterator[list[SizedCause]]:
             yield search.compared(list(exchanges(device, names, units)), none)
@@ -137,7 +137,7 @@ def causes_of(
         key=lambda each: (each.candidate.is_of_samples, each.gain),
         default=None,
     )
-    return Causes() if nearest is None else Causes(None, _cause_of([nearest], search.penalty), len(tried))
+    return Diagnosis() if nearest is None else Diagnosis(None, _cause_of([nearest], search.penalty), len(tried))
 
 
 def _units_of_moving(
@@ -194,7 +194,7 @@ def _explained(
     tried: Sequence[SizedCause],
     explaining: Sequence[SizedCause],
     sized: Sequence[CandidateCause],
-) -> Causes:
+) -> Diagnosis:
     """Return the best of those that explain the recordings, with what could replace it; none where a second is needed.
 
     ``sized`` are the changes with a size that may do so.
@@ -205,10 +205,10 @@ def _explained(
     # One Jacobian, at the first cause, shows what a second one would add and what could replace it.
     slopes = search.slopes(first.change, first.left, sized) if is_fitted else []
     if search.needs_another(first, slopes):
-        return Causes(None, _cause_of([first], search.penalty), len(tried))
+        return Diagnosis(None, _cause_of([first], search.penalty), len(tried))
     # With errors of sensors that any bench has, other small changes may explain as much as one alone.
     others = search.beside_usual(slopes, none, {each.candidate.name for each in explaining})
-    return Causes(_cause_of(explaining, search.penalty, others), None, len(tried))
+    return Diagnosis(_cause_of(explaining, search.penalty, others), None, len(tried))
 
 
 def _in_other_unit(

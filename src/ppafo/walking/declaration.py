@@ -20,7 +20,7 @@ from ppafo.simulation.declaration import (
     RATE,
     SENSORS,
     TEXTS,
-    Declared,
+    DeclaredContent,
     gas_settings,
     kind_at,
     line_paths,
@@ -194,7 +194,7 @@ def _quantities(document: Mapping[str, Any]) -> dict[str, Quantity]:
     return declared | by_path({"shut_off": SHUT_OFF}) | line_paths()
 
 
-OF_A_WALK = Declared(
+OF_A_WALK = DeclaredContent(
     find_kinds,
     _texts,
     _quantities,

@@ -234,7 +234,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     return with_duration(scenario, _duration(reading, scenario))
 
 
-class _Led(NamedTuple):
+class _LegLead(NamedTuple):
     """Lead of the leg: a gait, whether it was named by the user, and the task sequence, if any."""
 
     gait: Gait
@@ -242,19 +242,19 @@ class _Led(NamedTuple):
     task_sequence: TaskSequence | None
 
 
-def _led_by(reading: DocumentReader, request: ScenarioRequest) -> _Led:
+def _led_by(reading: DocumentReader, request: ScenarioRequest) -> _LegLead:
     """Return the gait and the task sequence of a walk, from the files that it names."""
     sequence_file = _named_file("task_sequence", request, reading.document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if sequence_file is None else load_task_sequence(sequence_file)
     with _named_by("gait", reading, request, DataError):
         gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
-    return _Led(gait, "gait" in request.instead or "gait" in reading.document, sequence)
+    return _LegLead(gait, "gait" in request.instead or "gait" in reading.document, sequence)
 
 
 def _motion(
     reading: DocumentReader,
-    led: _Led,
+    led: _LegLead,
     line: SupplyLine | None,
     bottle: BottleSupply | None,
     sensors: Mapping[str, float],

@@ -22,7 +22,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.walking.declaration import LARGEST_SEED
 from ppafo.walking.gait_series import EVENT_PHASES, gait_events, gait_series, gait_timing, strike_angle
 from ppafo.walking.motion import walk_of
-from ppafo.walking.wearer import Build, Wearer, draw_bounded_normal, draw_builds, scaled
+from ppafo.walking.wearer import BodyScale, Wearer, draw_bounded_normal, draw_builds, scaled
 
 SERIES = {
     "shank": "shank_angle",
@@ -155,14 +155,14 @@ def _person(gait: Gait, number: float) -> Person:
     return person
 
 
-def _drawn(gait: Gait, number: float) -> tuple[Build, VariedGaits, np.random.Generator]:
+def _drawn(gait: Gait, number: float) -> tuple[BodyScale, VariedGaits, np.random.Generator]:
     """Build and gait of two, the second of whom is the person, and what draws on."""
     generator = np.random.default_rng(int(number))
     build = draw_builds(2, generator)
     return build, draw_gaits(gait, build.stature, generator), generator
 
 
-def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Person:
+def drawn_people(build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Person:
     """People of some builds and gaits, each number an array (people,); the first is fitted as the settings say."""
     count = build.mass.size
     scale, shift = (draw_bounded_normal(generator, (count,)) for _ in range(2))
@@ -191,7 +191,7 @@ def drawn_people(build: Build, gaits: VariedGaits, generator: np.random.Generato
     )
 
 
-def crowd_of(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:
+def crowd_of(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Scenario:
     """Many wearers as one walk whose numbers are arrays (people,); everybody has noise of his or her own."""
     people = drawn_people(build, gaits, generator)
     # A seed of everybody: one noise for all would make their outcomes alike.

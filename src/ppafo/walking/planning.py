@@ -53,7 +53,7 @@ from ppafo.walking.preparation import (
     with_leg,
 )
 from ppafo.walking.task_sequence import PlannedSequence, TaskSequence, plan_task_sequence, standing_gait
-from ppafo.walking.wearer import Build, leg_parameters
+from ppafo.walking.wearer import BodyScale, leg_parameters
 
 NO_REFERENCE = ProfileChoice("constant", {"level": 0.0})
 """A controller of walking makes its own."""
@@ -135,7 +135,7 @@ def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors)
     )
 
 
-def batch_of_many(scenario: Scenario, build: Build, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
+def batch_of_many(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
     """The walks of many wearers, the first of whom is the scenario's; nothing is recorded on the way."""
     run, _ = plan_walks(crowd_of(scenario, build, gaits, generator))
     return unrecorded(run, build.mass.size)

@@ -186,7 +186,7 @@ def json_schema() -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class TimedSegment:
     """A segment in time: its kind, a title for tables, start and end [s], floats or arrays (wearers,)."""
 
     kind: str
@@ -200,7 +200,7 @@ class PlannedSequence:
     """Parts of a task sequence for the engine, its segments in time, and times [s] of equal strides on level ground."""
 
     timed: TimedSequence
-    spans: tuple[Span, ...]
+    spans: tuple[TimedSegment, ...]
     steady: tuple[tuple[Numbers, Numbers], ...]
     duration: Numbers
 
@@ -284,13 +284,13 @@ def plan_task_sequence(
     """
     resting = sequence.segments[0].kind == "rest"
     planner = _Planner(frequency, STANDS_AT * timing.heel_off, RESTING_LOAD if resting else STANDING_LOAD)
-    spans: list[Span] = []
+    spans: list[TimedSegment] = []
     steady: list[tuple[Numbers, Numbers]] = []
     for index, segment in enumerate(sequence.segments):
         start = planner.time
         ratio = _ratio(sequence, index, gait)
         steady += _strides(planner, segment, ratio, strike_angle)
-        spans.append(Span(segment.kind, _title(segment), start, planner.time))
+        spans.append(TimedSegment(segment.kind, _title(segment), start, planner.time))
     duration = planner.time
     if planner.ratio == 0.0:
         # The last part never ends, so that a step beyond the last segment has a part too.
@@ -407,7 +407,7 @@ def _title(segment: TaskSegment) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PaceInTime:
+class PhaseOverTime:
     """Phase [turns], strides per second [Hz] and stride over the recorded one [-] at many times."""
 
     turns: Floats
@@ -415,7 +415,7 @@ class PaceInTime:
     stride: Floats
 
 
-def pace_in_time(sequence: TimedSequence, time: Floats) -> PaceInTime:
+def pace_in_time(sequence: TimedSequence, time: Floats) -> PhaseOverTime:
     """Pace of one wearer in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays."""
     table = np.array([leaves(part) for part in sequence.parts], dtype=np.float64)
     row = table[np.searchsorted(table[:, 0], time, side="right") - 1].T
@@ -423,7 +423,7 @@ def pace_in_time(sequence: TimedSequence, time: Floats) -> PaceInTime:
     fraction = np.minimum((time - start) / length, 1.0)
     value = fraction**3 * (10.0 + fraction * (6.0 * fraction - 15.0))
     integral = fraction**4 * (2.5 + fraction * (fraction - 3.0))
-    return PaceInTime(
+    return PhaseOverTime(
         turns + frequency * (time - start) + frequency_gain * length * integral,
         frequency + frequency_gain * value,
         stride + stride_gain * value,

@@ -19,7 +19,7 @@ from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.leg import LegParameters
-from ppafo.parameters.graph import Follows, Graph, LinkFunction
+from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction
 from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import FOOT, DocumentReader, value_at
 
@@ -152,14 +152,14 @@ def paper_subject() -> Wearer:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Build:
+class BodyScale:
     """Body mass and stature of many people over one person's, each (people,)."""
 
     mass: Floats
     stature: Floats
 
 
-def draw_builds(count: int, generator: np.random.Generator) -> Build:
+def draw_builds(count: int, generator: np.random.Generator) -> BodyScale:
     """Draw the build of ``count`` people; the first is the wearer that is scaled."""
     normal = draw_bounded_normal(generator, (2, count))
     stature = normal[0]
@@ -168,7 +168,7 @@ def draw_builds(count: int, generator: np.random.Generator) -> Build:
     multiples = 1.0 + MASS_VARIATION * mass, 1.0 + STATURE_VARIATION * stature
     for values in multiples:
         values[0] = 1.0
-    return Build(*multiples)
+    return BodyScale(*multiples)
 
 
 def draw_bounded_normal(generator: np.random.Generator, shape: tuple[int, ...]) -> Floats:
@@ -252,12 +252,12 @@ STATURE, BODY_MASS = "wearer.stature", "wearer.body_mass"
 def links_of_stature(document: Mapping[str, Any]) -> Graph:
     """Return how the segments of a walk file follow stature and body mass: now, or once the stature is given."""
     later = value_at(document, STATURE) is None
-    links: dict[str, tuple[Follows, ...]] = {}
+    links: dict[str, tuple[LinkedDefault, ...]] = {}
     for name, function in _FOLLOWING.items():
         # A link waits until its first source is given, so the stature comes first for masses too.
         sources = (STATURE,) if SCALING[name] == (0, 1) else (STATURE, BODY_MASS)
         if value_at(document, f"wearer.{name}") is None:
-            links[f"wearer.{name}"] = (Follows((LinkFunction(sources, function),), when_set=later),)
+            links[f"wearer.{name}"] = (LinkedDefault((LinkFunction(sources, function),), when_set=later),)
     return links
 
 

@@ -22,7 +22,7 @@ from ppafo.analyses.reproduce.question import reproduce
 from ppafo.analyses.reproduce.solve import EXPERIMENTS, reproduce_paper, torque_task_observations
 from ppafo.errors import PpafoError, SimulationError
 from ppafo.parameters.audit.evidence import Evidence
-from ppafo.simulation.simulate import Measuring, Result, Status, simulate
+from ppafo.simulation.simulate import DeferredResult, Result, Status, simulate
 
 
 def printed_with(**values: float) -> ReportedSet:
@@ -209,7 +209,7 @@ def test_a_restless_hold_is_not_called_quiet(reproduction: Reproduction) -> None
     metrics = dict(reproduction.solenoid.metrics)
     metrics["oscillations_hold"] = dataclasses.replace(metrics["oscillations_hold"], value=7.0)
     measured = reproduction.solenoid.measured()._replace(metrics=metrics)
-    restless = dataclasses.replace(reproduction.solenoid, measured=Measuring(measured))
+    restless = dataclasses.replace(reproduction.solenoid, measured=DeferredResult(measured))
     told = {item.id: item for item in torque_task_observations(restless, reproduction.proportional)}
     assert told["solenoid_quiet_on_hold"].holds is False
     assert told["solenoid_quiet_on_hold"].evidence == "7 torque reversals on the hold"

@@ -21,7 +21,7 @@ from ppafo.control.controllers.model_based import (
 )
 from ppafo.control.controllers.switching import OnOffDeadZoneParameters, OnOffDeadZoneState
 from ppafo.control.profiles import KNOTS as TABLE_KNOTS
-from ppafo.control.profiles import NEVER, TABLE, Tabulated, table_bounds, table_value, used_knots
+from ppafo.control.profiles import NEVER, TABLE, TabulatedProfile, table_bounds, table_value, used_knots
 from ppafo.engine.rows import rebuilt
 from ppafo.model.orifice import iso6358_flow_function
 from ppafo.model.sensors import Measurement
@@ -250,11 +250,11 @@ VALUES = (0.5, 0.6, 3.0, 6.0, -3.0, 0.0)
 TABLE_PERIOD = 1.1
 
 
-def table(times: tuple[float, ...] = TIMES, values: tuple[float, ...] = VALUES, level: float = 0.0) -> Tabulated:
+def table(times: tuple[float, ...] = TIMES, values: tuple[float, ...] = VALUES, level: float = 0.0) -> TabulatedProfile:
     settings = {item.name: item.default or 0.0 for item in TABLE.quantities} | {"period": TABLE_PERIOD, "level": level}
     settings |= {f"time_{number:02d}": time for number, time in enumerate(times, 1) if number > 1}
     settings |= {f"value_{number:02d}": value for number, value in enumerate(values, 1)}
-    return rebuilt(Tabulated, settings.values())
+    return rebuilt(TabulatedProfile, settings.values())
 
 
 def test_the_value_lies_on_straight_lines_between_the_knots_and_repeats() -> None:

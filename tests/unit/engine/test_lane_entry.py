@@ -15,7 +15,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
 
 
-class Tally(NamedTuple):
+class RunCounter(NamedTuple):
     """A number, and how much more it gets at once."""
 
     number: float
@@ -49,8 +49,8 @@ def waits(parts: Any, lanes: Any, turns: int) -> None:
 def source(function: Any) -> str:
     """A module with one entry."""
     collector = SourceCollector(INLINE)
-    step = StepText(plan_run(load_scenario("step-response")).program, collector, further={"tally": Tally})
-    entry = lane_entry(step, function, {"tallies": {"tally": Tally}})
+    step = StepText(plan_run(load_scenario("step-response")).program, collector, further={"tally": RunCounter})
+    entry = lane_entry(step, function, {"tallies": {"tally": RunCounter}})
     return "\n\n\n".join([HEADER, collector.text(), entry])
 
 

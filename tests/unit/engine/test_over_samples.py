@@ -16,7 +16,7 @@ from ppafo.model.plant import sliding_friction
 
 COLUMN = np.concatenate([[0.0, -0.0, 0.25, 0.5, 1.0, 2.0], np.random.default_rng(1).uniform(-3.0, 3.0, 200)])
 KNOTS = np.concatenate([[0.0, 1.0], np.ravel([(0.1 * place, (-1.0) ** place) for place in range(1, 32)])])
-TABLE = rebuilt(profiles.Tabulated, [0.5, 2.5, *KNOTS[1:]])
+TABLE = rebuilt(profiles.TabulatedProfile, [0.5, 2.5, *KNOTS[1:]])
 
 
 @pytest.mark.parametrize(

@@ -25,10 +25,10 @@ from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.signals.meter import (
     SAME_LEVEL,
-    Course,
     EnergySample,
     FootSample,
     GasSample,
+    ReferenceSummary,
     Sample,
     StrideSample,
     advance_course,
@@ -79,7 +79,7 @@ def metrics_of(result: Result) -> dict[str, float]:
     recording = result.recording
     last = float(recording["reference"][-1])
     largest = max(abs(float(recording["reference"][0])), abs(last))
-    course = Course(last, largest, SAME_LEVEL * largest, 0.0)
+    course = ReferenceSummary(last, largest, SAME_LEVEL * largest, 0.0)
     kinds = [
         kind
         for kind in METRICS.values()

@@ -9,7 +9,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.conflict import SMOOTH
 from ppafo.identification.fit import Fit, fit
 from ppafo.identification.noise import Noise, burg, noise_of, whiten
-from ppafo.identification.residuals import Free, ResidualBlock
+from ppafo.identification.residuals import FitVariable, ResidualBlock
 from ppafo.signals.recording import Floats
 
 _COUNT = 300
@@ -22,12 +22,12 @@ _BLOCKS = tuple(
     )
 )
 _NUMBERS = (
-    Free("rate", 2.0, 0.1, 50.0, 2.0),
-    Free("level", 1.0, 0.1, 10.0, 1.0),
-    Free("zero_1", 0.0, -1.0, 1.0, 0.02, 0.02),
-    Free("gain_2", 0.0, -0.5, 0.5, 0.02, 0.02),
-    Free("start of rise", 0.32, -1.0, 3.0, 0.05, 0.05),
-    Free("start of fall", 1.15, -1.0, 3.0, 0.05, 0.05),
+    FitVariable("rate", 2.0, 0.1, 50.0, 2.0),
+    FitVariable("level", 1.0, 0.1, 10.0, 1.0),
+    FitVariable("zero_1", 0.0, -1.0, 1.0, 0.02, 0.02),
+    FitVariable("gain_2", 0.0, -0.5, 0.5, 0.02, 0.02),
+    FitVariable("start of rise", 0.32, -1.0, 3.0, 0.05, 0.05),
+    FitVariable("start of fall", 1.15, -1.0, 3.0, 0.05, 0.05),
 )
 
 
@@ -101,7 +101,7 @@ def test_a_model_whose_two_recordings_want_two_rates_holds_for_itself_only() -> 
 
 def test_numbers_that_act_only_as_their_product_are_not_identifiable() -> None:
     measured = 6.0 * _TIME + 0.01 * np.random.default_rng(1).normal(size=_COUNT)
-    numbers = (Free("one", 2.0, 0.1, 10.0, 2.0), Free("other", 3.0, 0.1, 10.0, 3.0))
+    numbers = (FitVariable("one", 2.0, 0.1, 10.0, 2.0), FitVariable("other", 3.0, 0.1, 10.0, 3.0))
 
     found = fit(
         lambda points: measured[:, None] - points[0] * points[1] * _TIME[:, None],
@@ -116,7 +116,7 @@ def test_numbers_that_act_only_as_their_product_are_not_identifiable() -> None:
 
 def test_the_tolerance_that_widens_an_interval_is_named_with_its_share_of_the_variance() -> None:
     measured = 2.0 + 0.001 * np.random.default_rng(1).normal(size=_COUNT)
-    numbers = (Free("value", 1.0, 0.1, 10.0, 1.0), Free("zero", 0.0, -1.0, 1.0, 0.1, 0.1))
+    numbers = (FitVariable("value", 1.0, 0.1, 10.0, 1.0), FitVariable("zero", 0.0, -1.0, 1.0, 0.1, 0.1))
 
     found = fit(
         lambda points: measured[:, None] - (points[0] + points[1]) * np.ones((_COUNT, 1)),
@@ -163,7 +163,7 @@ def test_a_sample_that_alone_decides_a_number_is_left_out() -> None:
 
     found = fit(
         lambda points: measured - slope * points[:1],
-        (Free("value", 1.0, -10.0, 10.0, 1.0),),
+        (FitVariable("value", 1.0, -10.0, 10.0, 1.0),),
         [ResidualBlock("only", "first", slice(0, _COUNT))],
         memory=0,
         is_motion=True,
@@ -178,7 +178,7 @@ def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
 
     found = fit(
         lambda points: measured[:, None] - points[:1],
-        (Free("level", 1.0, -10.0, 10.0, 1.0),),
+        (FitVariable("level", 1.0, -10.0, 10.0, 1.0),),
         [ResidualBlock("only", "first", slice(0, _COUNT))],
     )
 
@@ -188,7 +188,7 @@ def test_residuals_that_are_too_smooth_for_noise_are_a_conflict() -> None:
 
 
 def test_a_law_that_fits_exactly_leaves_numbers_and_a_channel_of_small_units_keeps_its_weight() -> None:
-    one = (Free("level", 1.0, -10.0, 10.0, 1.0),)
+    one = (FitVariable("level", 1.0, -10.0, 10.0, 1.0),)
     exact = fit(lambda points: 2.0 - np.ones((50, 1)) * points[:1], one, [ResidualBlock("a", "first", slice(0, 50))])
     assert exact.values[0] == pytest.approx(2.0)
     measured = 2.0 + np.random.default_rng(1).normal(size=100)[:, None] * 0.1
@@ -205,7 +205,7 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
     with pytest.raises(IdentificationError, match="1 samples for 1 numbers"):
         fit(
             lambda points: 2.5 - points[:1],
-            (Free("a", 1.0, -9.0, 9.0, 1.0),),
+            (FitVariable("a", 1.0, -9.0, 9.0, 1.0),),
             [ResidualBlock("a", "first", slice(0, 1))],
         )
 
@@ -215,13 +215,13 @@ def test_as_many_samples_as_numbers_are_refused() -> None:
     [
         ((), _BLOCKS, "a fit of 0 numbers to 4 blocks"),
         (_NUMBERS, (), "a fit of 6 numbers to 0 blocks"),
-        ((Free("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2 with the start 2"),
-        ((Free("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5 with the start 9"),
+        ((FitVariable("rate", 2.0, 2.0, 2.0, 2.0),), _BLOCKS, "rate: bounds 2 to 2 with the start 2"),
+        ((FitVariable("rate", 9.0, 0.1, 5.0, 2.0),), _BLOCKS, "rate: bounds 0.1 to 5 with the start 9"),
     ],
     ids=["no number", "no block", "equal bounds", "start outside"],
 )
 def test_a_fit_that_cannot_begin_says_why(
-    numbers: tuple[Free, ...], blocks: tuple[ResidualBlock, ...], said: str
+    numbers: tuple[FitVariable, ...], blocks: tuple[ResidualBlock, ...], said: str
 ) -> None:
     with pytest.raises(IdentificationError, match=said):
         fit(lambda points: np.zeros((_COUNT, points.shape[1])), numbers, blocks)
@@ -234,7 +234,10 @@ def test_an_interval_along_a_product_ends_where_the_prior_of_the_other_number_en
     The straight line at the estimate leads far out of the wider valley, and its Jacobian does not lead back.
     """
     measured = 2.0 * np.ones((_COUNT, 1)) + 0.01 * np.random.default_rng(1).normal(size=(_COUNT, 1))
-    numbers = (Free("size", 1.0, 0.01, 1000.0, 1.0), Free("exponent", 0.0, -9.0, 9.0, deviation, deviation))
+    numbers = (
+        FitVariable("size", 1.0, 0.01, 1000.0, 1.0),
+        FitVariable("exponent", 0.0, -9.0, 9.0, deviation, deviation),
+    )
 
     found = fit(
         lambda points: measured - points[0] * np.exp(points[1]) * np.ones((_COUNT, 1)),
@@ -278,14 +281,14 @@ def test_a_search_that_ends_where_no_run_succeeds_has_not_converged_and_names_th
         return np.where(side * points[0] > 1.0, np.nan, left)
 
     block = ResidualBlock("only", "first", slice(0, _COUNT))
-    offset = Free("offset", 0.9, -5.0, 5.0, 1.0)
-    found = fit(residuals, (Free("rate", 0.2 * side, -5.0, 5.0, 1.0), offset), (block,))
+    offset = FitVariable("offset", 0.9, -5.0, 5.0, 1.0)
+    found = fit(residuals, (FitVariable("rate", 0.2 * side, -5.0, 5.0, 1.0), offset), (block,))
     assert not found.has_converged
     assert found.edge == {"rate": side}
     assert 0.5 < side * found.by_name["rate"] <= 1.0
     # With a bound inside of the edge the search ends at that.
     low, high = sorted((-4.0 * side, 0.9 * side))
-    bounded = fit(residuals, (Free("rate", 0.2 * side, low, high, 1.0), offset), (block,))
+    bounded = fit(residuals, (FitVariable("rate", 0.2 * side, low, high, 1.0), offset), (block,))
     assert bounded.has_converged
     assert not bounded.edge
     assert bounded.by_name["rate"] == pytest.approx(0.9 * side, rel=1e-6)

@@ -14,7 +14,7 @@ from ppafo.analyses.identify.question import identify
 from ppafo.cli.main import main
 from ppafo.errors import PpafoError
 from ppafo.identification.problem import json_schema
-from ppafo.identification.source import Use, double_use
+from ppafo.identification.source import UsedRecording, double_use
 from ppafo.parameters.device import Orifice
 from ppafo.parameters.loading import load_device, parameter_set_toml, parse_parameter_set
 from ppafo.report.finding import files_of, text_of
@@ -438,8 +438,8 @@ def test_a_recording_of_a_bench_procedure_that_is_fitted_too_is_refused(
 
 def test_other_times_of_a_recording_of_a_bench_procedure_may_be_fitted() -> None:
     recording = Recording("decay", np.arange(10.0), {"angle": Channel(np.arange(10.0), "rad")})
-    bench = Use("procedure", "decay.csv", recording, frozenset(), -np.inf, 4.0)
-    fitted = Use("experiment", "copy.csv", recording, frozenset({"angle"}), 4.0, 9.0)
+    bench = UsedRecording("procedure", "decay.csv", recording, frozenset(), -np.inf, 4.0)
+    fitted = UsedRecording("experiment", "copy.csv", recording, frozenset({"angle"}), 4.0, 9.0)
     assert double_use([bench], [fitted]) == ""
     assert "would count twice" in double_use([bench], [replace(fitted, first=3.0)])
 

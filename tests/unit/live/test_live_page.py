@@ -54,12 +54,12 @@ def test_the_same_scenarios_give_the_same_page(file: Path) -> None:
 
 
 def test_every_default_of_the_page_is_what_its_text_says() -> None:
-    from ppafo.page.content import Simulated, program_content
+    from ppafo.page.content import PageSimulation, program_content
     from ppafo.page.wasm import module_of
 
     for name in DEFAULT:
         scenario = load_walk(name) if name in list_walks() else load_scenario(name)
-        content = program_content(Simulated(scenario, module_of(scenario), name), "module", {})
+        content = program_content(PageSimulation(scenario, module_of(scenario), name), "module", {})
         texts = {one["key"]: one for one in content["settings"] if one["text"]}
         assert "supply.pressure" in texts
         for setting in texts.values():

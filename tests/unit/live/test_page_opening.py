@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.loading import load_scenario
 from ppafo.page import html as pages
@@ -73,7 +73,7 @@ def test_minutes_of_the_bottle_are_those_of_endurance() -> None:
     bottle, schedule = load_bottle(PAPER_BOTTLE), Schedule(3e6, 0.0, 3e6)
     assert table["flows"] == [float(f"{flow:.4g}") for flow in FLOWS]
     for place in (9, 16, 22):
-        lasting = follow_bottle(bottle, draw_of_numbers(float(FLOWS[place]), 1.0, None), schedule)
+        lasting = follow_bottle(bottle, demand_of_numbers(float(FLOWS[place]), 1.0, None), schedule)
         assert float(f"{lasting.discharge.walking_time / 60.0:.4g}") == table["minutes"][place]
 
 

@@ -16,11 +16,11 @@ from ppafo.metrics.switching import UNDECIDED, Swing, count_of, next_swing, reve
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import (
     SAME_LEVEL,
-    Course,
     EnergySample,
     FootSample,
     GasSample,
     MeterKind,
+    ReferenceSummary,
     Sample,
     StrideSample,
     advance_course,
@@ -50,7 +50,7 @@ def samples_of(recording: Recording) -> list[Sample]:
     ]
 
 
-def metered(meter: MeterKind, samples: Sequence[Sample], course: Course) -> tuple[Any, Course]:
+def metered(meter: MeterKind, samples: Sequence[Sample], course: ReferenceSummary) -> tuple[Any, ReferenceSummary]:
     course = advance_course(course, samples[0])
     state = meter.start(course, samples[0])
     for sample in samples[1:]:
@@ -68,7 +68,7 @@ def read(recording: Recording) -> dict[str, float]:
     samples = samples_of(recording)
     reference = recording["reference"]
     largest = float(np.abs(reference).max())
-    course = Course(float(reference[-1]), largest, SAME_LEVEL * largest, 0.0)
+    course = ReferenceSummary(float(reference[-1]), largest, SAME_LEVEL * largest, 0.0)
     of_torque = {name: kind for name, kind in METRICS.items() if kind.of_reference in ("", "torque")}
     of_recordings = {name: kind for name, kind in of_torque.items() if kind.compute is not None}
     meters = {meter.name: metered(meter, samples, course) for kind in of_recordings.values() for meter in kind.meters}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from ppafo.metrics.strides import METER, PER_STRIDE, SETTLING, StrideMeter
-from ppafo.signals.meter import Course, EnergySample, FootSample, GasSample, Sample, StrideSample
+from ppafo.signals.meter import EnergySample, FootSample, GasSample, ReferenceSummary, Sample, StrideSample
 from ppafo.walking.strides import per_stride, stride_starts
 
-NO_COURSE = Course(*[0.0] * len(Course._fields))
+NO_COURSE = ReferenceSummary(*[0.0] * len(ReferenceSummary._fields))
 SAMPLES = 80
 ON_TOES = {5: 1.0, 15: 0.0, 25: 0.0, 35: 1.0, 45: 0.0, 55: 1.0, 65: 1.0}
 """Samples of the heel strikes, 1 where the toes met the ground before the heel."""

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from ppafo.model.declaration import Number
-from ppafo.parameters.graph import Follows, Graph, LinkFunction, acting, follows, gauge_link, holding, left, resolved
+from ppafo.parameters.graph import (
+    Graph,
+    LinkedDefault,
+    LinkFunction,
+    acting,
+    follows,
+    gauge_link,
+    holding,
+    left,
+    resolved,
+)
 
 FIRST, SECOND, ROOM, START = (
     "supply.pressure",
@@ -66,6 +76,6 @@ class Pair(NamedTuple):
 
 
 def test_terms_are_summed_and_one_with_settings_takes_them_by_name() -> None:
-    link = Follows((LinkFunction(("a", "b"), lambda row: row.x * row.y, (Pair,)), LinkFunction(("b",))), 0.5)
+    link = LinkedDefault((LinkFunction(("a", "b"), lambda row: row.x * row.y, (Pair,)), LinkFunction(("b",))), 0.5)
     assert link.sources == ("a", "b", "b")
     assert link.number({"a": 2.0, "b": 3.0}.__getitem__) == pytest.approx(9.5)

@@ -8,7 +8,7 @@ import pytest
 
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control.catalog import PROFILES
-from ppafo.control.profiles import Knot, Tabulated, smooth_bounds, smooth_value
+from ppafo.control.profiles import Knot, TabulatedProfile, smooth_bounds, smooth_value
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import batch_of
 from ppafo.errors import ScenarioError
@@ -186,10 +186,10 @@ def test_one_override_takes_the_leg_off() -> None:
 KNOTS = ((0.0, 1.0), (0.2, 3.0), (0.3, 2.5), (0.9, -1.0))
 
 
-def table(knots: tuple[tuple[float, float], ...], period: float) -> Tabulated:
+def table(knots: tuple[tuple[float, float], ...], period: float) -> TabulatedProfile:
     others = [Knot(time, value) for time, value in knots[1:]]
     others += [Knot(1.0e6, 0.0)] * (31 - len(others))
-    return Tabulated(0.5, period, knots[0][1], tuple(others))
+    return TabulatedProfile(0.5, period, knots[0][1], tuple(others))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])

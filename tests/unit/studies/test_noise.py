@@ -19,7 +19,7 @@ from ppafo.studies.distributions import Floats, NormalAround, noise_interval
 from ppafo.studies.draws import Uncertainty, uncertainty_of
 from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, other_noise, with_noise
-from ppafo.studies.study import Drawn
+from ppafo.studies.study import RandomValue
 from ppafo.study.blocks import drawn_values
 from ppafo.study.runs import Runs
 
@@ -144,7 +144,7 @@ def test_a_statistic_says_how_much_is_noise(statistic: Statistic) -> None:
         runs = Runs.of_model(model, ["rms_error"])
         return draw_until(runs, uncertainty, "rms_error", statistic, rule, 1).found.share_of_noise
 
-    drawn = (Drawn("x", NormalAround(0.0, 1.0)),)
+    drawn = (RandomValue("x", NormalAround(0.0, 1.0)),)
     heard = Uncertainty(*with_noise(drawn, None, [ppafo.load_scenario("torque-task-proportional", NOISY)], ["x"]))
     rule = StoppingRule(0.2, False, first=1024, maximum=4096)
     share = share_in(heard)

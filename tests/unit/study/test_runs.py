@@ -10,14 +10,14 @@ from ppafo.progress import Progress
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
-from ppafo.study.runs import FAILED, Runs, Tally, settled
+from ppafo.study.runs import FAILED, RunCounter, Runs, settled
 
 SHORT = ("run.duration=0.2 s",)
 
 
 def runs_of(*metrics: str) -> Runs:
     """Runs of a short task."""
-    return Runs(load_scenario("torque-task-proportional", SHORT), metrics, Tally(1, None))
+    return Runs(load_scenario("torque-task-proportional", SHORT), metrics, RunCounter(1, None))
 
 
 def test_each_run_gives_what_it_gives_alone() -> None:
@@ -50,7 +50,7 @@ def test_rows_that_lack_a_metric_are_refused_as_those_that_failed() -> None:
 
 def test_a_study_that_resumes_counts_on_from_what_is_there() -> None:
     seen: list[Progress] = []
-    tally = Tally(100, seen.append, 40, 2)
+    tally = RunCounter(100, seen.append, 40, 2)
     tally.add(30, 1)
     tally.add(30, 0)
     assert [(item.done, item.failed, item.earlier) for item in seen] == [(70, 3, 70), (100, 3, 70)]
@@ -72,7 +72,7 @@ def test_the_table_has_all_rows_with_the_values_that_made_them() -> None:
 
 def test_progress_grows_where_there_are_more_runs_than_were_thought() -> None:
     seen: list[Progress] = []
-    tally = Tally(100, seen.append)
+    tally = RunCounter(100, seen.append)
     for runs in (100, 100, 200):
         tally.add(runs, 1)
     assert [(item.total, item.done, item.failed) for item in seen] == [(100, 100, 1), (200, 200, 2), (400, 400, 3)]

@@ -17,7 +17,7 @@ from ppafo.signals import Channel, Recording
 from ppafo.simulation.loading import load_scenario
 from ppafo.validation.agreement import ReplaySettings, compare_recording
 from ppafo.validation.candidates import sizes
-from ppafo.validation.causes import Causes, causes_of
+from ppafo.validation.causes import Diagnosis, causes_of
 from ppafo.validation.compared import COMPARED
 from ppafo.validation.measured import check_recording
 
@@ -41,7 +41,7 @@ def bench() -> Recording:
     return Recording("bench", run.time, channels, "synthetic")
 
 
-def causes(recording: Recording, device: Device | None = None, **settings: object) -> Causes:
+def causes(recording: Recording, device: Device | None = None, **settings: object) -> Diagnosis:
     used = device or load_device("ppafo2011", overrides=SUPPLY)
     measured, replays = check_recording(recording, used, "r.csv"), ReplaySettings(**settings)  # type: ignore[arg-type]
     return causes_of([measured], [compare_recording(measured, used, replays)], used, replays)
@@ -52,7 +52,7 @@ def with_channel(recording: Recording, name: str, values: np.ndarray) -> Recordi
 
 
 def test_nothing_is_searched_where_only_noise_is_left(bench: Recording) -> None:
-    assert causes(bench) == Causes(is_noise=True)
+    assert causes(bench) == Diagnosis(is_noise=True)
 
 
 def dead(one: Recording) -> Recording:

@@ -23,7 +23,7 @@ from ppafo.walking.planning import plan_walk
 from ppafo.walking.wearer import Wearer, paper_subject
 
 
-class Judge:
+class AnswerFilter:
     """The ankle in the swing from the curves of a gait file: theta'' from the foot's angular momentum about the ankle.
 
     The foot hangs on an ankle that accelerates with the shank, so its angle alpha over the horizontal obeys
@@ -108,7 +108,7 @@ def test_the_free_foot_agrees_with_an_independent_solution(walk_plan: Callable[[
     swing = swing_of(plan_walk(plan), walk_of(plan).gait.stance_share, 300)
     assert swing.walk is not None
     angle = angles_of(swing)
-    judge = Judge(walk_of(plan).gait, walk_of(plan).wearer, swing.walk.share)
+    judge = AnswerFilter(walk_of(plan).gait, walk_of(plan).wearer, swing.walk.share)
     times = np.arange(angle.size) * swing.step
 
     def slopes(time: float, y: np.ndarray) -> list[float]:

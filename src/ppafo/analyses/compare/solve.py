@@ -22,7 +22,7 @@ from ppafo.studies.draws import (
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path
-from ppafo.study.runs import Rows, Runs, Tally, failures_of, unvaried
+from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
 
 AS_WRITTEN = "as written"
 """Name of a configuration's task where no other task is requested."""
@@ -170,7 +170,7 @@ def _drawn_runs(
                 )
     columns = uncertainty.replicated_columns(0, draws.count, seed)
     renoised = with_new_noise(columns) if uncertainty.has_noise else {}
-    tally = Tally((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
+    tally = RunCounter((draws.count + len(renoised.get(NOISE, ()))) * len(scenarios), draws.progress)
     drawn: dict[tuple[str, str], DrawnRuns] = {}
     for (task, name), scenario in scenarios.items():
         runs = Runs(scenario, metrics, tally, uncertainty.gauge, draws.threads)

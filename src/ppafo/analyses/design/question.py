@@ -13,7 +13,7 @@ from ppafo.units.shown import shown_in
 if TYPE_CHECKING:
     from ppafo.analyses.design.profile.answer import Sizing
     from ppafo.analyses.design.profile.problem import SizingProblem
-    from ppafo.analyses.design.wearer.wish import WearerSizing
+    from ppafo.analyses.design.wearer.requirements import WearerSizing
     from ppafo.report.finding import Finding
 
 DesignLike = Annotated["SizingProblem | str | Path", Word("DESIGN")]
@@ -69,8 +69,8 @@ def design(
     from ppafo.analyses.design.profile.solve import size_for_profile
     from ppafo.analyses.design.solve import FOR_A_WEARER
     from ppafo.analyses.design.wearer import answer as wearer
+    from ppafo.analyses.design.wearer.requirements import DesignRequirements
     from ppafo.analyses.design.wearer.solve import size_for_wearer
-    from ppafo.analyses.design.wearer.wish import Wish
     from ppafo.arguments.words import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
@@ -84,9 +84,9 @@ def design(
             raise StudyError(f"no design was given: name one, give a .toml file, or for a wearer {FOR_A_WEARER}")
         if mass is None or torque is None or pressure is None or minutes is None:
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
-        wish = Wish(mass, stature, float(torque), float(pressure), 60.0 * minutes, toes)
+        requirements = DesignRequirements(mass, stature, float(torque), float(pressure), 60.0 * minutes, toes)
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
-            return wearer.finding_of(size_for_wearer(wish, report, DEFAULT if catalogue is None else catalogue))
+            return wearer.finding_of(size_for_wearer(requirements, report, DEFAULT if catalogue is None else catalogue))
     of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.endurance.discharge import Discharge
-from ppafo.analyses.endurance.draw import Draw
+from ppafo.analyses.endurance.gas_demand import GasDemand
 from ppafo.model.cold_gas import heat_to_warm
 from ppafo.model.source import bottle_content
 from ppafo.parameters.bottles.bottle import Bottle
@@ -39,7 +39,7 @@ class Endurance:
     """
 
     bottle: Bottle
-    draw: Draw
+    draw: GasDemand
     schedule: Schedule
     discharge: Discharge
     strides_when_warm: float

@@ -7,7 +7,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.analyses.endurance.draw import Draw
+from ppafo.analyses.endurance.gas_demand import GasDemand
 from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import ParameterError, SimulationError
 from ppafo.model.source import (
@@ -37,7 +37,7 @@ _NEXT_TO_NOTHING = 0.01
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class DischargeEnd:
     """End of a run: kind, sentence, mass left [kg], and the part of it [kg] that a warm bottle would still deliver."""
 
     kind: str
@@ -46,7 +46,7 @@ class Ending:
     usable_when_warm: float
 
 
-def reserves(bottle: Bottle, draw: Draw, pressure: float, temperature: float) -> tuple[float, float]:
+def reserves(bottle: Bottle, draw: GasDemand, pressure: float, temperature: float) -> tuple[float, float]:
     """Return the margins of a bottle at its largest flow, as fractions: below 0 the supply pressure is lost.
 
     First the pressure above what the regulator needs, then the flow that it would pass above the largest one.
@@ -61,7 +61,7 @@ def flow_limit(bottle: Bottle, pressure: float, temperature: float) -> float:
     return regulator_flow_limit(bottle.regulator, pressure, temperature, bottle.heat_capacity_ratio, gas_constant)
 
 
-def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
+def smallest_mass_when_warm(bottle: Bottle, draw: GasDemand) -> float:
     """Return the mass of gas [kg] with which the bottle, at room temperature, just holds the supply pressure."""
     table, room = bottle.fluid.table, bottle.room_temperature
     low, high = 0.0, min(bottle.mass, bottle.volume * densest_gas(table, room))
@@ -76,7 +76,7 @@ def smallest_mass_when_warm(bottle: Bottle, draw: Draw) -> float:
     return high
 
 
-def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stopped_by: Stop) -> Ending:
+def ending(bottle: Bottle, draw: GasDemand, mass: float, content: BottleContent, stopped_by: Stop) -> DischargeEnd:
     """Return the ending for what stopped a run: the supply pressure, the cold end of the table, or the time.
 
     A bottle that would still do at room temperature is too cold, any other is empty.
@@ -85,12 +85,12 @@ def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stop
     left = f"{mass * GRAMS_PER_KILOGRAM:.3g} g are left"
     warm = f"{usable * GRAMS_PER_KILOGRAM:.3g} g of this would be usable at room temperature"
     if stopped_by == "time":
-        return Ending(
+        return DischargeEnd(
             TIME_IS_UP, f"the supply pressure was maintained for the whole requested time; {left}", mass, usable
         )
     if stopped_by == "frozen":
         cold = "the liquid begins to freeze (dry ice)" if has_liquid(bottle.fluid.table) else "the gas is too cold"
-        return Ending("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
+        return DischargeEnd("frozen", f"{cold}, and the property table ends here; {left}, {warm}", mass, usable)
     of_pressure, of_flow = reserves(bottle, draw, content.pressure, content.temperature)
     # Both are fractions, so that the smaller one says what went short first.
     is_pressure = of_pressure <= of_flow
@@ -98,8 +98,8 @@ def ending(bottle: Bottle, draw: Draw, mass: float, content: BottleContent, stop
     why = f"its pressure is too low to {short}"
     # What a warm bottle would still give decides between the two: cold is mended by waiting, empty is not.
     if usable > _NEXT_TO_NOTHING * bottle.mass:
-        return Ending("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
-    return Ending("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
+        return DischargeEnd("too cold", f"the bottle is too cold: {why}; {left}, {warm}", mass, usable)
+    return DischargeEnd("empty", f"the bottle is empty: {why}, and would be also when warm; {left}", mass, usable)
 
 
 MAXIMUM_STRETCHES = 2000
@@ -149,7 +149,7 @@ class Discharge:
     walking_time: float
     total_time: float
     strides: float
-    ending: Ending
+    ending: DischargeEnd
     balance: Balance | SupplyBalance
     record: Callable[[], Recording] = field(repr=False, compare=False)
 
@@ -173,7 +173,7 @@ def check_schedule(schedule: Schedule) -> None:
         )
 
 
-def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
+def discharge(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Discharge:
     """Return the course of a full bottle under a draw; walking takes the mean flow of a stride.
 
     Strides are a second long and bottles cool in minutes, so the mean stands for the pulses; the regulator is judged by
@@ -221,7 +221,7 @@ def discharge(bottle: Bottle, draw: Draw, schedule: Schedule) -> Discharge:
     )
 
 
-def discharge_of_life(life: BottleLife, draw: Draw) -> Discharge:
+def discharge_of_life(life: BottleLife, draw: GasDemand) -> Discharge:
     """Return the course of a bottle on which somebody walked to its end."""
     course = life.course
     ended, bottle = course.ending, course.supply.bottle
@@ -230,7 +230,9 @@ def discharge_of_life(life: BottleLife, draw: Draw) -> Discharge:
         walking_time=life.walked,
         total_time=life.total,
         strides=life.repeats,
-        ending=Ending(TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable),
+        ending=DischargeEnd(
+            TIME_IS_UP if ended.kind == WALKED else ended.kind, ended.message, course.last.mass, usable
+        ),
         balance=course.balance,
         record=partial(_recording_of_course, course),
     )
@@ -278,7 +280,7 @@ def content_of(bottle: Bottle, mass: float, energy: float) -> BottleContent:
 
 
 def solve_stretch(
-    bottle: Bottle, draw: Draw, start: float, end: float, values: Floats, walking: bool
+    bottle: Bottle, draw: GasDemand, start: float, end: float, values: Floats, walking: bool
 ) -> DischargeInterval:
     """Return one stretch; walking, it may end early where the supply pressure is no longer maintained."""
     from scipy.integrate import solve_ivp

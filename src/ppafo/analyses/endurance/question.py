@@ -63,7 +63,7 @@ def bottle(
     from dataclasses import replace
 
     from ppafo.analyses.endurance.answer import Endurances, finding_of, finding_of_several
-    from ppafo.analyses.endurance.draw import draw_of_numbers, draw_of_recording
+    from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
     from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
     from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
     from ppafo.errors import ParameterError
@@ -82,7 +82,7 @@ def bottle(
     schedule = Schedule(BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
     named, changed = PAPER_BOTTLE if bottle is None else bottle, tuple(overrides)
     if gas_per_stride is not None:
-        draw = draw_of_numbers(gas_per_stride, STRIDE_TIME if stride_time is None else stride_time, peak_flow)
+        draw = demand_of_numbers(gas_per_stride, STRIDE_TIME if stride_time is None else stride_time, peak_flow)
         return finding_of(follow_bottle(load_bottle(named, changed), draw, schedule))
     if peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
@@ -105,7 +105,7 @@ def bottle(
         if gas is None:
             full = load_bottle(named, changed)
             recording = use if isinstance(use, Recording) else read_recording(Path(str(use)))
-            life = follow_bottle(full, draw_of_recording(recording, stride_time), schedule)
+            life = follow_bottle(full, demand_of_recording(recording, stride_time), schedule)
             run = Path(str(use)) / RUN_FILE
             units = stated_units(run, read_json(run)) if not isinstance(use, Recording) and run.is_file() else {}
             # Whoever says how long a stride takes recorded strides; else the recording is what repeats.

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from ppafo.analyses.endurance.answer import Endurance
 from ppafo.analyses.endurance.discharge import check_schedule, discharge, discharge_of_life, smallest_mass_when_warm
-from ppafo.analyses.endurance.draw import Draw
-from ppafo.analyses.endurance.walk_gas import WalkGas, draw_of_walk, walk_gas
+from ppafo.analyses.endurance.gas_demand import GasDemand
+from ppafo.analyses.endurance.walk_gas import WalkGas, demand_of_walk, walk_gas
 from ppafo.arguments import checked
 from ppafo.errors import DataError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle
@@ -48,7 +48,7 @@ def endurance_of_walk_gas(
     gas: WalkGas, bottle: str | Path | None, schedule: Schedule, overrides: Iterable[str] = ()
 ) -> Endurance:
     """Return how long a bottle lasts when a walk continues; DataError where it took no gas, or is not known."""
-    at_set_pressure = draw_of_walk(gas)
+    at_set_pressure = demand_of_walk(gas)
     if gas.scenario is None:
         raise DataError(f"{gas.name}: its folder does not say what was walked; write the walk again")
     own = walk_of(gas.scenario).bottle
@@ -62,7 +62,7 @@ def endurance_of_walk_gas(
     stride_time, mass = life.walked / strides, life.course.regulated / strides
     before = Kind("", "kg", "gas mass", ".3g").text(at_set_pressure.mass_per_stride)
     origin = f"{at_set_pressure.origin} on the bottle, mean over its strides ({before} before, at the set pressure)"
-    taken = Draw(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
+    taken = GasDemand(mass, stride_time, max(at_set_pressure.peak_flow, mass / stride_time), origin)
     usable = supply.mass - smallest_mass_when_warm(supply.bottle, taken)
     return Endurance(
         bottle=supply.bottle,
@@ -75,7 +75,7 @@ def endurance_of_walk_gas(
     )
 
 
-def follow_bottle(bottle: Bottle, draw: Draw, schedule: Schedule) -> Endurance:
+def follow_bottle(bottle: Bottle, draw: GasDemand, schedule: Schedule) -> Endurance:
     """Return how long a full bottle lasts at a draw, by the schedule of its use."""
     usable = bottle.mass - smallest_mass_when_warm(bottle, draw)
     return Endurance(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ppafo.analyses.endurance.draw import Draw, draw_of_numbers, largest_flow
+from ppafo.analyses.endurance.gas_demand import GasDemand, demand_of_numbers, largest_flow
 from ppafo.errors import DataError, PpafoError, ScenarioError, refused_as
 from ppafo.parameters.overrides import read_overrides
 from ppafo.signals import Recording
@@ -56,13 +56,13 @@ def walk_gas(result: WalkResult) -> WalkGas:
     )
 
 
-def draw_of_walk(walk: WalkGas) -> Draw:
+def demand_of_walk(walk: WalkGas) -> GasDemand:
     """Return the gas use of a walk that continues: a stride is one of the leg with the device."""
     if walk.gas_per_stride <= 0.0:
         raise DataError(f"walk '{walk.name}': no gas was taken from the supply, so a bottle would never be empty")
     # An open valve may let gas back into the supply for moments, so the largest flow is a mean over 0.1 s.
     peak = max(largest_flow(walk.recording), walk.gas_per_stride / walk.stride_time)
-    draw = draw_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
+    draw = demand_of_numbers(walk.gas_per_stride, walk.stride_time, peak)
     along = f" in task sequence '{walk.task_sequence}'" if walk.task_sequence else ""
     return replace(draw, origin=f"walk '{walk.name}'{along}, {walk.recording.kind}, repeated")
 

@@ -15,7 +15,7 @@ from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import MetricLimit, atmosphere_of, check_metrics, level_of, seeds_of_noise
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
-from ppafo.study.runs import Runs, Tally, follows, oscillating, settled, with_companions
+from ppafo.study.runs import RunCounter, Runs, follows, oscillating, settled, with_companions
 from ppafo.units import split_quantity
 
 DEFAULT_GRID = 64
@@ -197,7 +197,7 @@ def outermost(
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
     seeds = seeds_of_noise([base], [searched.path.path], 0, _STREAMS, _SEED)
-    tally = Tally(grid * max(1, seeds.size), progress)
+    tally = RunCounter(grid * max(1, seeds.size), progress)
     runs = Runs(base, with_companions([condition.metric], base), tally, (), threads)
     search = FindProgress(base, searched.path.path, condition, runs, seeds)
     search.run(np.linspace(searched.low, searched.high, grid))

@@ -14,7 +14,7 @@ from ppafo.identification.bench.result import BenchResult, bench_figure, figure_
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
 from ppafo.identification.source import kind_of
-from ppafo.identification.trajectory.fitting import Known, TrajectoryFit
+from ppafo.identification.trajectory.fitting import NuisanceParameter, TrajectoryFit
 from ppafo.identification.trajectory.section import TrajectoryOutcome
 from ppafo.identification.wording import in_shown_unit, with_error
 from ppafo.parameters.loading import parameter_set_toml
@@ -227,7 +227,7 @@ def _trajectory_part(outcome: TrajectoryOutcome, before: ParameterSet) -> Sectio
     return _table(heading, fit.estimates, before, remarks)
 
 
-def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
+def _tolerances(known: Sequence[NuisanceParameter], before: ParameterSet) -> list[str]:
     """Return the tolerances that widen an interval or that the recordings contradict, largest first."""
     is_far = {number.name: abs(number.after - number.before) > _FAR * number.before_error for number in known}
     shown = sorted(
@@ -241,7 +241,7 @@ def _tolerances(known: Sequence[Known], before: ParameterSet) -> list[str]:
     return rows
 
 
-def _tolerance_text(tolerance: Known, before: ParameterSet) -> str:
+def _tolerance_text(tolerance: NuisanceParameter, before: ParameterSet) -> str:
     """Return a tolerance as stated and as fitted, each with its error, and what it contributes to an interval."""
     quantity, unit = tolerance.name.partition(" of ")[0], tolerance.unit
 

@@ -16,7 +16,7 @@ from ppafo.identification.problem import (
     run_procedure,
     window_of,
 )
-from ppafo.identification.source import RecordingSource, Use, double_use, source_of
+from ppafo.identification.source import RecordingSource, UsedRecording, double_use, source_of
 from ppafo.identification.tolerances import tolerances_of
 from ppafo.identification.trajectory.section import SectionContext, solve_section
 from ppafo.parameters.audit import audit
@@ -133,19 +133,19 @@ def _tasks(given: _Given, before: ParameterSet) -> list[_Task]:
     ]
 
 
-def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[Use, ...]:
+def _uses(tasks: Sequence[_Task], before: ParameterSet, valve: str, file: str) -> tuple[UsedRecording, ...]:
     """Return what the procedures use of which recording.
 
     One recording may serve two procedures, which ask it other things; IdentificationError where it serves one twice.
     """
-    uses: list[Use] = []
+    uses: list[UsedRecording] = []
     for kind in PROCEDURES:
-        of_kind: list[Use] = []
+        of_kind: list[UsedRecording] = []
         for task in tasks:
             if task.procedure.kind == kind:
                 first, last = window_of(task.procedure, ProcedureContext(before, valve, task.place))
                 of_kind += [
-                    Use(
+                    UsedRecording(
                         by=f"recording {number} of procedure {kind}",
                         trace=source.trace,
                         recording=source.recording,

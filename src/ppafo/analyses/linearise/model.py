@@ -28,7 +28,7 @@ class LinearSignal:
 
 
 @dataclass(frozen=True, slots=True)
-class Edge:
+class SlopeKink:
     """A kink of the plant at the point: state or input along which slopes of both sides differ, and the side taken.
 
     The linear model holds above the value of the point where ``is_above`` is true, else below it.
@@ -67,7 +67,7 @@ class LinearModel:
     d: Floats
     rates: Floats
     sides: Mapping[str, str]
-    edges: tuple[Edge, ...]
+    edges: tuple[SlopeKink, ...]
     delays: OmittedDelays
 
     @property

@@ -136,7 +136,7 @@ def valve_states(program: Program) -> dict[str, str]:
     return {VALVE + path.removeprefix("valve_state.").replace(".", "_"): path for path in paths}
 
 
-class ValveNow(NamedTuple):
+class SettledValve(NamedTuple):
     """State of the valve after the changes that it makes at once, its openings [-], and rates of its states by name."""
 
     state: Any
@@ -144,7 +144,7 @@ class ValveNow(NamedTuple):
     rates: dict[str, float]
 
 
-def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) -> ValveNow:
+def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) -> SettledValve:
     """The valve of a run at values of its states and of the command by name."""
     valve, names = run.program.valve, valve_states(run.program)
     command = functions.of(at_valve)(values["command"])
@@ -152,7 +152,7 @@ def valve_at(run: Run, functions: PythonFunctions, values: Mapping[str, float]) 
     settled = functions.of(valve.settle)(run.valve, state, command, 0.0)
     openings = functions.of(valve.instant)(run.valve, settled, command)
     rates = numbers(functions.of(valve.rates)(run.valve, settled, command))
-    return ValveNow(settled, openings, dict(zip(names, rates, strict=True)))
+    return SettledValve(settled, openings, dict(zip(names, rates, strict=True)))
 
 
 def without_slew_limit(run: Run) -> Run:

@@ -5,7 +5,7 @@ from numbers import Real
 
 import numpy as np
 
-from ppafo.analyses.linearise.model import Edge, LinearModel, LinearSignal, OmittedDelays
+from ppafo.analyses.linearise.model import LinearModel, LinearSignal, OmittedDelays, SlopeKink
 from ppafo.analyses.linearise.plant import (
     UNITS,
     VALVE,
@@ -137,7 +137,7 @@ def model_at(scenario: Scenario, run: Run, point: Point) -> LinearModel:
         d=d,
         rates=np.array([here.rates[name] for name in states]),
         sides=sides,
-        edges=tuple(Edge(name, side_of(name, values, point.way) > 0.0) for name in kinks),
+        edges=tuple(SlopeKink(name, side_of(name, values, point.way) > 0.0) for name in kinks),
         delays=OmittedDelays(run.command_delay, run.signal_delay, run.period),
     )
 

@@ -21,7 +21,7 @@ from ppafo.report.style import (
     PROPORTIONAL,
     REFERENCE,
     SOLENOID,
-    Look,
+    DrawingStyle,
 )
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
@@ -200,7 +200,7 @@ def torque_task_figure(
     return draw_panels(panels, 1, (7.3, 1.0), kind=solenoid.kind)
 
 
-def _torque_marks(recording: Recording, look: Look, ceiling: float, synthetic: Recording | None) -> list[Mark]:
+def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synthetic: Recording | None) -> list[Mark]:
     """Return reference, torque and what the supply can hold, over the broad torque of a synthetic experiment."""
     time, dashed = recording.time, {"linestyle": REFERENCE.line, "linewidth": 1.3}
     held = f"maximum that the supply can hold: {ceiling:.1f} N m"
@@ -229,7 +229,7 @@ def _filling_marks(recording: Recording) -> list[Mark]:
     return marks
 
 
-def _end_marks(height: float, run: Recording, look: Look) -> list[Mark]:
+def _end_marks(height: float, run: Recording, look: DrawingStyle) -> list[Mark]:
     """Return where the supplied gas is at the end: in the chambers, or vented; below it what leaked past the vane."""
     supplied, vented, leaked = (float(run[name][-1]) for name in ("supplied_mass", "vented_mass", "leaked_mass"))
     bars = (

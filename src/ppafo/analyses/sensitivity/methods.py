@@ -36,7 +36,7 @@ class Indices:
 
 
 @dataclass(frozen=True, slots=True)
-class Evaluated:
+class EvaluatedBlocks:
     """Whole blocks of a design: shares and inputs [SI] (rows, paths), values (rows,), and the numbers of the blocks.
 
     ``ends`` (2, paths) [SI] are the 5 and the 95 % quantile of each input, nan of the noise; ``seed`` made the design.
@@ -70,7 +70,7 @@ class Method:
     block_label: str
     block_rows: Callable[[int], int]
     design: Callable[[Uncertainty, int, int], Floats]
-    indices: Callable[[Evaluated, float], Indices]
+    indices: Callable[[EvaluatedBlocks, float], Indices]
 
 
 def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
@@ -93,7 +93,7 @@ def _sobol_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     return np.clip(design.reshape(-1, dimensions), _SMALLEST, 1.0 - _SMALLEST)
 
 
-def _sobol_indices(evaluated: Evaluated, confidence: float) -> Indices:
+def _sobol_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
     """Return ``first`` and ``total`` with bands."""
     # Points of one scramble depend on each other, scrambles do not: those are left out in turn.
     table = evaluated.values.reshape(evaluated.blocks.size, -1)
@@ -164,7 +164,7 @@ def _shapley_design(uncertainty: Uncertainty, blocks: int, seed: int) -> Floats:
     return np.asarray(np.clip(uniform, _SMALLEST, 1.0 - _SMALLEST))
 
 
-def _shapley_indices(evaluated: Evaluated, confidence: float) -> Indices:
+def _shapley_indices(evaluated: EvaluatedBlocks, confidence: float) -> Indices:
     """Return ``shapley`` with bands, by the delta method over the orders."""
     from scipy.special import stdtrit
 
@@ -219,7 +219,7 @@ METHODS = {method.name: method for method in (SOBOL, SHAPLEY)}
 """Methods by name. To add a method: its design, its indices, and its value here."""
 
 
-def changes(evaluated: Evaluated, confidence: float) -> tuple[Floats, Floats]:
+def changes(evaluated: EvaluatedBlocks, confidence: float) -> tuple[Floats, Floats]:
     """Return the change of the metric (paths,) from the 5 to the 95 % quantile of each value, and its half band.
 
     In the unit of the metric, above 0 where the metric grows with the value; nan for the noise. It is the difference of

@@ -64,7 +64,7 @@ def sensitivity(
     from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, SensitivitySettings, analyse
     from ppafo.errors import StudyError, nearest_name
     from ppafo.studies.draws import drawn_in
-    from ppafo.study.runs import Runs, Tally
+    from ppafo.study.runs import RunCounter, Runs
 
     if method is not None and method not in METHODS:
         raise StudyError(
@@ -78,7 +78,7 @@ def sensitivity(
         raise StudyError(f"study '{chosen.name}' keeps no metrics; name the metric to analyse")
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
-    tally = Tally(count * by.block_rows(len(used.drawn)), progress)
+    tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
     runs = Runs(base.scenario, requested, tally, used.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))

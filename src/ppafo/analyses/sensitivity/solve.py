@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.analyses.sensitivity.methods import Evaluated, Indices, Method, changes
+from ppafo.analyses.sensitivity.methods import EvaluatedBlocks, Indices, Method, changes
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.studies.distributions import Floats
@@ -40,7 +40,7 @@ class SensitivitySettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Settling:
+class IndexConvergence:
     """The indices of one metric, and their bands, by name from the first ``blocks`` blocks; ``used`` had all values."""
 
     blocks: int
@@ -63,7 +63,7 @@ class OfMetric:
     runs_without_value: int
     change_from_5_to_95_percent: list[float]
     band_of_change: list[float]
-    settling: list[Settling]
+    settling: list[IndexConvergence]
 
     @property
     def indices(self) -> Indices:
@@ -128,7 +128,9 @@ def analyse(
     inputs = np.stack([columns[path] for path in uncertainty.paths], axis=1)
     blocks = np.repeat(np.arange(settings.samples), design.shape[0] // settings.samples)
     # The design of all metrics, without the values of one.
-    whole = Evaluated(fractions=design, inputs=inputs, values=np.empty(0), blocks=blocks, ends=ends, seed=settings.seed)
+    whole = EvaluatedBlocks(
+        fractions=design, inputs=inputs, values=np.empty(0), blocks=blocks, ends=ends, seed=settings.seed
+    )
     metrics = [_of_metric(name, rows[name], whole, method, settings) for name in runs.metrics]
     return Influences(
         study=study,
@@ -142,7 +144,9 @@ def analyse(
     )
 
 
-def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, settings: SensitivitySettings) -> OfMetric:
+def _of_metric(
+    name: str, values: Floats, design: EvaluatedBlocks, method: Method, settings: SensitivitySettings
+) -> OfMetric:
     """Return the indices of a metric, whose ``values`` are (rows,), from growing parts of the sample.
 
     StudyError where it is the same in every run, or too few blocks have a value in all their runs.
@@ -163,7 +167,7 @@ def _of_metric(name: str, values: Floats, design: Evaluated, method: Method, set
         kept = np.flatnonzero(is_whole[:size])
         estimated = method.indices(_part_of(design, values, kept), settings.confidence)
         indices, bands = _as_lists(estimated.values), _as_lists(estimated.bands)
-        settling.append(Settling(blocks=size, used=kept.size, indices=indices, bands=bands))
+        settling.append(IndexConvergence(blocks=size, used=kept.size, indices=indices, bands=bands))
     change, band = changes(_part_of(design, values, np.flatnonzero(is_whole)), settings.confidence)
     return OfMetric(
         metric=name,
@@ -190,7 +194,7 @@ def _sizes(values: Floats, is_whole: NDArray[np.bool_], method: Method) -> list[
     return sizes
 
 
-def _part_of(design: Evaluated, values: Floats, kept: NDArray[np.intp]) -> Evaluated:
+def _part_of(design: EvaluatedBlocks, values: Floats, kept: NDArray[np.intp]) -> EvaluatedBlocks:
     """Return the part of a design that is made of some blocks, with the values of a metric in their runs."""
     rows = np.flatnonzero(np.isin(design.blocks, kept))
     return replace(

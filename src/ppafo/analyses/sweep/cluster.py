@@ -12,7 +12,7 @@ from uuid import uuid4
 from ppafo.errors import StudyError, one_line, reason
 from ppafo.storage.places import place_at
 from ppafo.study.blocks import chunk_count
-from ppafo.study.store import ChunkTask, Finished, note_file, work_on_chunk
+from ppafo.study.store import ChunkTask, FinishedChunk, note_file, work_on_chunk
 
 _TASKS_PER_THREAD = 3
 """Tasks that wait at the scheduler for every thread of the workers: enough to keep them busy, few for 10^9 runs."""
@@ -40,7 +40,7 @@ def check_scheduler(address: str) -> None:
 
 
 def compute_on_cluster(
-    address: str, task: ChunkTask, numbers: Iterable[int], finish: Callable[[Finished], None]
+    address: str, task: ChunkTask, numbers: Iterable[int], finish: Callable[[FinishedChunk], None]
 ) -> None:
     """Compute the chunks of these numbers on the workers of the scheduler at an address; ``finish`` hears of each one.
 
@@ -67,7 +67,7 @@ def compute_on_cluster(
 
 
 def _compute(
-    client: Any, distributed: Any, task: ChunkTask, numbers: Iterable[int], finish: Callable[[Finished], None]
+    client: Any, distributed: Any, task: ChunkTask, numbers: Iterable[int], finish: Callable[[FinishedChunk], None]
 ) -> None:
     """Keep some chunks waiting at the scheduler, one more for each that is finished, until all are.
 
@@ -84,7 +84,7 @@ def _compute(
     submit(max(_FEWEST_TASKS, _TASKS_PER_THREAD * sum(client.nthreads().values())))
     for future in futures:
         try:
-            finished: Finished = future.result()
+            finished: FinishedChunk = future.result()
         except distributed.scheduler.KilledWorker as error:
             raise StudyError(f"chunk {future.key}: its workers died repeatedly: {one_line(error)}") from error
         future.release()

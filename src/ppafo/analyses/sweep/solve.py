@@ -40,14 +40,14 @@ from ppafo.studies.loading import list_studies, load_study
 from ppafo.studies.study import Study
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
-from ppafo.study.runs import Tally, joined
+from ppafo.study.runs import RunCounter, joined
 from ppafo.study.sent_plugins import plugins_to_send
 from ppafo.study.store import (
     FOLLOWS,
     OSCILLATES,
     STATUSES,
     ChunkTask,
-    Finished,
+    FinishedChunk,
     StudyStore,
     compute_chunk,
     note_file,
@@ -279,9 +279,9 @@ def _work(task: ChunkTask, store: StudyStore, scheduler: str | None, progress: R
     known = store.finished()
     earlier, missing = sum(block.runs for block in known), set(range(chunk_count(study)))
     missing -= {block.number for block in known}
-    tally = Tally(study.runs, progress, earlier, sum(block.failed for block in known))
+    tally = RunCounter(study.runs, progress, earlier, sum(block.failed for block in known))
 
-    def count(finished: Finished) -> None:
+    def count(finished: FinishedChunk) -> None:
         tally.add(finished.runs, finished.failed)
 
     # Rows change below: an old summary would pass for a finished study meanwhile.
@@ -320,11 +320,11 @@ def _work(task: ChunkTask, store: StudyStore, scheduler: str | None, progress: R
 
 
 def _compute_here(
-    task: ChunkTask, store: StudyStore, numbers: Iterable[int], finish: Callable[[Finished], None]
+    task: ChunkTask, store: StudyStore, numbers: Iterable[int], finish: Callable[[FinishedChunk], None]
 ) -> None:
     """Compute chunks one after the other; while one is written, the next one is computed."""
     with ThreadPoolExecutor(1, "ppafo-writing") as writer:
-        writing: Future[Finished] | None = None
+        writing: Future[FinishedChunk] | None = None
         for number in numbers:
             computed = compute_chunk(task, number)
             if writing is not None:

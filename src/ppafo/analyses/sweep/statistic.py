@@ -22,7 +22,7 @@ from ppafo.studies.distributions import Floats, floored_interval, noise_interval
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, atmosphere_of, check_metrics, drawn_in
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import Study
-from ppafo.study.runs import Runs, Tally
+from ppafo.study.runs import RunCounter, Runs
 from ppafo.units.shown import shown_in
 
 DEFAULT_WIDTH = "1 %"
@@ -77,7 +77,7 @@ def estimate(
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
-    runs = Runs(base.scenario, wanted, Tally(rule.first, progress), uncertainty.gauge, threads)
+    runs = Runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         first = chosen.sample.seed if seed is None else seed
         return draw_until(runs, uncertainty, metric, what, rule, first, wanted[1:])

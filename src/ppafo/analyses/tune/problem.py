@@ -116,7 +116,7 @@ Gains = Mapping[str, float]
 
 
 @dataclass(frozen=True, slots=True)
-class Searched:
+class SearchedParameter:
     """A path, its bounds [SI], whether its logarithm is searched, its value before [SI], and how it is written."""
 
     path: str
@@ -199,7 +199,7 @@ class Problem:
     description: str
     scenario: Scenario
     overrides: tuple[str, ...]
-    searched: tuple[Searched, ...]
+    searched: tuple[SearchedParameter, ...]
     goals: tuple[ObjectiveTerm, ...]
     constraints: tuple[MetricLimit, ...]
     spread: Spread | None
@@ -297,7 +297,7 @@ def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (
         )
 
 
-def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> Searched:
+def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) -> SearchedParameter:
     with refused_as(StudyError, f"search '{gain.path}'", UnitError, ScenarioError):
         varied = varied_path(gain.path, scenario)
         ends = (gain.minimum, gain.maximum)
@@ -317,7 +317,7 @@ def _searched(gain: SearchRange, scenario: Scenario, atmosphere_varies: bool) ->
         raise StudyError(f"search '{gain.path}': spacing = 'logarithmic' needs a minimum above 0, not {gain.minimum!r}")
     # Where the atmosphere varies, gauge bounds count from each run's own; so does the value before.
     before -= varied.atmosphere if varied.is_gauge else 0.0
-    return Searched(gain.path, minimum, maximum, is_logarithmic, before, varied)
+    return SearchedParameter(gain.path, minimum, maximum, is_logarithmic, before, varied)
 
 
 def _goal(goal: GoalSection) -> ObjectiveTerm:

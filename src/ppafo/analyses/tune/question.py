@@ -61,7 +61,7 @@ def tune(
     from ppafo.errors import StudyError
     from ppafo.studies.distributions import Floats
     from ppafo.studies.sampling import NOISE_DRAWS
-    from ppafo.study.runs import Runs, Tally, with_companions
+    from ppafo.study.runs import RunCounter, Runs, with_companions
 
     if isinstance(tuning, Problem) and overrides:
         raise StudyError("a loaded Problem takes no overrides; give them to load_tuning")
@@ -77,7 +77,7 @@ def tune(
     if spread is not None:
         expected = spread.draws * expected + 2 * (FRESH_DRAWS + NOISE_DRAWS * spread.uncertainty.has_noise)
     metrics = with_companions(problem.metrics, problem.scenario)
-    runs = Runs(problem.scenario, metrics, Tally(expected, progress), problem.gauge, threads)
+    runs = Runs(problem.scenario, metrics, RunCounter(expected, progress), problem.gauge, threads)
     draws = {} if spread is None else spread.uncertainty.random_columns(0, spread.draws, spread.seed)
     scales = scales_of(problem, rows_of_gains(runs, problem, problem.before, draws))
 

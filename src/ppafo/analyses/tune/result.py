@@ -48,7 +48,7 @@ def agreement(starts: Sequence[SearchStart]) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Ceiling:
+class UnreachableDraws:
     """Draws in which the reference needs more torque than the supply can hold, whatever the gains.
 
     ``fraction`` is theirs of all; ``explains`` are the metrics of the constraints that they alone break: no gains can
@@ -78,7 +78,7 @@ class GainResult:
     share_without_value: float
     fresh_violation: float
     fresh_share_without_value: float
-    torque_ceiling: Ceiling
+    torque_ceiling: UnreachableDraws
     share_of_noise: Mapping[str, ConfidenceInterval]
     metrics: Mapping[str, Metric]
     result: Result = field(compare=False, repr=False)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.tune.problem import Gains, Problem, SearchEffort, Spread
-from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, Ceiling, GainResult, SearchStart
+from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, UnreachableDraws
 from ppafo.engine.scheme.actuators import torque_of
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
@@ -39,7 +39,7 @@ UNUSABLE = 1.0e12
 
 
 @dataclass(frozen=True, slots=True)
-class Crossed:
+class CandidateMetrics:
     """Metrics by name and failures of candidates, each (candidates, draws); one draw without uncertainty."""
 
     metrics: Mapping[str, Floats]
@@ -53,7 +53,7 @@ class Crossed:
 
 
 @dataclass(frozen=True, slots=True)
-class Judgement:
+class CandidateScores:
     """Objective, violation and what both are made of, each (candidates,): metric at its bad end by name [SI]."""
 
     objective: Floats
@@ -96,7 +96,7 @@ def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
     return values[:, 0] if spread is None else spread.bad_end(values, is_high)
 
 
-def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judgement:
+def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> CandidateScores:
     """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
@@ -109,7 +109,7 @@ def judge(runs: Crossed, problem: Problem, scales: Mapping[str, float]) -> Judge
         beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
         violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
-    return Judgement(objective, violation, failing)
+    return CandidateScores(objective, violation, failing)
 
 
 Costs = Callable[[Floats], Floats]
@@ -211,12 +211,14 @@ _NOISE_CONFIDENCE = 0.95
 """Confidence of the interval of the share of sensor noise."""
 
 
-def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> Crossed:
+def rows_of_gains(runs: Runs, problem: Problem, gains: Gains, draws: Mapping[str, Floats]) -> CandidateMetrics:
     """Run one setting of the gains over the draws."""
     return crossed(runs, problem, {gain.path: np.array([gains[gain.path]]) for gain in problem.searched}, draws)
 
 
-def crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]) -> Crossed:
+def crossed(
+    runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: Mapping[str, Floats]
+) -> CandidateMetrics:
     """Run every candidate (values, each (candidates,)) with every draw (columns, each (draws,))."""
     candidates = len(next(iter(values.values())))
     count = len(next(iter(draws.values()))) if draws else 1
@@ -226,10 +228,10 @@ def crossed(runs: Runs, problem: Problem, values: Mapping[str, Floats], draws: M
     metrics = {name: settled(rows, name).reshape(candidates, count) for name in problem.metrics}
     # Gains with which the loop oscillates are no better than ones with which the run fails.
     unusable = rows[FAILED] | oscillating(rows, problem.scenario)
-    return Crossed(metrics, unusable.reshape(candidates, count))
+    return CandidateMetrics(metrics, unusable.reshape(candidates, count))
 
 
-def scales_of(problem: Problem, before: Crossed) -> dict[str, float]:
+def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
     """Return the size of each goal: the given one, or its value before tuning."""
     # By default each goal is 1 before tuning: goals in different units then weigh as much as their weights say.
     scales = {}
@@ -280,13 +282,13 @@ def setting_of(
     )
 
 
-def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: Crossed) -> Ceiling:
+def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: CandidateMetrics) -> UnreachableDraws:
     """Return in how many draws the supply cannot hold the reference, and which violated constraints that explains."""
     base = scenario_with(problem, gains)
     columns = {path: column for path, column in absolute(base, draws, problem.gauge).items() if path not in TIMES}
     scenario = with_numbers(base, columns)
     if not scenario.follows_reference:
-        return Ceiling(0.0, ())
+        return UnreachableDraws(0.0, ())
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
     spread, explained = problem.spread, []
     for constraint in problem.constraints:
@@ -302,7 +304,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
         rest = values[:, lacking[0] == 0.0]
         if is_out_of_reach or rest.shape[1] < 2 or constraint.is_kept(float(bad_ends(rest, spread, is_most)[0])):
             explained.append(constraint.metric)
-    return Ceiling(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
+    return UnreachableDraws(float(np.mean(lacking > 0.0)), tuple(explained) if lacking.any() else ())
 
 
 def scenario_with(problem: Problem, gains: Gains) -> Scenario:
@@ -313,7 +315,7 @@ def scenario_with(problem: Problem, gains: Gains) -> Scenario:
     return with_overrides(problem.scenario, problem.lines(gains))
 
 
-def _values(runs: Crossed, problem: Problem) -> dict[str, float]:
+def _values(runs: CandidateMetrics, problem: Problem) -> dict[str, float]:
     """Return every metric of the problem as the first candidate is judged by it; nan where a run has none."""
     less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
     less |= {

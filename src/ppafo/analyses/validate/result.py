@@ -9,7 +9,7 @@ from ppafo.report.kind import Kind
 from ppafo.units.shown import quantity_of_unit
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import RecordingAgreement, ReplaySettings
-from ppafo.validation.causes import Causes, ResidualCause
+from ppafo.validation.causes import Diagnosis, ResidualCause
 from ppafo.validation.compared import COMPARED
 from ppafo.version import __version__
 
@@ -29,7 +29,7 @@ class Validation:
     overrides: tuple[str, ...]
     settings: ReplaySettings
     recordings: tuple[RecordingAgreement, ...]
-    causes: Causes
+    causes: Diagnosis
 
     @property
     def passes(self) -> bool:
@@ -77,7 +77,7 @@ def verdict(validation: Validation) -> str:
     return f"{name} agrees with {count} recording{'s' * (count > 1)}: every RMS error is within its limit; {rest}"
 
 
-def _why(causes: Causes, without: float, passes: bool) -> str:
+def _why(causes: Diagnosis, without: float, passes: bool) -> str:
     """Return what explains a disagreement, or what comes nearest; empty where nothing but noise is left.
 
     ``without`` is the largest error over noise [-] without any cause: a nearest one is named that takes half of it, or

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from ppafo.arguments import Count, File, Folder, Name, Overrides, Patience, Port, Time, Whole, Word
 
 if TYPE_CHECKING:
-    from ppafo.cli.output import Said
+    from ppafo.cli.output import CommandOutput
 
 
 def rig_simulate(
@@ -20,7 +20,7 @@ def rig_simulate(
     valve: Name | None = None,
     overrides: Overrides = (),
     out: Folder = Path("out/rig"),
-) -> Said:
+) -> CommandOutput:
     """Run an experiment on the simulated test bench, and write the recording of a laboratory, marked as synthetic.
 
     experiment: name of an experiment
@@ -35,7 +35,7 @@ def rig_simulate(
     201 samples of command, mass_flow, upstream_pressure, downstream_pressure
     written: rig (valve-map.csv, rig.json)
     """
-    from ppafo.cli.output import Said, blame_out_option
+    from ppafo.cli.output import CommandOutput, blame_out_option
     from ppafo.rig.experiments import NOTICE, check_rig_folder, find_experiment, record, write_rig_recording
 
     # An unknown name and a refused folder are told before anything runs.
@@ -46,12 +46,12 @@ def rig_simulate(
     files = write_rig_recording(out, made)
     counted = f"{len(made.recording)} samples of {', '.join(made.recording.names)}"
     text = f"{experiment}: {NOTICE}\n{counted}\nwritten: {out} ({', '.join(files)})"
-    return Said(text, {"folder": str(out), "files": list(files), **made.truth})
+    return CommandOutput(text, {"folder": str(out), "files": list(files), **made.truth})
 
 
 def rig_record(
     *, port: Port, baud: Count = 921600, duration: Time | None = None, patience: Patience = 5.0, out: File
-) -> Said:
+) -> CommandOutput:
     """Record a bench that speaks the protocol of 'ppafo hil'.
 
     Exit code 1 where the port broke, 130 where Ctrl-C stopped it.
@@ -97,12 +97,12 @@ def rig_record(
     code = output.EXIT_INTERRUPTED if found.is_stopped else output.EXIT_CHECK_FAILED if is_broken else output.EXIT_GOOD
     aside = f"stopped; {out} is whole" if found.is_stopped else ""
     document = {"file": str(out), **found.document()}
-    return output.Said(f"{found.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
+    return output.CommandOutput(f"{found.text()}\nwritten: {out}", document, exit_code=code, aside=aside)
 
 
-def list_rig() -> Said:
+def list_rig() -> CommandOutput:
     """Return the experiments and the presets with what they are."""
-    from ppafo.cli.output import Said
+    from ppafo.cli.output import CommandOutput
     from ppafo.rig.experiments import overview
 
-    return Said(*overview())
+    return CommandOutput(*overview())

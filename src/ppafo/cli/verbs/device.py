@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 from ppafo.arguments import Overrides, SetName
 
 if TYPE_CHECKING:
-    from ppafo.cli.output import Said
+    from ppafo.cli.output import CommandOutput
     from ppafo.report.finding import Finding
 
 
-def sets_list() -> Said:
+def sets_list() -> CommandOutput:
     """List the parameter sets that come with the package.
 
     >>> print(sets_list().text)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from ppafo.arguments import Folder, Overrides, Scenario, Word
 
 if TYPE_CHECKING:
-    from ppafo.cli.output import Said
+    from ppafo.cli.output import CommandOutput
 
 Interface = Annotated[
     Literal["loop", "plant"],
@@ -22,7 +22,9 @@ Interface = Annotated[
 ]
 
 
-def export_c(scenario: Scenario, *, interface: Interface = "loop", overrides: Overrides = (), out: Folder) -> Said:
+def export_c(
+    scenario: Scenario, *, interface: Interface = "loop", overrides: Overrides = (), out: Folder
+) -> CommandOutput:
     """Write a scenario or a walk as a library in C: header, source, example, make files.
 
     out: the folder to write
@@ -49,7 +51,7 @@ def export_fmu(
     platforms: Annotated[str, Word("LIST")] | None = None,
     overrides: Overrides = (),
     out: Folder,
-) -> Said:
+) -> CommandOutput:
     """Write a scenario or a walk as a functional mock-up unit (FMU).
 
     fmi: version of FMI; default 2

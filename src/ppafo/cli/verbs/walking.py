@@ -20,12 +20,12 @@ from ppafo.arguments import (
 )
 
 if TYPE_CHECKING:
-    from ppafo.cli.output import Said
+    from ppafo.cli.output import CommandOutput
     from ppafo.gait.finding import GaitFound
     from ppafo.report.finding import Finding
 
 
-def gait_list() -> Said:
+def gait_list() -> CommandOutput:
     """List the gaits that come with the package.
 
     >>> print(gait_list().text)
@@ -116,7 +116,7 @@ def gait_import(
     return gait_finding(imported.gait, imported)
 
 
-def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:
+def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> CommandOutput:
     """Write some strides of a gait as a synthetic recording.
 
     strides: number of strides; default 10
@@ -126,7 +126,7 @@ def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:
     >>> print(gait_record("falisse2019-subject1", strides=2, out=Path("strides.csv")).text)
     written: strides.csv (417 samples, synthetic)
     """
-    from ppafo.cli.output import Said, check_new_file
+    from ppafo.cli.output import CommandOutput, check_new_file
     from ppafo.errors import DataError
     from ppafo.gait import load_gait, walk_recording
     from ppafo.storage import write_csv
@@ -137,4 +137,4 @@ def gait_record(gait: Gait, *, strides: Count = 10, out: File) -> Said:
     recording = walk_recording(load_gait(gait), strides)
     write_csv(out, recording)
     document = {"file": str(out), "samples": len(recording), "channels": list(recording.names)}
-    return Said(f"written: {out} ({len(recording)} samples, synthetic)", document)
+    return CommandOutput(f"written: {out} ({len(recording)} samples, synthetic)", document)

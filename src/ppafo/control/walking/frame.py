@@ -56,13 +56,13 @@ class WalkingParts(NamedTuple):
     restart: Callable[[Any, float, float], Any]
 
 
-class AnewParts(NamedTuple):
+class InitialStateParts(NamedTuple):
     """State of a law at its start."""
 
     start: Any
 
 
-def restart_anew(state: Any, requested: float, continues: float, *, parts: AnewParts) -> Any:
+def restart_anew(state: Any, requested: float, continues: float, *, parts: InitialStateParts) -> Any:
     """The state of a law that starts again where another task begins (``continues`` 0, else 1)."""
     return state if continues > 0.5 else parts.start
 
@@ -118,7 +118,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
     parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
     state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
-    anew = made_of(restart_anew, f"restart_{name}", AnewParts(law.initial)) if len(law.initial) else keep_state
+    anew = made_of(restart_anew, f"restart_{name}", InitialStateParts(law.initial)) if len(law.initial) else keep_state
     parts = WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
     return replace(
         law,

@@ -133,7 +133,7 @@ class ObservedValve(NamedTuple):
     waits: float
 
 
-class OnTheWay(NamedTuple):
+class CommandInTransit(NamedTuple):
     """A command on its way to a spool or a vent valve [-], a third of the dead time behind it each."""
 
     first: float
@@ -166,8 +166,8 @@ class Observer(NamedTuple):
     command: float
     coil_1: ObservedValve
     coil_2: ObservedValve
-    on_the_way: OnTheWay
-    venting: OnTheWay
+    on_the_way: CommandInTransit
+    venting: CommandInTransit
     spool: float
     joined: float
     lines: LineState
@@ -183,8 +183,8 @@ START = Observer(
     command=2.0,
     coil_1=_OFF,
     coil_2=_OFF,
-    on_the_way=OnTheWay(first=0.0, second=0.0, third=0.0),
-    venting=OnTheWay(first=1.0, second=1.0, third=1.0),
+    on_the_way=CommandInTransit(first=0.0, second=0.0, third=0.0),
+    venting=CommandInTransit(first=1.0, second=1.0, third=1.0),
     spool=0.0,
     joined=0.0,
     lines=_FULL,
@@ -258,7 +258,9 @@ def next_coil(nominal: NominalDevice, coil: ObservedValve, wanted: float, period
     ), before * coil.position + (1.0 - before) * target
 
 
-def next_on_the_way(nominal: NominalDevice, on_the_way: OnTheWay, target: float, period: float) -> OnTheWay:
+def next_on_the_way(
+    nominal: NominalDevice, on_the_way: CommandInTransit, target: float, period: float
+) -> CommandInTransit:
     """A command on its way after a sample [s] with a ``target`` [-]: three lags, which together last the dead time.
 
     So the gas that passes is right in the mean; a line of all samples of a dead time would have no end.
@@ -266,7 +268,7 @@ def next_on_the_way(nominal: NominalDevice, on_the_way: OnTheWay, target: float,
     share = period / (period + nominal.nominal_delay / 3.0)
     first = on_the_way.first + (target - on_the_way.first) * share
     second = on_the_way.second + (first - on_the_way.second) * share
-    return OnTheWay(first=first, second=second, third=on_the_way.third + (second - on_the_way.third) * share)
+    return CommandInTransit(first=first, second=second, third=on_the_way.third + (second - on_the_way.third) * share)
 
 
 def opening_of(nominal: NominalDevice, command: float) -> float:

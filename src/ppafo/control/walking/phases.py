@@ -24,7 +24,7 @@ class PhaseRules(NamedTuple):
     ]
 
 
-class Switch(NamedTuple):
+class DebouncedSensor(NamedTuple):
     """A debounced force sensor: loaded (1) or not (0), and how long it has contradicted that [s]."""
 
     loaded: float
@@ -35,8 +35,8 @@ class PhaseState(NamedTuple):
     """Phase, both switches, time in the phase and since the last heel strike [s], stride time [s], strikes seen."""
 
     phase: float
-    heel: Switch
-    toe: Switch
+    heel: DebouncedSensor
+    toe: DebouncedSensor
     in_phase: float
     since_strike: float
     stride_time: float
@@ -45,8 +45,8 @@ class PhaseState(NamedTuple):
 
 START = PhaseState(
     phase=SWING,
-    heel=Switch(0.0, 0.0),
-    toe=Switch(0.0, 0.0),
+    heel=DebouncedSensor(0.0, 0.0),
+    toe=DebouncedSensor(0.0, 0.0),
     in_phase=0.0,
     since_strike=0.0,
     stride_time=0.0,
@@ -59,7 +59,7 @@ def lifts(phase: float) -> bool:
     return phase < 1.5
 
 
-def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) -> Switch:
+def next_switch(rules: PhaseRules, switch: DebouncedSensor, force: float, period: float) -> DebouncedSensor:
     """The switch after a sample of its force [N]; ``period`` [s]."""
     # Between both thresholds the switch stays as it is.
     indicated = 0.0 if force < rules.unload_threshold else switch.loaded
@@ -67,7 +67,7 @@ def next_switch(rules: PhaseRules, switch: Switch, force: float, period: float) 
     # A change counts once it has lasted for the debounce time; until then the old state holds.
     against = switch.contradicted + period if indicated != switch.loaded else 0.0
     switches = against >= rules.debounce and indicated != switch.loaded
-    return Switch(indicated if switches else switch.loaded, 0.0 if switches else against)
+    return DebouncedSensor(indicated if switches else switch.loaded, 0.0 if switches else against)
 
 
 def next_phase(rules: PhaseRules, state: PhaseState, heel: float, toe: float, passed: float) -> float:

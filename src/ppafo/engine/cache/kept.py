@@ -24,7 +24,7 @@ CHECKSUMS = "checksums.json"
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class RequestedProgram:
     """A program: its text, and what compiles it."""
 
     source: str
@@ -45,7 +45,7 @@ class Wanted:
         return execute(self.name, self.source, path, self.compiler.compile_text)
 
 
-def load_kept_module(kept: Path, wanted: Wanted) -> ModuleType | None:
+def load_kept_module(kept: Path, wanted: RequestedProgram) -> ModuleType | None:
     """Return the module of a program that is there and whole; one that is damaged is removed."""
     if not os.path.lexists(kept):
         return None
@@ -113,5 +113,5 @@ def remove(folder: Path) -> None:
 
 def is_kept(source: str, compiler: Compiler) -> bool:
     """True where a program was loaded by this compiler already, or lies in the cache."""
-    wanted, folder = Wanted(source, compiler), cache_folder()
+    wanted, folder = RequestedProgram(source, compiler), cache_folder()
     return wanted.name in sys.modules or (folder is not None and os.path.lexists(wanted.place(folder)))

@@ -16,7 +16,7 @@ from types import ModuleType
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.cache.announcing import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
 from ppafo.engine.cache.folder import LOCK, cache_folder, refusal
-from ppafo.engine.cache.kept import CHECKSUMS, Wanted, is_kept, load_kept_module, remove
+from ppafo.engine.cache.kept import CHECKSUMS, RequestedProgram, is_kept, load_kept_module, remove
 from ppafo.engine.cache.tidying import PROGRAM, entries_named, evict
 from ppafo.engine.compilers import Compiler, Effort
 from ppafo.errors import reason
@@ -77,7 +77,7 @@ def _lock(place: Path) -> int | None:
 logger = logging.getLogger("ppafo")
 
 
-def make(wanted: Wanted, kept: Path | None) -> ModuleType:
+def make(wanted: RequestedProgram, kept: Path | None) -> ModuleType:
     """Compile a program and keep it at its place, or in memory alone where there is none or it cannot be kept."""
     if kept is not None:
         try:
@@ -102,12 +102,14 @@ def load_all(programs: Iterable[tuple[str, Effort]], compiler: Compiler, load: C
         return
     folder = cache_folder()
     kept = [] if folder is None else entries_named(folder, PROGRAM)
-    expected = sum(_estimate(Wanted(source, compiler.with_effort(effort)), kept) for source, effort in missing)
+    expected = sum(
+        _estimate(RequestedProgram(source, compiler.with_effort(effort)), kept) for source, effort in missing
+    )
     where = "not kept" if folder is None or refusal(folder) else f"kept in {folder}"
     compile_side_by_side([partial(load, source, effort) for source, effort in missing], expected, where)
 
 
-def _compile_and_keep(kept: Path, wanted: Wanted) -> ModuleType:
+def _compile_and_keep(kept: Path, wanted: RequestedProgram) -> ModuleType:
     """Compile a program in a folder aside, which takes its place when it is whole."""
     # Written aside and renamed: to other processes a program is whole, or not there.
     aside = kept.with_name(f".writing-{secrets.token_hex(8)}")
@@ -133,7 +135,7 @@ def _compile_and_keep(kept: Path, wanted: Wanted) -> ModuleType:
     return module
 
 
-def _estimate(wanted: Wanted, kept: Iterable[Path]) -> float:
+def _estimate(wanted: RequestedProgram, kept: Iterable[Path]) -> float:
     """About how long a program takes to compile [s]."""
     kind = wanted.name.rpartition("_")[0]
     alike = [entry for entry in kept if entry.name.startswith(f"{kind}_")]

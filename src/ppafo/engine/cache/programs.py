@@ -6,7 +6,7 @@ import threading
 from types import ModuleType
 
 from ppafo.engine.cache.folder import CACHE_VARIABLE, NOTE, cache_folder, refusal
-from ppafo.engine.cache.kept import Wanted, load_kept_module, short_hash
+from ppafo.engine.cache.kept import RequestedProgram, load_kept_module, short_hash
 from ppafo.engine.compilers import Compiler
 
 logger = logging.getLogger("ppafo")
@@ -20,13 +20,13 @@ def load_generated(source: str, compiler: Compiler) -> ModuleType:
     ProgramError where it cannot be compiled, in terms of the file that the function at fault was written in;
     CompilerError where the compiler does not work.
     """
-    wanted = Wanted(source, compiler)
+    wanted = RequestedProgram(source, compiler)
     # A second thread must not get a module of which only the beginning has run.
     with _LOADING.setdefault(wanted.name, threading.RLock()):
         return sys.modules[wanted.name] if wanted.name in sys.modules else _import_program(wanted)
 
 
-def _import_program(wanted: Wanted) -> ModuleType:
+def _import_program(wanted: RequestedProgram) -> ModuleType:
     """Return the module of a program from the cache, or compile it; a warning says why where it is not kept."""
     folder = cache_folder()
     # Loading runs what lies there, so the folder is looked at each time, not once for the process.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:  # a lane is of these, and makes none of them
     from ppafo.model.regulator import LineState, SupplyLines
     from ppafo.model.sensors import GaitSeen, GaitSensors, SensorParameters
     from ppafo.model.shut_off import ShutOff, Unpowered
-    from ppafo.signals.meter import Course, Sample
+    from ppafo.signals.meter import ReferenceSummary, Sample
 
 
 SAME_MOMENT = 1.0e-9
@@ -138,7 +138,7 @@ class Lane:
     gait_seen: "GaitSeen"  # last readings of a walk
     unpowered: "Unpowered"
     line_state: "LineState"
-    course: "Course"  # of the reference over the whole run, for meters
+    course: "ReferenceSummary"  # of the reference over the whole run, for meters
     start: LaneStart
     signal_history: NDArray[np.float64]  # rings of what comes late, and the traced samples
     command_history: NDArray[np.float64]

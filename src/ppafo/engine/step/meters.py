@@ -10,10 +10,10 @@ from ppafo.model.plant import ThermalParameters, joint_torque
 from ppafo.signals.meter import (
     NO_ENERGY,
     SAME_LEVEL,
-    Course,
     EnergySample,
     FootSample,
     GasSample,
+    ReferenceSummary,
     Sample,
     StrideSample,
     advance_course,
@@ -124,7 +124,7 @@ def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None
     """The last value of the reference, how far its ends are from its origin, and no hold yet."""
     value, origin = reference_at(parts, lane, last * interval * lane.timing.step), origin_of(parts, lane)
     largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step) - origin), abs(value - origin))
-    lane.course = Course(last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0)
+    lane.course = ReferenceSummary(last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0)
 
 
 def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:

@@ -3,17 +3,19 @@
 from ppafo.engine.program import Program
 from ppafo.engine.scheme.pneumatics import SHORTEST
 from ppafo.engine.step.lane import Lane
-from ppafo.model.effects.kind import Moment
+from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.plant import PlantState, chamber_pressures
 
 LARGEST = 1.0e300
 """A state beyond this, or one that is no number, is a failure."""
 
 
-def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float) -> Moment:
+def moment(
+    parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float
+) -> PlantSnapshot:
     """State of the plant that effects depend on, with mean flows [kg/s]."""
     pressure_1, pressure_2 = chamber_pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
-    return Moment(
+    return PlantSnapshot(
         angle=state.angle,
         angular_velocity=state.angular_velocity,
         pressure_1=pressure_1,
@@ -24,7 +26,7 @@ def moment(parts: Program, lane: Lane, state: PlantState, supplied: float, vente
     )
 
 
-def begun_moment(parts: Program, lane: Lane, command: float) -> Moment:
+def begun_moment(parts: Program, lane: Lane, command: float) -> PlantSnapshot:
     """State of the plant that effects depend on, at the start of a step, with the flows of its first stage."""
     supplied, mass_1, mass_2 = parts.gas.first_flows(parts, lane)
     return moment(parts, lane, lane.state, supplied, supplied - mass_1 - mass_2, command)

@@ -7,7 +7,7 @@ row for each; the composed functions are the same but for their first and last l
 from collections.abc import Callable, Iterable, Mapping
 
 from ppafo.engine.rows import is_number, is_row, leaf_paths, members, row_expression
-from ppafo.translation.value_types import FLOAT, Items, Row, Shared, Type
+from ppafo.translation.value_types import FLOAT, Items, Row, RowReference, Type
 
 NameOf = Callable[[type], str]
 
@@ -61,16 +61,16 @@ def _paths(groups: Mapping[str, type]) -> list[str]:
     return [path for name, row in groups.items() for path in leaf_paths(row, name)]
 
 
-def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> Shared:
+def struct_of(name: str, groups: Mapping[str, type], name_of: NameOf) -> RowReference:
     """A struct of groups of rows, without those that hold no number."""
     # C has no empty structs.
     found = ((group, type_of(row, name_of)) for group, row in groups.items() if leaf_paths(row, group))
-    return Shared(Row(name, tuple(found)))
+    return RowReference(Row(name, tuple(found)))
 
 
-def struct_of_numbers(name: str, names: Iterable[str]) -> Shared:
+def struct_of_numbers(name: str, names: Iterable[str]) -> RowReference:
     """Return the C declaration of a struct whose members are numbers."""
-    return Shared(Row(name, tuple((field, FLOAT) for field in names)))
+    return RowReference(Row(name, tuple((field, FLOAT) for field in names)))
 
 
 def type_of(row: object, name_of: NameOf) -> Type:

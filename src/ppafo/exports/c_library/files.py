@@ -122,7 +122,7 @@ class SwitchedSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Surface:
+class LibraryApi:
     """API variant of an exported library: header, example, README and source templates; ``words`` fill them.
 
     The settings ``as_step`` are ``step`` whatever they are.
@@ -137,7 +137,7 @@ class Surface:
     as_step: tuple[str, ...] = ()
 
 
-LOOP = Surface("interface.h", "main.c", "README.md", "loop.c")
+LOOP = LibraryApi("interface.h", "main.c", "README.md", "loop.c")
 """The closed loop, which goes from sample to sample."""
 
 
@@ -164,7 +164,7 @@ class Library:
     following: Further | None = None
     defaults: frozenset[str] = frozenset()
     links: Graph = field(default_factory=dict)
-    surface: Surface = LOOP
+    surface: LibraryApi = LOOP
     rules: tuple[Rule, ...] = ()
 
     @property

@@ -9,7 +9,7 @@ from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
-from ppafo.exports.c_library.files import ExportParameter, Library, Surface, c_identifier, library_files
+from ppafo.exports.c_library.files import ExportParameter, Library, LibraryApi, c_identifier, library_files
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
@@ -259,7 +259,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "step": f"{alone.step:g}",
         "clock": c_identifier(alone.clock),
     }
-    surface = Surface(
+    surface = LibraryApi(
         "plant.h",
         "plant_main.c",
         "plant_README.md",

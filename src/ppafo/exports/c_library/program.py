@@ -25,7 +25,7 @@ from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, 
 from ppafo.metrics.metric import ReadAt, Readings
 from ppafo.model.columns import over_runs
 from ppafo.model.one_run import FOR_ONE_RUN
-from ppafo.translation.value_types import FLOAT, INT, Array, Row, Shared, Type
+from ppafo.translation.value_types import FLOAT, INT, Array, Row, RowReference, Type
 
 
 def for_one_run(function: FunctionType, tree: ast.FunctionDef) -> ast.FunctionDef:
@@ -105,7 +105,7 @@ def c_text_of_run(
     parameters = struct_of("run_parameters", program.parameter_rows(), collector.add)
     settings_row = struct_of_numbers(f"{name}_settings", settings)
     outputs = struct_of_numbers(f"{name}_outputs", ["time", *exported.outputs])
-    samples = Shared(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
+    samples = RowReference(Row("run_samples", (("last", outputs.row), ("before", outputs.row))))
     metrics_row = struct_of_numbers(f"{name}_metrics", [kind.name for kind in exported.metrics])
     types: dict[str, tuple[Type, ...]] = {
         WHOLE: (states, parameters, samples, *LOOP_TYPES, *([INT] if exported.program.chooses_parts else [])),

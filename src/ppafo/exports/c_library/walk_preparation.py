@@ -27,7 +27,7 @@ from ppafo.model.gait import gait_at
 from ppafo.model.sensors import NOTHING_SEEN
 from ppafo.model.shut_off import NEVER, POWERED
 from ppafo.parameters.building import consistency
-from ppafo.parameters.graph import Follows, Graph, LinkFunction, holding
+from ppafo.parameters.graph import Graph, LinkedDefault, LinkFunction, holding
 from ppafo.simulation.declaration import RUN
 from ppafo.simulation.numbers import device_numbers, number_at
 from ppafo.simulation.profiles import profile_parameters
@@ -129,7 +129,7 @@ def _control(configuration: Scenario) -> dict[str, Quantity]:
 def links_of_walk(configuration: Scenario) -> Graph:
     """Settings of a walk that follow others as long as nobody changes them."""
     known = {setting.path: setting.value for setting in settings_of_walk(configuration)}
-    recorded = {"run.output_interval": (Follows((LinkFunction(("run.duration",), record_interval),)),)}
+    recorded = {"run.output_interval": (LinkedDefault((LinkFunction(("run.duration",), record_interval),)),)}
     # A plant alone has no settings of the controller that its walk had.
     links = {path: links for path, links in {**configuration.graph, **recorded}.items() if path in known}
     return holding(links, known)

@@ -131,7 +131,7 @@ class LockStep:
         _drain(port, take)
 
 
-Pace = RealTime | LockStep
+LoopPacing = RealTime | LockStep
 """Time stepping of the plant: real time or lock step; ``is_real`` if times are meaningful."""
 
 
@@ -210,7 +210,7 @@ class LogRow(NamedTuple):
 
 
 @final
-class Judge:
+class AnswerFilter:
     """Accepts answers of a controller. Everything that is not the answer to a waiting sample is counted."""
 
     def __init__(self, run: int, period: float) -> None:
@@ -286,12 +286,12 @@ class LinkTraffic:
 class Bench:
     """A plant at the wire, whose samples are ``period`` [s] apart; ``run`` is the number of the run, of 16 bits."""
 
-    def __init__(self, plant: SampledRun, period: float, port: wire.Port, pace: Pace, run: int) -> None:
+    def __init__(self, plant: SampledRun, period: float, port: wire.Port, pace: LoopPacing, run: int) -> None:
         self.plant = plant
         self.port = port
         self.pace = pace
         self.period = period
-        self.judge = Judge(run, period)
+        self.judge = AnswerFilter(run, period)
         self.reader = wire.Reader(port.is_stream)
         self.taken = 0
         self.rows: list[LogRow] = []

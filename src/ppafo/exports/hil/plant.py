@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from ppafo.engine.lanes import Advancing, load_program
+from ppafo.engine.lanes import RunnableProgram, load_program
 from ppafo.engine.loading import backend_described
 from ppafo.engine.run import Run, batch_of
 from ppafo.errors import ScenarioError
@@ -21,7 +21,7 @@ class CompiledPlant:
 
     scenario: Scenario
     run: Run
-    module: Advancing
+    module: RunnableProgram
     compiled_by: str
     period: float
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from ppafo.engine.run import batch_of
 from ppafo.exports.hil import wire
-from ppafo.exports.hil.loop import Bench, LockStep, Pace, RealTime, without_collections
+from ppafo.exports.hil.loop import Bench, LockStep, LoopPacing, RealTime, without_collections
 from ppafo.exports.hil.plant import CompiledPlant, check_baud, plant_of
 from ppafo.exports.hil.result import HardwareRun, HostComputer, timing_of
 from ppafo.simulation.sampled import SampledRun
@@ -28,7 +28,7 @@ _SAME_PERIOD = 1.0e-9
 def run_plant(
     plant: CompiledPlant,
     port: wire.Port,
-    pace: Callable[[float], Pace],
+    pace: Callable[[float], LoopPacing],
     patience: float = PATIENCE,
     is_stopped: Callable[[], bool] = lambda: False,
     run: int | None = None,
@@ -85,13 +85,13 @@ def run_at(
                 f"give --set controller.rate={rate}Hz here and to 'ppafo export controller'"
             )
         say(f"calling the controller at {port_name} ...")
-        pace: Callable[[float], Pace] = _lock_step if in_lock_step else RealTime
+        pace: Callable[[float], LoopPacing] = _lock_step if in_lock_step else RealTime
         return run_plant(plant, port, pace, patience, is_stopped)
     finally:
         port.close()
 
 
-def _lock_step(_period: float) -> Pace:
+def _lock_step(_period: float) -> LoopPacing:
     """The pace that waits for each answer, whatever the sample period is."""
     return LockStep()
 

@@ -19,7 +19,7 @@ from scipy.optimize import nnls
 from ppafo.constants import STANDARD_ATMOSPHERE, UNIVERSAL_GAS_CONSTANT
 from ppafo.identification.bench.law import PooledReadings, Values, solve, sought, tolerance, within
 from ppafo.identification.fit import Fit
-from ppafo.identification.residuals import Free
+from ppafo.identification.residuals import FitVariable
 from ppafo.identification.tolerances import Tolerances
 from ppafo.model.gas import choked_flow_constant, critical_pressure_ratio, specific_gas_constant
 from ppafo.model.orifice import sonic_conductance_mass
@@ -64,12 +64,14 @@ ZERO = "zero of the flow meter"
 APPARENT = "gap that a gain of the flow meter looks like"
 
 
-def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[Free, ...]:
+def gas_tolerances(gas: GasAt, tolerances: Tolerances) -> tuple[FitVariable, ...]:
     """Return what is not known exactly of the gas: its temperature [K] and its law [-]."""
     return (*tolerance(TEMPERATURE, gas.temperature_deviation), *within(GAS_LAW, tolerances.law_of_gas))
 
 
-def flow_tolerances(gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float) -> tuple[Free, ...]:
+def flow_tolerances(
+    gas: GasAt, tolerances: Tolerances, names: tuple[str, str], largest: float
+) -> tuple[FitVariable, ...]:
     """Return what is not known exactly of a flow bench; ``names`` are the channels of the pressures.
 
     ``largest`` is the largest reading of the flow meter [kg/s].
@@ -190,7 +192,7 @@ class Paths(NamedTuple):
         """Return the sizes among the numbers of a law."""
         return OpeningSizes(at[self.size], at[self.critical_ratio], at[self.beside])
 
-    def sought(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[Free, ...]:
+    def sought(self, start: OpeningSizes, alone: OpeningSizes) -> tuple[FitVariable, ...]:
         """Return the numbers that are sought; a part of which nothing may be seen has the scale of all of the flow."""
         scale = alone.size if self.beside else 0.0
         return (

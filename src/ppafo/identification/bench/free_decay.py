@@ -32,7 +32,7 @@ from ppafo.identification.bench.decay import (
 )
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
-from ppafo.identification.residuals import Free
+from ppafo.identification.residuals import FitVariable
 from ppafo.identification.source import RecordingSource, check_sources, without_wrong_samples
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.report.kind import TIME, Kind
@@ -201,7 +201,7 @@ def _speed_name(place: int) -> str:
     return f"start speed {place + 1}"
 
 
-def _start_numbers(place: int, push: _Push) -> tuple[Free, Free]:
+def _start_numbers(place: int, push: _Push) -> tuple[FitVariable, FitVariable]:
     """Return the start of a decay, which is sought: angle [rad] and speed [rad/s]."""
     return (
         sought(_angle_name(place), push.angle, scale=push.swept),
@@ -236,7 +236,7 @@ class _Law:
                 series.append(decay.sign * speed)
         return np.concatenate(series)
 
-    def sought_from(self, pushes: Sequence[_Push]) -> tuple[Free, Free]:
+    def sought_from(self, pushes: Sequence[_Push]) -> tuple[FitVariable, FitVariable]:
         """Return damping and friction, which are sought from rough values of all decays."""
         # With viscous damping alone the way is speed over rate, with Coulomb friction alone speed^2 over twice the
         # deceleration: half of each is a start between the two.
@@ -257,7 +257,7 @@ class _Law:
         )
 
 
-def _near_rest(rise: float) -> tuple[Free, ...]:
+def _near_rest(rise: float) -> tuple[FitVariable, ...]:
     """Return the tolerances of seals that grip harder near standstill: by how much, and from which velocity on."""
     most, usual = math.log1p(rise), _USUAL_RISE_VELOCITY
     if not most > 0.0:
@@ -265,8 +265,8 @@ def _near_rest(rise: float) -> tuple[Free, ...]:
     # Between no rise and all of it nothing is known, not even the order of magnitude: an even distribution of the
     # logarithm, its width over the root of 12.
     return (
-        Free(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
-        Free(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
+        FitVariable(_RISE, 0.5 * most, 0.0, 2.0 * most, most, most / math.sqrt(12.0)),
+        FitVariable(_RISE_VELOCITY, usual, _LOWEST_RISE_VELOCITY, _HIGHEST_RISE_VELOCITY, usual, usual),
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.identification.fit import Fit, fit
 from ppafo.identification.noise import SAMPLES_PER_COEFFICIENT
-from ppafo.identification.residuals import Free, ResidualBlock
+from ppafo.identification.residuals import FitVariable, ResidualBlock
 from ppafo.identification.source import RecordingSource
 from ppafo.signals.faults import resolution_of, rounding_of
 from ppafo.signals.recording import Floats
@@ -25,7 +25,7 @@ _WIDEST = 12.0
 """Limits by which a tolerance may be off at most in the search."""
 
 
-def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[Free, ...]:
+def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "") -> tuple[FitVariable, ...]:
     """Return a number known to a standard deviation about its start [SI]; nothing where it is known exactly.
 
     Those of one ``family`` are tested together.
@@ -35,17 +35,17 @@ def tolerance(name: str, deviation: float, start: float = 0.0, family: str = "")
     # The scale of the search is the limit, so that a step of one scale is a likely one.
     limit = math.sqrt(3.0) * deviation
     width = _WIDEST * limit
-    return (Free(name, start, start - width, start + width, limit, deviation, family),)
+    return (FitVariable(name, start, start - width, start + width, limit, deviation, family),)
 
 
-def within(name: str, limit: float, family: str = "") -> tuple[Free, ...]:
+def within(name: str, limit: float, family: str = "") -> tuple[FitVariable, ...]:
     """Return an error of the bench, known within a limit on either side of 0 [SI]; see ``tolerance``."""
     return tolerance(name, deviation_of_limit(limit), family=family)
 
 
-def sought(name: str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0) -> Free:
+def sought(name: str, start: float, low: float = -math.inf, high: float = math.inf, scale: float = 0.0) -> FitVariable:
     """Return a number that is sought [SI]; its scale is its start where none is given."""
-    return Free(name, start, low, high, scale or abs(start) or 1.0)
+    return FitVariable(name, start, low, high, scale or abs(start) or 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +69,7 @@ def recordings_of(sources: tuple[RecordingSource, ...], counts: Iterable[int] = 
 
 
 def solve(
-    law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[Free], confidence: float
+    law: Callable[[Values], Floats], readings: PooledReadings, numbers: Sequence[FitVariable], confidence: float
 ) -> tuple[Fit, Floats]:
     """Return the fit of a law to readings, and what the law gives there, in the unit of what was measured."""
     names, measured = [number.name for number in numbers], readings.measured

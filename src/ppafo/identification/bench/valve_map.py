@@ -17,7 +17,7 @@ from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, flow_tolerances, orifice_shape, read_flow, true_pressure
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
-from ppafo.identification.residuals import Free
+from ppafo.identification.residuals import FitVariable
 from ppafo.identification.source import RecordingSource, check_no_wrong_reading, check_sources, meter_readings, pool
 from ppafo.identification.tolerances import DEFAULTS, Tolerances
 from ppafo.model.effects.spool_play import spool_position
@@ -137,7 +137,7 @@ def _sweep_of(sources: tuple[RecordingSource, ...], flow: Floats) -> Sweep:
     )
 
 
-def _sought(sources: tuple[RecordingSource, ...], sweep: Sweep, areas: Floats, band: str) -> tuple[Free, ...]:
+def _sought(sources: tuple[RecordingSource, ...], sweep: Sweep, areas: Floats, band: str) -> tuple[FitVariable, ...]:
     """Return what is sought, with first guesses from the effective areas [m^2] of the readings; ``band`` is a path."""
     size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
     half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())

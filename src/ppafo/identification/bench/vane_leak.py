@@ -34,7 +34,7 @@ from ppafo.identification.bench.flow import (
 )
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, tolerance, within
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
-from ppafo.identification.residuals import Free
+from ppafo.identification.residuals import FitVariable
 from ppafo.identification.source import (
     RecordingSource,
     check_moves,
@@ -274,7 +274,7 @@ class LeakDecay:
         """Name of the share by which a pressure is off just after filling [-]."""
         return f"relaxation of {sensor}, decay {self.number}"
 
-    def numbers(self) -> Iterator[Free]:
+    def numbers(self) -> Iterator[FitVariable]:
         """Yield the unknowns: initial pressures, the room's within its noise, and initial offsets of the readings."""
         chambers = self.chambers
         pairs = zip(self.sensors, (chambers.first, chambers.second), strict=True)
@@ -354,7 +354,7 @@ def _decaying_leak(
         *_ratio(closed, volume, other_volume, volume_deviation),
         *(number for decay in decays for number in decay.numbers()),
         # Of the logarithm of a time, for only its order of magnitude is known.
-        Free(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
+        FitVariable(_RELAXATION, 0.0, -5.0, math.log(_RELAXED), 1.0, 1.5),
         *gas_tolerances(opening.gas, tolerances),
         *tolerance(_VOLUME, volume_deviation if volume else 0.0),
         *(zero for sensor in decays[0].sensors for zero in within(f"zero of {sensor}", tolerances.zero_of_pressure)),
@@ -395,7 +395,7 @@ def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
 
 def _ratio(
     closed: tuple[ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
-) -> tuple[Free, ...]:
+) -> tuple[FitVariable, ...]:
     """Return the ratio of the volumes [m^3], each known to the relative deviation or sought; none beside a room."""
     changes = [chambers.changes for chambers in closed if chambers.room is None]
     if not changes:

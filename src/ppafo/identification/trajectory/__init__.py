@@ -6,7 +6,7 @@ Each file leans on those before it: ``problem`` says what is requested, ``tolera
 """
 
 from ppafo.identification.tolerances import Tolerances
-from ppafo.identification.trajectory.expected import CandidateExperiment, Expected, expected_information
+from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
 from ppafo.identification.trajectory.experiment import FittedExperiment
 from ppafo.identification.trajectory.fitting import ChannelFit, TrajectoryFit, fit
 from ppafo.identification.trajectory.numbers import FreeParameter
@@ -16,7 +16,7 @@ from ppafo.identification.trajectory.tolerances import tolerance_parameters
 __all__ = [
     "CandidateExperiment",
     "ChannelFit",
-    "Expected",
+    "ExpectedBenefit",
     "FittedExperiment",
     "FreeParameter",
     "Tolerances",

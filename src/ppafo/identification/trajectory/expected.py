@@ -33,7 +33,7 @@ class CandidateExperiment:
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
+class ExpectedBenefit:
     """Expected benefit of a candidate experiment.
 
     ``gain`` is half the growth of the logarithm of the determinant of the information on the numbers sought [-]
@@ -47,7 +47,7 @@ class Expected:
     most_helped: str
 
 
-def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[Expected, ...]:
+def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExperiment]) -> tuple[ExpectedBenefit, ...]:
     """Return what each candidate would bring, the most informative first.
 
     IdentificationError for a candidate without noise in a channel that can be fitted.
@@ -55,7 +55,7 @@ def expected_information(fit: TrajectoryFit, candidates: Sequence[CandidateExper
     return tuple(sorted((_expect(fit, one) for one in candidates), key=lambda one: -one.gain))
 
 
-def _expect(fit: TrajectoryFit, candidate: CandidateExperiment) -> Expected:
+def _expect(fit: TrajectoryFit, candidate: CandidateExperiment) -> ExpectedBenefit:
     noise = dict(candidate.noise) or dict(fit.fit.noise)
     if not noise or any(name not in FITTED_CHANNELS or not one > 0.0 for name, one in noise.items()):
         raise IdentificationError(
@@ -96,4 +96,4 @@ def _expect(fit: TrajectoryFit, candidate: CandidateExperiment) -> Expected:
     shrinkage = {fit.numbers[index].free.name: math.sqrt(max(after[index, index], 0.0)) for index in sought}
     part = np.ix_(sought, sought)
     gain = 0.5 * float(np.linalg.slogdet(before[part])[1] - np.linalg.slogdet(after[part])[1])
-    return Expected(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))
+    return ExpectedBenefit(candidate.label, gain, shrinkage, min(shrinkage, key=lambda name: shrinkage[name]))

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
-from ppafo.identification.source import Use
+from ppafo.identification.source import UsedRecording
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.channels import (
     ANGLE,
@@ -154,11 +154,11 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     return scenario
 
 
-def use_of(experiment: FittedExperiment) -> Use:
+def use_of(experiment: FittedExperiment) -> UsedRecording:
     """Return what of its recording an experiment is compared with."""
     last = float(experiment.recording.time[-1])
     trace = experiment.source or experiment.recording.label
-    return Use(
+    return UsedRecording(
         f"experiment '{experiment.label}'",
         trace,
         experiment.recording,

@@ -56,7 +56,7 @@ class ChannelFit:
 
 
 @dataclass(frozen=True, slots=True)
-class Known:
+class NuisanceParameter:
     """A tolerance in the SI unit of its number: what it was thought to be, and what the recordings make of it.
 
     ``widens`` is the number that is sought whose interval it widens most, ``share`` its fraction of the variance there.
@@ -88,7 +88,7 @@ class TrajectoryFit:
     estimates: tuple[Estimate, ...]
     covariance: Floats
     correlation: Floats
-    known: tuple[Known, ...]
+    known: tuple[NuisanceParameter, ...]
     channels: tuple[ChannelFit, ...]
     models: tuple[Recording, ...]
     measurements: tuple[Recording, ...]
@@ -251,14 +251,14 @@ def _in_unit(value: float, estimate: Estimate) -> str:
     return f"{value:.4g}" if estimate.unit in ("", "-") else f"{value:.4g} {estimate.unit}"
 
 
-def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> Known:
+def _known(fitted: Fit, number: FitNumber, row: int, error: float, estimates: Sequence[Estimate]) -> NuisanceParameter:
     """Return what a fit says of a number that is known to a tolerance, and whose interval that widens most."""
     name, free = number.free.name, number.free
     shares = {estimate.path: dict(fitted.shares[estimate.path]).get(name, 0.0) for estimate in estimates}
     widens = max(shares, key=lambda path: shares[path], default="")
     before, before_error = _in_its_unit(number, free.start, free.deviation)
     after, after_error = _in_its_unit(number, float(fitted.values[row]), error)
-    return Known(
+    return NuisanceParameter(
         name=name,
         unit=number.unit,
         before=before,

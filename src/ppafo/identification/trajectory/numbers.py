@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ppafo.errors import IdentificationError, nearest_name
-from ppafo.identification.residuals import Free
+from ppafo.identification.residuals import FitVariable
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, refuse_first, scenario_of
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
@@ -146,7 +146,7 @@ class FitNumber:
 
     path: str
     unit: str
-    free: Free
+    free: FitVariable
     recordings: tuple[str, ...]
     is_tolerance: bool
     is_logarithm: bool
@@ -180,7 +180,7 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     scale = abs(start) or 0.5 * (high - low)
     if math.isfinite(parameter.deviation):
         scale = _SCALE * parameter.deviation
-    free = Free(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
+    free = FitVariable(full_path(parameter.name, scenarios[0]), start, low, high, scale, parameter.deviation)
     unit = quantity.unit.removesuffix("_a").removesuffix("_d") or "-"
     return FitNumber(path, unit, free, parameter.recordings, parameter.is_tolerance, parameter.is_logarithm)
 

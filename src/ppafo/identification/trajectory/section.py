@@ -12,9 +12,9 @@ from typing import NamedTuple
 from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_name
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.keys import positive_in, quantity_in
-from ppafo.identification.source import RecordingSource, Use, double_use, told_of_readings
+from ppafo.identification.source import RecordingSource, UsedRecording, double_use, told_of_readings
 from ppafo.identification.tolerances import Tolerances, quantity_of
-from ppafo.identification.trajectory.expected import CandidateExperiment, Expected, expected_information
+from ppafo.identification.trajectory.expected import CandidateExperiment, ExpectedBenefit, expected_information
 from ppafo.identification.trajectory.experiment import (
     FITTED_CHANNELS,
     INPUTS,
@@ -60,7 +60,7 @@ class SectionContext:
     parameter_set: ParameterSet | None = None
     valve: str | None = None
     bench: Mapping[str, Estimate] = field(default_factory=dict)
-    used: tuple[Use, ...] = ()
+    used: tuple[UsedRecording, ...] = ()
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
@@ -240,7 +240,7 @@ class TrajectoryOutcome:
     """The fit, candidates by what they would bring, the best first, and remarks on recordings and on the fit."""
 
     fit: TrajectoryFit
-    expected: tuple[Expected, ...]
+    expected: tuple[ExpectedBenefit, ...]
     remarks: tuple[str, ...]
 
     @property

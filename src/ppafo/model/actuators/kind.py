@@ -112,7 +112,7 @@ class ShapedPlant(Protocol):
     """Torque T_ex [N m]."""
 
 
-class AtRest(NamedTuple):
+class UnpressurisedPlant(NamedTuple):
     """The part of a plant that a kind's ``chambers`` read, where pressures count from the atmosphere."""
 
     shape: Any
@@ -121,7 +121,7 @@ class AtRest(NamedTuple):
 
 def mean_growth(shape: Any, stops: Range, gauge: float, chambers: Callable[..., Chambers]) -> float:
     """Mean growth of chamber 1 between the stops [m^3/rad] at a gauge pressure [Pa]: torque per pressure, too."""
-    still = AtRest(shape, 0.0)
+    still = UnpressurisedPlant(shape, 0.0)
     first = chambers(still, stops.angle_min, gauge, 0.0).volume_1
     last = chambers(still, stops.angle_max, gauge, 0.0).volume_1
     # 1e-9 rad: stops that coincide must not divide by 0.

@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import Number
-from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.effects.kind import Effect, PlantSnapshot, State
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import follow, follow_rate
 
@@ -55,13 +55,13 @@ def as_they_show(
     )
 
 
-def start(_bandwidth: SensorRates, now: Moment) -> SensorState:
+def start(_bandwidth: SensorRates, now: PlantSnapshot) -> SensorState:
     """State of sensors that show the true values when a run begins."""
     return SensorState(angle=now.angle, pressure_1=now.pressure_1, pressure_2=now.pressure_2)
 
 
 def advance(
-    bandwidth: SensorRates, bandwidth_state: SensorState, before: Moment, after: Moment, step: float
+    bandwidth: SensorRates, bandwidth_state: SensorState, before: PlantSnapshot, after: PlantSnapshot, step: float
 ) -> SensorState:
     """Sensor readings after a step [s] over which the true values are linear in time; exact."""
     pressure = bandwidth.pressure
@@ -72,7 +72,7 @@ def advance(
     )
 
 
-def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: Moment) -> SensorState:
+def slopes(bandwidth: SensorRates, bandwidth_state: SensorState, now: PlantSnapshot) -> SensorState:
     """Rates of what the sensors show [rad/s, Pa/s]."""
     return SensorState(
         angle=follow_rate(bandwidth.angle, bandwidth_state.angle, now.angle),

@@ -3,7 +3,7 @@
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import Number
-from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.effects.kind import Effect, PlantSnapshot, State
 from ppafo.model.elementary import logarithm
 from ppafo.model.ports import opening_time
 from ppafo.model.sensors import decay_factors
@@ -81,7 +81,7 @@ def opening_when_warm(time: float, is_coil_a: float, coil_heating: CoilHeating, 
 
 
 def advance(
-    coil_heating: CoilHeating, coil_heating_state: CoilRises, _before: Moment, after: Moment, step: float
+    coil_heating: CoilHeating, coil_heating_state: CoilRises, _before: PlantSnapshot, after: PlantSnapshot, step: float
 ) -> CoilRises:
     """Rises [K] after a step [s] with one command: ``dx/dt = (x_s on - x) / tau``, solved exactly."""
     on_a, on_b = coil_commands(after.command)
@@ -92,7 +92,7 @@ def advance(
     )
 
 
-def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: Moment) -> CoilRises:
+def slopes(coil_heating: CoilHeating, coil_heating_state: CoilRises, now: PlantSnapshot) -> CoilRises:
     """Rates [K/s] of the rises in temperature of both coils."""
     on_a, on_b = coil_commands(now.command)
     return CoilRises(

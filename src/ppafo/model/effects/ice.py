@@ -3,7 +3,7 @@
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import Number
-from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.effects.kind import Effect, PlantSnapshot, State
 from ppafo.model.ports import exhaust_path
 from ppafo.model.sensors import decay_factors
 
@@ -39,14 +39,14 @@ def narrowed(conductance: float, ice_state: IceState) -> float:
     return exhaust_path(conductance / (1.0 + max(ice_state.blockage, 0.0)))
 
 
-def advance(ice: Ice, ice_state: IceState, _before: Moment, after: Moment, step: float) -> IceState:
+def advance(ice: Ice, ice_state: IceState, _before: PlantSnapshot, after: PlantSnapshot, step: float) -> IceState:
     """Blockage [-] after a step [s] with the mean flow in it: ``ds/dt = g m' - s / tau``, solved exactly."""
     # Only gas that leaves grows ice; what flows in from the atmosphere does not melt it either.
     kept, mean = decay_factors(ice.melting, step)
     return IceState(kept * ice_state.blockage + step * mean * ice.blockage_per_gas * max(after.vented_flow, 0.0))
 
 
-def slopes(ice: Ice, ice_state: IceState, now: Moment) -> IceState:
+def slopes(ice: Ice, ice_state: IceState, now: PlantSnapshot) -> IceState:
     """Rates [1/s] at which ice blocks the vents."""
     # The same balance as in ``advance``, for the solver in continuous time.
     return IceState(ice.blockage_per_gas * max(now.vented_flow, 0.0) - ice.melting * ice_state.blockage)

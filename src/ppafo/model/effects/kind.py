@@ -17,7 +17,7 @@ SECTION = "effects"
 """Section of a parameter set, and begin of the paths, that hold the settings of effects."""
 
 
-class Moment(NamedTuple):
+class PlantSnapshot(NamedTuple):
     """State of the plant that an effect depends on: angle [rad], its rate [rad/s], absolute pressures [Pa].
 
     Flows [kg/s] from the supplies and to the atmosphere, and the command that the valve has [-]. At both ends of a step
@@ -48,9 +48,9 @@ class State:
     """
 
     row: type
-    start: Callable[[Any, Moment], Any] | None
-    advance: Callable[[Any, Any, Moment, Moment, float], Any]
-    slopes: Callable[[Any, Any, Moment], Any]
+    start: Callable[[Any, PlantSnapshot], Any] | None
+    advance: Callable[[Any, Any, PlantSnapshot, PlantSnapshot, float], Any]
+    slopes: Callable[[Any, Any, PlantSnapshot], Any]
     tolerances: tuple[float, ...] = ()
     settle: Callable[[Any, Any, float], Any] | None = None
 

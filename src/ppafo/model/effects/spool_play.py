@@ -3,7 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from ppafo.model.declaration import Number
-from ppafo.model.effects.kind import Effect, Moment, State
+from ppafo.model.effects.kind import Effect, PlantSnapshot, State
 from ppafo.model.ports import at_valve
 from ppafo.model.valves.kind import VENTS_ABOVE
 
@@ -52,13 +52,13 @@ def settle(_spool_play: SpoolPlay, spool_play_state: SpoolPlace, command: float)
 
 
 def advance(
-    spool_play: SpoolPlay, spool_play_state: SpoolPlace, _before: Moment, after: Moment, step: float
+    spool_play: SpoolPlay, spool_play_state: SpoolPlace, _before: PlantSnapshot, after: PlantSnapshot, step: float
 ) -> SpoolPlace:
     """The spool after a step [s], in which its command stays what it is; exact."""
     return settle(spool_play, spool_play_state, after.command)
 
 
-def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: Moment) -> SpoolPlace:
+def slopes(_spool_play: SpoolPlay, _spool_play_state: SpoolPlace, _now: PlantSnapshot) -> SpoolPlace:
     """Rate [1/s] of the spool in its play: none, for it moves with the command alone."""
     return SpoolPlace(0.0)
 

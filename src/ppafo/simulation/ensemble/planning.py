@@ -32,7 +32,7 @@ Rule = Callable[[Scenario], tuple[Problem, ...]]
 
 
 @dataclass(slots=True)
-class Screen:
+class ValidRuns:
     """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not.
 
     Without a ``clock`` it is the scenario's.
@@ -57,7 +57,7 @@ class Screen:
             controller=replace(scenario.controller, period=clock.period),
         )
 
-    def at(self, places: Members) -> "Screen":
+    def at(self, places: Members) -> "ValidRuns":
         """The screen of some of these runs, which writes its reasons to the same place."""
         clock = self.clock
         if clock is not None:
@@ -65,7 +65,7 @@ class Screen:
             kept: list[Any] = [time[places] if isinstance(time, np.ndarray) else time for time in times]
             clock = RunTimes(*kept)
         values = {path: column[places] for path, column in self.columns.values.items()}
-        return Screen(replace(self.columns, values=values), self.members[places], self.reasons, clock)
+        return ValidRuns(replace(self.columns, values=values), self.members[places], self.reasons, clock)
 
     def refuse(self, is_bad: Any, line: Callable[[int], str]) -> None:
         """Drop runs, by a mask over those left or one truth value for all; ``line(place)`` says why."""
@@ -78,9 +78,9 @@ class Screen:
         self.members, self.columns, self.clock = left.members, left.columns, left.clock
 
 
-def screen_columns(columns: ScenarioColumns) -> Screen:
+def screen_columns(columns: ScenarioColumns) -> ValidRuns:
     """The runs whose values are in range and fit together."""
-    screen = Screen(columns, np.arange(columns.runs), {})
+    screen = ValidRuns(columns, np.arange(columns.runs), {})
     for path in columns.values:
         # A default that follows others goes where they lead it, as it does in a single run.
         if path in columns.given or not columns.declared[path].follows:
@@ -135,7 +135,9 @@ def plan_ensemble(columns: ScenarioColumns, change: Callable[[Run], Run] | None 
     return EnsemblePlan(tuple(batches), screen.reasons)
 
 
-def _plan_batches(screen: Screen, places: Members, change: Callable[[Run], Run] | None) -> list[tuple[Members, Batch]]:
+def _plan_batches(
+    screen: ValidRuns, places: Members, change: Callable[[Run], Run] | None
+) -> list[tuple[Members, Batch]]:
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:

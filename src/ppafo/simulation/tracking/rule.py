@@ -48,7 +48,7 @@ SMALLEST_MOVE = 0.01
 SMALLEST_CHANGE = 0.05
 """Smallest wanted change over the whole range of what is controlled [-]: smaller ones are judged as if so large."""
 SMALLEST_SIZE = 5.0e-4
-"""The same where the range is 0, in sizes of what is controlled (``Controlled.size``)."""
+"""The same where the range is 0, in sizes of what is controlled (``ControlledQuantity.size``)."""
 
 REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""

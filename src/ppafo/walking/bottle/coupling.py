@@ -87,7 +87,7 @@ def run_on_bottle(
     ``device`` is what the run was planned for; ``stride_time`` [s] is how long a stride takes; ``progress`` gets the
     minutes done and in all.
     """
-    use = _Use([_Meeting(0.0, supply.start(), supply.offers_first())])
+    use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
     result, done = _use_bottle(run, device, supply, stride_time, use, progress)
     count = batch_of(run).clock.step_count
     record = result.record if done == count else result.record[: (done - 1) // int(run.record_every) + 1]
@@ -106,7 +106,7 @@ def life_on_bottle(
 
     The run is planned for as long as may be walked at most.
     """
-    use = _Use([_Meeting(0.0, supply.start(), supply.offers_first())])
+    use = _BottleInUse([_Meeting(0.0, supply.start(), supply.offers_first())])
     while use.ending is None and use.walked + use.rested < schedule.longest:
         _use_bottle(run, device, supply, stride_time, use, progress, schedule)
     length = batch_of(run).clock.step_count * run.step if run.program.takes_task_sequence else stride_time
@@ -122,7 +122,7 @@ class _Meeting(NamedTuple):
 
 
 @dataclass(slots=True)
-class _Use:
+class _BottleInUse:
     """A bottle in use: where it met the device, time walked and rested [s], gas through its regulator [kg]."""
 
     met: list[_Meeting]
@@ -132,7 +132,7 @@ class _Use:
     ending: SupplyEnding | None = None
 
 
-def _course_of_use(supply: BottleSupply, use: _Use) -> SupplyCourse:
+def _course_of_use(supply: BottleSupply, use: _BottleInUse) -> SupplyCourse:
     """Return what a bottle went through; a use that nothing ended went to the end of the walk."""
     last = use.met[-1]
     over = f"the walk is over, and {_grams(last.state.mass)} are left in the bottle"
@@ -172,7 +172,7 @@ def _use_bottle(
     device: Device,
     supply: BottleSupply,
     stride_time: float,
-    use: _Use,
+    use: _BottleInUse,
     progress: Callable[[float, float], None],
     schedule: Schedule | None = None,
 ) -> tuple[BatchResult, int]:
@@ -239,7 +239,7 @@ def _met_again(supply: BottleSupply, meeting: _Meeting, drawn: float, duration: 
     return _Meeting(time, state, supply.offers(state, content.temperature, drawn))
 
 
-def _rest(supply: BottleSupply, use: _Use, rest: float) -> None:
+def _rest(supply: BottleSupply, use: _BottleInUse, rest: float) -> None:
     """Let a bottle warm for a time [s] in which no gas flows."""
     parts = max(1, math.ceil(rest / _RESTING))
     for _ in range(parts):

@@ -12,7 +12,7 @@ from ppafo.analyses.compare.question import compare
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import NormalAround
 from ppafo.studies.draws import Uncertainty
-from ppafo.studies.study import Drawn
+from ppafo.studies.study import RandomValue
 
 
 def test_pairs_are_counted_and_incomplete_ones_left_out() -> None:
@@ -41,7 +41,7 @@ def test_more_is_better_where_the_metric_says_so() -> None:
 
 
 def test_configurations_that_are_equally_good_are_called_different_no_more_often_than_is_said() -> None:
-    normals = Uncertainty(tuple(Drawn(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
+    normals = Uncertainty(tuple(RandomValue(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
     differs, is_better = [], []
     for seed in range(300):
         drawn = normals.replicated_columns(0, 256, seed)

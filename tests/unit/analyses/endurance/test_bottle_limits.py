@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from ppafo.analyses.endurance.discharge import Discharge, discharge
-from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, Bottle, load_bottle
 from ppafo.walking.bottle.coupling import Schedule
 
@@ -24,7 +24,7 @@ def properties() -> Any:
 
 def emptied(bottle: Bottle, flow: float, longest: float = DAY, walk: float = 600.0, rest: float = 0.0) -> Discharge:
     """The course under a flow [kg/s]."""
-    return discharge(bottle, draw_of_numbers(flow, 1.0, None), Schedule(walk, rest, longest))
+    return discharge(bottle, demand_of_numbers(flow, 1.0, None), Schedule(walk, rest, longest))
 
 
 def boiled_adiabatically(properties: Any, bottle: Bottle, drawn: float, steps: int = 400) -> tuple[float, float]:

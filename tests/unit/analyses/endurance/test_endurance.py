@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.endurance.answer import Endurance, Endurances
-from ppafo.analyses.endurance.draw import draw_of_numbers, draw_of_recording
+from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.errors import DataError, ParameterError
@@ -19,7 +19,7 @@ WITHOUT_REST = Schedule(600.0, 0.0, 86400.0)
 
 def lasting(grams: float, *overrides: str, schedule: Schedule = WITHOUT_REST, peak: float | None = None) -> Endurance:
     """The paper's bottle under a gas use per stride of 1.1 s."""
-    return follow_bottle(load_bottle(PAPER_BOTTLE, overrides), draw_of_numbers(grams * 1e-3, 1.1, peak), schedule)
+    return follow_bottle(load_bottle(PAPER_BOTTLE, overrides), demand_of_numbers(grams * 1e-3, 1.1, peak), schedule)
 
 
 def staircase(mass: float, duration: float, opened: float) -> Recording:
@@ -104,11 +104,11 @@ def test_schedules_that_cannot_be_are_refused(schedule: Schedule) -> None:
 @pytest.mark.parametrize(("mass", "time", "peak"), [(0.0, 1.1, None), (3e-4, 0.0, None), (3e-4, 1.1, 1e-4)])
 def test_numbers_that_cannot_be_are_refused(mass: float, time: float, peak: float | None) -> None:
     with pytest.raises(ParameterError):
-        draw_of_numbers(mass, time, peak)
+        demand_of_numbers(mass, time, peak)
 
 
 def test_the_draw_of_a_recording_is_its_gain_its_time_and_its_largest_flow() -> None:
-    draw = draw_of_recording(staircase(6e-4, 2.2, 0.4), 1.1)
+    draw = demand_of_recording(staircase(6e-4, 2.2, 0.4), 1.1)
     assert draw.mass_per_stride == pytest.approx(3e-4)
     assert draw.mean_flow == pytest.approx(6e-4 / 2.2)
     assert draw.peak_flow == pytest.approx(6e-4 / 0.4, rel=1e-9)
@@ -117,11 +117,11 @@ def test_the_draw_of_a_recording_is_its_gain_its_time_and_its_largest_flow() -> 
 
 
 def test_all_of_a_recording_is_one_step_unless_the_time_of_a_step_is_given() -> None:
-    assert draw_of_recording(staircase(6e-4, 2.2, 0.4), None).mass_per_stride == pytest.approx(6e-4)
+    assert demand_of_recording(staircase(6e-4, 2.2, 0.4), None).mass_per_stride == pytest.approx(6e-4)
 
 
 def test_a_recording_lasts_as_the_same_numbers_do() -> None:
-    draw = draw_of_recording(staircase(3e-4, 1.1, 1.1), None)
+    draw = demand_of_recording(staircase(3e-4, 1.1, 1.1), None)
     bottle = load_bottle(PAPER_BOTTLE)
     assert follow_bottle(bottle, draw, WITHOUT_REST).discharge.strides == pytest.approx(
         lasting(0.3).discharge.strides, rel=1e-6
@@ -131,7 +131,7 @@ def test_a_recording_lasts_as_the_same_numbers_do() -> None:
 def test_a_little_gas_that_flows_back_into_the_line_is_taken_off() -> None:
     supplied = Channel(np.array([0.0, 3e-4, 2.9e-4, 6e-4]), "kg")
     recording = Recording("walk", np.array([0.0, 1.0, 1.5, 2.0]), {"supplied_mass": supplied})
-    assert draw_of_recording(recording, None).mass_per_stride == pytest.approx(6e-4)
+    assert demand_of_recording(recording, None).mass_per_stride == pytest.approx(6e-4)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ def test_recordings_that_say_nothing_of_a_gas_use_are_refused(
     recording: Recording, stride_time: float | None, words: str
 ) -> None:
     with pytest.raises(DataError, match=words):
-        draw_of_recording(recording, stride_time)
+        demand_of_recording(recording, stride_time)
 
 
 def test_the_verb_takes_numbers_as_the_command_takes_texts() -> None:

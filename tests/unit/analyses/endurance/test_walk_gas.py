@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from ppafo.analyses.endurance.answer import Endurance
-from ppafo.analyses.endurance.draw import largest_flow
+from ppafo.analyses.endurance.gas_demand import largest_flow
 from ppafo.analyses.endurance.question import bottle as endurance
 from ppafo.analyses.endurance.solve import endurance_of_walk
-from ppafo.analyses.endurance.walk_gas import WalkGas, draw_of_walk, read_walk_gas, walk_gas
+from ppafo.analyses.endurance.walk_gas import WalkGas, demand_of_walk, read_walk_gas, walk_gas
 from ppafo.cli.main import main
 from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE
@@ -63,7 +63,7 @@ def test_a_folder_says_what_the_walk_says(tmp_path: Path) -> None:
     here = walk_gas(solenoid())
     read = read_walk_gas(folder_of(here, tmp_path / "walk"))
     assert replace(read, recording=here.recording, scenario=here.scenario) == here
-    assert draw_of_walk(read) == draw_of_walk(here)
+    assert demand_of_walk(read) == demand_of_walk(here)
     assert read.gas_per_stride == solenoid().metrics["gas"].value
 
 
@@ -176,7 +176,7 @@ def test_several_recordings_have_one_folder_and_none_comes_twice(
 
 def test_a_walk_without_gas_lasts_for_ever() -> None:
     with pytest.raises(DataError, match="never be empty"):
-        draw_of_walk(replace(pulses(5.0), gas_per_stride=0.0))
+        demand_of_walk(replace(pulses(5.0), gas_per_stride=0.0))
 
 
 def test_the_largest_flow_is_that_of_the_bottles_regulator_where_there_are_lines() -> None:

@@ -12,7 +12,7 @@ import pytest
 
 import ppafo
 from ppafo.analyses.linearise.answer import finding_of, steps_of
-from ppafo.analyses.linearise.model import Edge, LinearModel
+from ppafo.analyses.linearise.model import LinearModel, SlopeKink
 from ppafo.analyses.linearise.question import linearise
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.engine.continuous_time import flows_at
@@ -175,7 +175,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     at_stop = linear("step-response")
     assert at_stop.sides["ankle"] == "against a stop"
     assert "straight line" in at_stop.sides["source to chamber 1"]
-    assert at_stop.edges == (Edge("command", is_above=False),)
+    assert at_stop.edges == (SlopeKink("command", is_above=False),)
     assert "the column of `command` holds below 1, and another one above it" in text_of(finding_of(at_stop))
     assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
     deaf = linear(TASK, 0.1, ["valve.dead_band=0.5"])
@@ -206,7 +206,7 @@ def test_at_a_closed_valve_the_model_is_that_of_an_opening_to_chamber_1(
 ) -> None:
     model = linear(TASK, time, overrides)
     run = plan_run(model.scenario)
-    assert model.edges == (Edge("command", is_above=True),)
+    assert model.edges == (SlopeKink("command", is_above=True),)
     at = {item.name: item.value for item in (*model.outputs, *model.states, *model.inputs)} | {"external_torque": 0.0}
     closed, opened = (of_the_textbook(run, None, {**at, "command": command}) for command in (0.0, 1e-3))
     slopes = [1e3 * (opened[row] - closed[row]) for row in ("rate of pressure_1", "rate of pressure_2")]

@@ -9,19 +9,19 @@ import pytest
 from scipy.stats import qmc
 
 from ppafo.analyses.sensitivity.answer import overlapping_pairs, remarks
-from ppafo.analyses.sensitivity.methods import METHODS, Evaluated, changes
+from ppafo.analyses.sensitivity.methods import METHODS, EvaluatedBlocks, changes
 from ppafo.analyses.sensitivity.question import sensitivity
 from ppafo.analyses.sensitivity.solve import Influences, SensitivitySettings, analyse
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, OneOf, UniformBetween
 from ppafo.studies.draws import Uncertainty
-from ppafo.studies.study import Drawn
+from ppafo.studies.study import RandomValue
 from ppafo.study.runs import Runs
 
 METRIC = "rms_error"
 A, B = 7.0, 0.1
 Model = Callable[[Mapping[str, Floats]], Mapping[str, Floats]]
-ANGLES = Uncertainty(tuple(Drawn(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
+ANGLES = Uncertainty(tuple(RandomValue(name, UniformBetween(-math.pi, math.pi)) for name in ("x1", "x2", "x3")))
 
 
 def analysed(model: Model, uncertainty: Uncertainty, method: str, settings: SensitivitySettings) -> Influences:
@@ -75,7 +75,7 @@ def test_the_result_is_the_same_every_time() -> None:
 
 
 def test_a_distribution_without_ends_has_finite_effects() -> None:
-    normal = Uncertainty((Drawn("x1", NormalAround(0.0, 1.0)), Drawn("x2", NormalAround(5.0, 2.0))))
+    normal = Uncertainty((RandomValue("x1", NormalAround(0.0, 1.0)), RandomValue("x2", NormalAround(5.0, 2.0))))
 
     def first(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         return {METRIC: columns["x1"].copy()}
@@ -201,10 +201,10 @@ def test_the_band_of_the_change_holds_where_the_metric_bends() -> None:
 def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_whatever_the_distribution() -> None:
     mixed = Uncertainty(
         (
-            Drawn("x1", NormalAround(0.0, 2.0)),
-            Drawn("x2", OneOf((3.0, 4.0), (0.5, 1.0))),
-            Drawn("x3", OneOf((0.0, 1.0), (0.97, 1.0))),
-            Drawn("x4", LogNormalAround(1.0, 2.0)),
+            RandomValue("x1", NormalAround(0.0, 2.0)),
+            RandomValue("x2", OneOf((3.0, 4.0), (0.5, 1.0))),
+            RandomValue("x3", OneOf((0.0, 1.0), (0.97, 1.0))),
+            RandomValue("x4", LogNormalAround(1.0, 2.0)),
         )
     )
     model = linear_in({"x1": 1.0, "x2": -5.0, "x3": 2.0, "x4": 1.0})
@@ -217,7 +217,7 @@ def test_the_change_of_a_linear_function_is_slope_times_distance_of_the_ends_wha
 
 def test_a_correlated_value_goes_along_in_the_change() -> None:
     # x2 does nothing by itself; where it is high, x1 is.
-    drawn = (Drawn("x1", NormalAround(0.0, 1.0)), Drawn("x2", NormalAround(5.0, 3.0)))
+    drawn = (RandomValue("x1", NormalAround(0.0, 1.0)), RandomValue("x2", NormalAround(5.0, 3.0)))
     together = Uncertainty(drawn, ((1.0, 0.0), (-0.8, 0.6)))
     found = analysed(linear_in({"x1": 2.0}), together, "shapley", SensitivitySettings(4096)).metrics[0]
     whole = 2.0 * 2.0 * 1.6448536269514722
@@ -247,7 +247,7 @@ def test_shapley_effects_of_correlated_values_are_the_known_ones_and_their_bands
     truth = shapley_of_linear(slopes, correlation * np.outer(sizes, sizes))
     factor = tuple(tuple(row) for row in np.linalg.cholesky(correlation).tolist())
     names = ("x1", "x2", "x3")
-    drawn = tuple(Drawn(name, NormalAround(3.0, size)) for name, size in zip(names, sizes.tolist(), strict=True))
+    drawn = tuple(RandomValue(name, NormalAround(3.0, size)) for name, size in zip(names, sizes.tolist(), strict=True))
     model = linear_in(dict(zip(names, slopes.tolist(), strict=True)))
     held = []
     for seed in range(1, 41):
@@ -354,6 +354,6 @@ def test_the_band_of_a_change_has_what_the_metric_bends_beside_the_spread(
         drawn = points.reshape(-1, 2)
         values = metric(drawn[:, 0]) + 0.1 * drawn[:, 1]
         ends = np.array([[0.05, 0.05], [0.95, 0.95]])
-        change, band = changes(Evaluated(drawn, drawn, values, np.arange(len(points)), ends, seed), 0.95)
+        change, band = changes(EvaluatedBlocks(drawn, drawn, values, np.arange(len(points)), ends, seed), 0.95)
         held += bool(abs(change[0] - np.diff(metric(np.array([0.05, 0.95])))[0]) <= band[0])
     assert held >= fewest

@@ -26,7 +26,7 @@ from ppafo.progress import Progress
 from ppafo.storage.files import LEFT_ASIDE
 from ppafo.storage.places import place_at
 from ppafo.study.sent_plugins import SentPlugin, take_plugins
-from ppafo.study.store import ChunkTask, Finished, work_on_chunk
+from ppafo.study.store import ChunkTask, FinishedChunk, work_on_chunk
 from tests.virtual_wire import free_port
 
 pytestmark = pytest.mark.skipif(not find_spec("distributed"), reason="needs the extra 'cluster'")
@@ -99,7 +99,7 @@ def test_workers_that_write_elsewhere_are_noticed(
         sweep(small, out=tmp_path / "out", scheduler=two_workers.scheduler_address)
 
 
-def _written_elsewhere(address: str, task: ChunkTask, number: int) -> Finished:
+def _written_elsewhere(address: str, task: ChunkTask, number: int) -> FinishedChunk:
     return work_on_chunk(replace(task, address=address), number)
 
 
@@ -172,7 +172,7 @@ def test_workers_get_the_modules_of_the_person(
         take_plugins([SentPlugin(Plugin("my_law", str(tmp_path)), (("my_law.py", b"KIND = 1"),))])
 
 
-def _on_another_computer(task: ChunkTask, number: int) -> Finished:
+def _on_another_computer(task: ChunkTask, number: int) -> FinishedChunk:
     """Compute where the folder of the module is not there."""
     moved = [replace(item, plugin=replace(item.plugin, folder="/nowhere")) for item in task.plugins]
     assert [name for name, _ in moved[0].files] == ["my_metric.py", "my_number.py"]

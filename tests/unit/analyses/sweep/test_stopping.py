@@ -13,12 +13,12 @@ from ppafo.analyses.sweep.stopping import StatisticEstimate, StoppingRule, stopp
 from ppafo.errors import StudyError
 from ppafo.studies.distributions import Floats, LogNormalAround, NormalAround, UniformBetween, replicates_interval
 from ppafo.studies.draws import REPLICATES, Uncertainty
-from ppafo.studies.study import Drawn
+from ppafo.studies.study import RandomValue
 from ppafo.study.runs import Runs
 
 METRIC = "rms_error"
 SIGMA = 0.5
-UNCERTAIN = Uncertainty((Drawn("x", LogNormalAround(1.0, math.exp(SIGMA))),))
+UNCERTAIN = Uncertainty((RandomValue("x", LogNormalAround(1.0, math.exp(SIGMA))),))
 MEAN = math.exp(0.5 * SIGMA**2)
 NORMAL = NormalDist(sigma=SIGMA)
 STUDY = "torque-task-uncertainty"
@@ -99,7 +99,7 @@ def test_without_the_correction_they_would_not() -> None:
     assert np.mean(held) < 0.88
 
 
-NORMALS = Uncertainty(tuple(Drawn(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
+NORMALS = Uncertainty(tuple(RandomValue(f"x{number}", NormalAround(0.0, 1.0)) for number in range(6)))
 
 
 def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
@@ -124,7 +124,7 @@ def test_a_mean_that_a_few_draws_carry_is_not_believed_and_drawn_on() -> None:
 
 
 def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> None:
-    rare = Uncertainty((Drawn("x0", UniformBetween(0.0, 1.0)),))
+    rare = Uncertainty((RandomValue("x0", UniformBetween(0.0, 1.0)),))
 
     def outcomes(share: float) -> Model:
         def run(columns: Mapping[str, Floats]) -> dict[str, Floats]:
@@ -154,7 +154,7 @@ def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:
     def jumps(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         return {METRIC: 3.0 + columns["x0"] + 10.0 * (columns["x1"] < 0.0019)}
 
-    uncertain = Uncertainty(tuple(Drawn(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
+    uncertain = Uncertainty(tuple(RandomValue(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
     rule = StoppingRule(0.1, is_relative=False, first=256, maximum=2**16)
     for seed in range(20):
         found = drawn_until(jumps, uncertain, mean_of("N m"), rule, seed)
@@ -170,7 +170,7 @@ def test_a_mean_that_is_met_holds_beside_a_jump_that_hardly_ever_comes(share: fl
     def jumps(columns: Mapping[str, Floats]) -> dict[str, Floats]:
         return {METRIC: 3.0 + columns["x0"] + size * (columns["x1"] < share)}
 
-    uncertain = Uncertainty(tuple(Drawn(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
+    uncertain = Uncertainty(tuple(RandomValue(f"x{place}", UniformBetween(0.0, 1.0)) for place in range(2)))
     rule, truth = StoppingRule(0.01, is_relative=True, first=256, maximum=2**15), 3.5 + size * share
     found = [drawn_until(jumps, uncertain, mean_of("N m"), rule, seed) for seed in range(20)]
     wrong = [item for item in found if item.is_met and not abs(item.interval.value - truth) < 0.01 * truth]
@@ -198,7 +198,7 @@ def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independe
 
 
 def test_a_mean_that_rare_values_decide_is_not_met_by_replicates_that_count_them_alike() -> None:
-    uniform = Uncertainty((Drawn("x0", UniformBetween(0.0, 1.0)), Drawn("x1", NormalAround(0.0, 1.0))))
+    uniform = Uncertainty((RandomValue("x0", UniformBetween(0.0, 1.0)), RandomValue("x1", NormalAround(0.0, 1.0))))
 
     def rare(columns: Mapping[str, Floats]) -> Floats:
         return 1.0 + 0.1 * columns["x1"] + 100.0 * (columns["x0"] < 0.003)

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from ppafo.analyses.tune.problem import ObjectiveTerm, Problem, Searched, SearchEffort, Spread
+from ppafo.analyses.tune.problem import ObjectiveTerm, Problem, SearchedParameter, SearchEffort, Spread
 from ppafo.analyses.tune.result import INFEASIBLE, agreement
-from ppafo.analyses.tune.solve import UNUSABLE, Crossed, judge, search
+from ppafo.analyses.tune.solve import UNUSABLE, CandidateMetrics, judge, search
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats, NormalAround
 from ppafo.studies.draws import MetricLimit, Uncertainty
-from ppafo.studies.study import Drawn
+from ppafo.studies.study import RandomValue
 from ppafo.studies.varying import varied_path
 
 EFFORT = SearchEffort(starts=3, generations=200, candidates_per_gain=12, seed=4)
@@ -34,10 +34,10 @@ def problem(**changes: Any) -> Problem:
     return Problem(**(given | changes))
 
 
-def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> Crossed:
+def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> CandidateMetrics:
     """Runs of candidates (rows) over draws (columns)."""
     shape = np.shape(error)
-    return Crossed(
+    return CandidateMetrics(
         {"rms_error": np.array(error), "gas_supplied": np.array(gas)},
         np.zeros(shape, bool) if failed is None else np.array(failed),
     )
@@ -140,7 +140,7 @@ def test_a_run_without_the_metric_counts_as_failed() -> None:
 
 @pytest.mark.parametrize(("share", "deviations"), [(None, 2.0), (0.75, 0.0)])
 def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations: float) -> None:
-    spread = Spread(Uncertainty((Drawn("x", NormalAround(0.0, 1.0)),)), "s", 5, 1, deviations, share)
+    spread = Spread(Uncertainty((RandomValue("x", NormalAround(0.0, 1.0)),)), "s", 5, 1, deviations, share)
     values = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     goals = (ObjectiveTerm("rms_error", 1.0, None), ObjectiveTerm("gas_supplied", -1.0, None))
     judged = judge(
@@ -154,7 +154,7 @@ def test_candidates_are_judged_by_their_bad_end(share: float | None, deviations:
 def test_logarithmic_bounds_and_what_lies_at_them() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    item = Searched("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
+    item = SearchedParameter("controller.proportional_gain", 0.01, 1.0, True, 0.1, place)
     assert item.value(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.01, 0.1, 1.0])
     assert item.fraction(0.1) == pytest.approx(0.5)
     assert item.fraction(2.0) > 1.0
@@ -168,7 +168,7 @@ def test_logarithmic_bounds_and_what_lies_at_them() -> None:
 def test_the_gains_that_are_run_are_those_that_are_written() -> None:
     scenario = load_scenario("torque-task-proportional")
     place = varied_path("controller.proportional_gain", scenario)
-    trial = problem(searched=(Searched("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
+    trial = problem(searched=(SearchedParameter("controller.proportional_gain", 0.01, 1.0, True, 0.095, place),))
     gains = trial.gains([0.123456789])
     line = trial.lines(gains)[0]
     assert load_scenario("torque-task-proportional", [line]).controller.proportional_gain == gains[place.path]

@@ -9,7 +9,7 @@ from ppafo.control.controllers.model_based import FeedbackLinearisationState, li
 from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import Assistance, Hold, TorqueProfile, profile_torque
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
-from ppafo.control.walking.phases import PhaseState, Switch
+from ppafo.control.walking.phases import DebouncedSensor, PhaseState
 from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
 from ppafo.engine.rows import rebuilt
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
@@ -39,7 +39,7 @@ def wanted(phase: PhaseState, angle: float, rate: float, rules: Assistance = RUL
 
 def at(phase: float, share: float) -> PhaseState:
     """The wearer in a phase at a share of a stride of 1.2 s."""
-    off = Switch(0.0, 0.0)
+    off = DebouncedSensor(0.0, 0.0)
     return PhaseState(phase, off, off, 0.1, 1.2 * share, 1.2, 3.0)
 
 

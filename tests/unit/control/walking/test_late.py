@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.control.walking import fault_flags, phases, safety
 from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
-from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState, Switch
+from ppafo.control.walking.phases import PHASE_QUANTITIES, DebouncedSensor, PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.engine.rows import rebuilt
 from ppafo.model.helping import HELPS, LIFTS, PUSH_OFF, STOPPED, SWING
@@ -95,7 +95,7 @@ def test_a_foot_that_turns_up_slowly_before_it_lands_nearly_flat_is_no_sign() ->
 
 
 FED, FILLS, EMPTIES = 0.06, 4.0e6, 0.05
-IN_THE_AIR = PhaseState(SWING, Switch(0.0, 0.0), Switch(0.0, 0.0), 0.1, 0.7, 1.0, 5.0)
+IN_THE_AIR = PhaseState(SWING, DebouncedSensor(0.0, 0.0), DebouncedSensor(0.0, 0.0), 0.1, 0.7, 1.0, 5.0)
 
 
 def pressure(time: float) -> float:

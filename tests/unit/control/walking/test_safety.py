@@ -7,7 +7,7 @@ import pytest
 
 from ppafo.control.walking import fault_checks, fault_flags, phases, safety
 from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
-from ppafo.control.walking.phases import PhaseState, Switch
+from ppafo.control.walking.phases import DebouncedSensor, PhaseState
 from ppafo.control.walking.safety import SafetyState, Stance, ValveTimes, VentingFault
 from ppafo.engine.rows import leaf_paths, rebuilt
 from ppafo.model.helping import HELPS, LANDING, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
@@ -24,7 +24,7 @@ STEPS = safety.START._replace(stance=safety.START.stance._replace(flat_angle=1.0
 
 
 def phase(name: float, since: float, heel: float = 1.0, toe: float = 1.0, in_phase: float = 0.1) -> PhaseState:
-    return PhaseState(name, Switch(heel, 0.0), Switch(toe, 0.0), in_phase, since, 1.0, 5.0)
+    return PhaseState(name, DebouncedSensor(heel, 0.0), DebouncedSensor(toe, 0.0), in_phase, since, 1.0, 5.0)
 
 
 def found(

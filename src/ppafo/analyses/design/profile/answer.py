@@ -45,7 +45,7 @@ class SizingMargins:
 
 
 @dataclass(frozen=True, slots=True)
-class Notes:
+class SizingRemarks:
     """Remarks on a sized valve.
 
     ``fails_above`` is a higher pressure [Pa absolute] at which the error limit is exceeded again, ``rated`` the rated
@@ -84,7 +84,7 @@ class SizedValve:
     mass: float | None
     margins: SizingMargins | None
     limit: Limit
-    notes: Notes
+    notes: SizingRemarks
     curve: tuple[Floats, Floats, Floats]
 
     @property

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ppafo.analyses.design.profile.answer import Notes, SizedValve, Sizing, SizingMargins
+from ppafo.analyses.design.profile.answer import SizedValve, Sizing, SizingMargins, SizingRemarks
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import Trials, ceiling, flow_margin, highest_pressure, limit_of, try_pressures
 from ppafo.analyses.endurance.discharge import TIME_IS_UP
-from ppafo.analyses.endurance.draw import draw_of_numbers
+from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
 from ppafo.errors import ParameterError
 from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle, scaled_entries
@@ -75,7 +75,7 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     gas_in_all, works = float(in_all[least]), tried.first is not None
     bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure) if works else (None, False)
     rated = highest_pressure(problem, valve)
-    notes = Notes(
+    notes = SizingRemarks(
         fails_above=tried.fails_above,
         rated=rated if rated < problem.highest_pressure and not works else None,
         is_cold=is_cold,
@@ -131,7 +131,7 @@ def _lasting_bottle(problem: SizingProblem, gas: float, in_all: float, pressure:
         ]
         full = load_bottle(PAPER_BOTTLE, [*changes, f"regulator.set_pressure={pressure} SI"])
         try:
-            ended = follow_bottle(full, draw_of_numbers(gas, period, None), schedule).discharge.ending.kind
+            ended = follow_bottle(full, demand_of_numbers(gas, period, None), schedule).discharge.ending.kind
         except ParameterError:
             # Its regulator does not pass the flow even when it is full.
             continue

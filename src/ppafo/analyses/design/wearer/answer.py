@@ -3,16 +3,16 @@
 from functools import partial
 
 from ppafo.analyses.design.wearer.electrical import electrical_sentences
-from ppafo.analyses.design.wearer.wish import (
+from ppafo.analyses.design.wearer.requirements import (
     BODY_MASS_INDEX,
     CLEARANCE,
     MASS,
     TOES,
     TORQUE,
     WALKS,
+    DesignRequirements,
     SizedDevice,
     WearerSizing,
-    Wish,
 )
 from ppafo.analyses.parts.sections import part_titles, parts_to_check
 from ppafo.report import finding
@@ -46,7 +46,7 @@ _READING = (
 
 def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     """Return the device with its walk, or what to give up; it has not passed without a device."""
-    wish, device = sizing.wish, sizing.device
+    requirements, device = sizing.requirements, sizing.device
     rows = [
         (tried.valve.name, tried.actuator.name, tried.torque, tried.toes, tried.flow, tried.mass)
         for tried in sorted(sizing.tried, key=lambda tried: -tried.torque)
@@ -55,18 +55,18 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     table = finding.Section(
         "What was walked with", columns_of(_HEAD, rows), remarks=remarks, left=2, is_detail=device is not None
     )
-    stature = f"{wish.height:.4g} m"
-    if wish.stature is None:
+    stature = f"{requirements.height:.4g} m"
+    if requirements.stature is None:
         stature += f" (assumed: a body mass index of {BODY_MASS_INDEX:g} kg/m^2; give --stature)"
-    said = [f"a wearer of {wish.mass:.4g} kg and {stature}; {wish.text()}"]
-    if wish.toes is None and wish.clearance < TOES:
+    said = [f"a wearer of {requirements.mass:.4g} kg and {stature}; {requirements.text()}"]
+    if requirements.toes is None and requirements.clearance < TOES:
         said.append(
             f"the lowest height of the toes in the healthy gait itself is {CLEARANCE.text(sizing.healthy_toes)}"
         )
     sections = (
         (finding.Section(remarks=("No device in the catalogue can do this. Alternatives:", *sizing.instead)), table)
         if device is None
-        else (*_sections(wish, device), table, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
+        else (*_sections(requirements, device), table, *parts_to_check(sizing.doubtful), part_titles(sizing.parts))
     )
     return Finding(
         name="design",
@@ -79,13 +79,13 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     )
 
 
-def _sections(wish: Wish, device: SizedDevice) -> tuple[finding.Section, ...]:
+def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[finding.Section, ...]:
     walked = device.walked
-    share = device.torque / wish.torque
+    share = device.torque / requirements.torque
     # A walk on a bottle may end at nine tenths of the request, so how far it fell short is said.
     short = f" ({100.0 * share:.0f} % of the request: pressure falls with the bottle)" if share < 1.0 else ""
     low, high = (share * walk_of(walked.scenario).gait.body_mass for share in SCALED_MASS)
-    wanted, lasts = f"{wish.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
+    wanted, lasts = f"{requirements.seconds / 60.0:.4g} min", minutes_text(device.life.discharge.walking_time)
     last = TORQUE.text(float(walked.peak_torques[-1]))
     rows = (
         ("controller", f"{walked.scenario.controller.kind}, walk '{WALKS[device.tried.valve.kind]}'"),
@@ -102,7 +102,7 @@ def _sections(wish: Wish, device: SizedDevice) -> tuple[finding.Section, ...]:
         *electrical_sentences(device.electrical),
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
     ]
-    if not low <= wish.mass <= high:
+    if not low <= requirements.mass <= high:
         remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
     caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())

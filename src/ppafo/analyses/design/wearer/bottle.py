@@ -4,8 +4,8 @@ import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ppafo.analyses.design.wearer.shelf import Shelf
-from ppafo.analyses.design.wearer.wish import WALKS, WalkedDevice, Wish
+from ppafo.analyses.design.wearer.available_parts import AvailableParts
+from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
 from ppafo.errors import ScenarioError
 from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report
@@ -26,24 +26,26 @@ class OnBottle(NamedTuple):
     walked: WalkResult
 
 
-def lightest_on_bottle(wish: Wish, tried: Sequence[WalkedDevice], shelf: Shelf, report: Report) -> OnBottle | None:
-    """Return the lightest pair and bottle whose walk does what is wanted, with that walk; None if none does.
+def lightest_on_bottle(
+    requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts, report: Report
+) -> OnBottle | None:
+    """Return the lightest pair and bottle whose walk meets the requirements, with that walk; None if none does.
 
-    No pair that might last on a bottle is left out, so that an offer is found again when its values are requested.
+    No pair that might last on a bottle is left out, so that an alternative is found again when it is requested.
     """
     # Heaviest first: of pairs with the same overrides the lightest replaces the others.
-    able = {pair.overrides: pair for pair in sorted(tried, key=lambda pair: -pair.mass) if pair.has(wish)}
+    able = {pair.overrides: pair for pair in sorted(tried, key=lambda pair: -pair.mass) if pair.has(requirements)}
     choices = [(pair, bottle) for pair in able.values() for bottle in shelf.bottles]
     too_thirsty: dict[str, float] = {}
     for pair, bottle in sorted(choices, key=lambda choice: choice[0].mass + choice[1].full_mass):
-        largest_flow = min(bottle.values["content"] / wish.seconds, too_thirsty.get(bottle.name, math.inf))
+        largest_flow = min(bottle.values["content"] / requirements.seconds, too_thirsty.get(bottle.name, math.inf))
         if pair.flow > largest_flow:
             continue
         report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-        walked = walk_on_bottle(pair, shelf.bottle_name(bottle), wish.seconds)
-        if walked is None or walking_time(walked) < wish.seconds:
-            too_thirsty[bottle.name] = lasting_flow(pair, walking_time(walked), wish.seconds)
-        elif keeps(walked, wish):
+        walked = walk_on_bottle(pair, shelf.bottle_name(bottle), requirements.seconds)
+        if walked is None or walking_time(walked) < requirements.seconds:
+            too_thirsty[bottle.name] = lasting_flow(pair, walking_time(walked), requirements.seconds)
+        elif keeps(walked, requirements):
             return OnBottle(pair, bottle, walked)
     return None
 
@@ -71,9 +73,9 @@ def lasting_flow(pair: WalkedDevice, lasted: float, seconds: float) -> float:
     return pair.flow * min(0.99, max(0.5, _ALLOWANCE * lasted / seconds))
 
 
-def keeps(walked: WalkResult, wish: Wish) -> bool:
+def keeps(walked: WalkResult, requirements: DesignRequirements) -> bool:
     """Return whether the mean stride of a walk on a bottle reaches the torque, and has the clearance."""
     if not walked.averages or walked.tracking:
         return False
-    is_reached = wish.is_reached_by(float(walked.averages["torque"].mean.max()))
-    return bool(is_reached and walked.metrics["lowest_toes"].value >= wish.clearance)
+    is_reached = requirements.is_reached_by(float(walked.averages["torque"].mean.max()))
+    return bool(is_reached and walked.metrics["lowest_toes"].value >= requirements.clearance)

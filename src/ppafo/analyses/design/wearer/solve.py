@@ -8,21 +8,21 @@ given up.
 from dataclasses import replace
 from pathlib import Path
 
+from ppafo.analyses.design.wearer.alternatives import alternatives_to
+from ppafo.analyses.design.wearer.available_parts import AvailableParts, shelf_of
 from ppafo.analyses.design.wearer.bottle import OnBottle, lightest_on_bottle
 from ppafo.analyses.design.wearer.electrical import electrical_of
-from ppafo.analyses.design.wearer.offers import offers_instead
-from ppafo.analyses.design.wearer.shelf import Shelf, shelf_of
-from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
-from ppafo.analyses.design.wearer.wish import (
+from ppafo.analyses.design.wearer.requirements import (
     TOES,
     WALKS,
+    DesignRequirements,
     SizedDevice,
     WalkedDevice,
     WearerSizing,
-    Wish,
-    check_wish,
+    check_requirements,
     shown_clearance,
 )
+from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
 from ppafo.analyses.endurance.solve import endurance_of_walk
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT
@@ -36,37 +36,41 @@ _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
 """The processor and the cells of the battery, unless the catalogue is one's own."""
 
 
-def size_for_wearer(wish: Wish, report: Report, catalogue: str | Path = DEFAULT) -> WearerSizing:
-    """Return the lightest device for a wish, or what to give up; ``catalogue`` is a name or a file.
+def size_for_wearer(requirements: DesignRequirements, report: Report, catalogue: str | Path = DEFAULT) -> WearerSizing:
+    """Return the lightest device that meets the requirements, or the alternatives; ``catalogue`` is a name or a file.
 
-    ``report`` hears what is being walked. StudyError for a wish that is none, ParameterError for a bad catalogue.
+    ``report`` is told of each walk. Raises StudyError for impossible requirements, ParameterError for a bad catalogue.
     """
-    check_wish(wish)
+    check_requirements(requirements)
     shelf = shelf_of(catalogue)
-    healthy = healthy_metrics(load_walk(next(iter(WALKS.values())), of_wearer(wish)))["lowest_toes"].value
+    healthy = healthy_metrics(load_walk(next(iter(WALKS.values())), of_wearer(requirements)))["lowest_toes"].value
     # What the healthy gait itself does not do is not asked of a device, unless somebody does.
-    wish = replace(wish, usual_toes=shown_clearance(min(TOES, healthy)))
-    pairs = shelf.pairs(wish.pressure)
+    requirements = replace(requirements, usual_toes=shown_clearance(min(TOES, healthy)))
+    pairs = shelf.pairs(requirements.pressure)
     tried: list[WalkedDevice] = []
     for number, (valve, actuator) in enumerate(pairs):
         report(Progress(f"walking with {valve.name}", number, len(pairs), noun="pairs"))
-        tried += few_strides(wish, valve, actuator)
-    lightest = lightest_on_bottle(wish, tried, shelf, report)
+        tried += few_strides(requirements, valve, actuator)
+    lightest = lightest_on_bottle(requirements, tried, shelf, report)
     if lightest is not None:
-        return WearerSizing(wish, healthy, tuple(tried), _device(lightest, wish, shelf), ())
-    instead = tuple(offer.text(wish) for offer in offers_instead(wish, tried, shelf, report))
+        return WearerSizing(requirements, healthy, tuple(tried), _device(lightest, requirements, shelf), ())
+    instead = tuple(
+        alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
+    )
     if not tried:
         instead = ("no pair of valve and actuator may have this pressure, or none helps: take another pressure",)
-    return WearerSizing(wish, healthy, tuple(tried), None, instead)
+    return WearerSizing(requirements, healthy, tuple(tried), None, instead)
 
 
-def _device(lightest: OnBottle, wish: Wish, shelf: Shelf) -> SizedDevice:
+def _device(lightest: OnBottle, requirements: DesignRequirements, shelf: AvailableParts) -> SizedDevice:
     """Return the device of a pair and a bottle: with regulators, shut-off valve, processor and battery."""
     pair, bottle, walked = lightest
     life = endurance_of_walk(walked)
     assert life is not None, "a walk on a bottle that has a torque took gas"
     processor, cell = shelf.part("processors", _PROCESSOR), shelf.part("batteries", _CELL)
-    electrical = electrical_of(walked.recording, pair.valve, SHUT_OFF_PARTS["power"], processor, cell, wish.seconds)
+    electrical = electrical_of(
+        walked.recording, pair.valve, SHUT_OFF_PARTS["power"], processor, cell, requirements.seconds
+    )
     masses = {
         f"actuator {pair.actuator.name}": pair.actuator.full_mass,
         f"valve {pair.valve.name}": pair.valve.full_mass,

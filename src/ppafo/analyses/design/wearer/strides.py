@@ -4,7 +4,7 @@ Of a torque controller the lowest torque is requested that gives the one wanted;
 where the toes would not clear the ground.
 """
 
-from ppafo.analyses.design.wearer.wish import WALKS, WalkedDevice, Wish
+from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.model.catalog import VALVES
@@ -36,70 +36,70 @@ SHUT_OFF_PARTS = {quantity.name: quantity.default or 0.0 for quantity in SHUT_OF
 """Numbers of the shut-off valve of every device [SI]: the usual ones, and an area that does not throttle the supply."""
 
 
-def of_wearer(wish: Wish) -> tuple[str, ...]:
-    """Return the overrides of a walk that make its wearer the one of a wish."""
-    return f"wearer.body_mass={wish.mass:.6g} kg", f"wearer.stature={wish.height:.6g} m"
+def of_wearer(requirements: DesignRequirements) -> tuple[str, ...]:
+    """Return the overrides of a walk that give it the wearer of the requirements."""
+    return f"wearer.body_mass={requirements.mass:.6g} kg", f"wearer.stature={requirements.height:.6g} m"
 
 
-def few_strides(wish: Wish, valve: Part, actuator: Part) -> list[WalkedDevice]:
+def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[WalkedDevice]:
     """Return a few strides with a pair of parts that have the torque and the clearance, else those that come nearest.
 
     Nearest are the most torque, and the highest toes with enough of it: one or two, none where no walk has help.
     """
-    common = _common_overrides(wish, valve, actuator)
+    common = _common_overrides(requirements, valve, actuator)
     strides: list[WalkedDevice] = []
-    for request in _requests(wish, valve, actuator):
-        for lift in _lifts(request, wish, valve, actuator):
+    for request in _requests(requirements, valve, actuator):
+        for lift in _lifts(request, requirements, valve, actuator):
             peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
             limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
             tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
             if tried is None:
                 break
             # A request that has all of the torque goes before one that all but reaches it.
-            if tried.torque >= wish.torque and tried.has(wish):
+            if tried.torque >= requirements.torque and tried.has(requirements):
                 return [tried]
             strides.append(tried)
             # Another lift gives no more torque.
-            if tried.torque < wish.torque:
+            if tried.torque < requirements.torque:
                 break
     if not strides:
         return []
     strongest = max(strides, key=lambda tried: tried.torque)
-    highest = max(strides, key=lambda tried: (min(tried.torque, wish.torque), tried.toes))
+    highest = max(strides, key=lambda tried: (min(tried.torque, requirements.torque), tried.toes))
     return [strongest] if highest is strongest else [strongest, highest]
 
 
-def _common_overrides(wish: Wish, valve: Part, actuator: Part) -> tuple[str, ...]:
+def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: Part) -> tuple[str, ...]:
     """Return the overrides of all walks with a pair: wearer, supply, numbers of the parts, shut-off valve."""
-    dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (wish.pressure - STANDARD_ATMOSPHERE)
+    dorsiflexion = STANDARD_ATMOSPHERE + _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     units = {quantity.name: quantity.unit for quantity in (*ORIFICE, *VALVES[valve.kind].quantities, *ACTUATOR)}
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
-        *of_wearer(wish),
-        f"supply.pressure={written_text(wish.pressure, 'Pa_a')}",
+        *of_wearer(requirements),
+        f"supply.pressure={written_text(requirements.pressure, 'Pa_a')}",
         f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
         f"shut_off.area={written_text(SHUT_OFF_PARTS['area'], 'm^2')}",
     )
 
 
-def _requests(wish: Wish, valve: Part, actuator: Part) -> list[float]:
+def _requests(requirements: DesignRequirements, valve: Part, actuator: Part) -> list[float]:
     """Return the torques [N m] that are requested one after the other, from the lowest."""
     if valve.kind != _PROPORTIONAL:
-        return [_ABOVE * wish.torque]
+        return [_ABOVE * requirements.torque]
     # No request above what the supply pressure can hold with this actuator; those that are equal then are one.
-    held = actuator.values["torque_constant"] * (wish.pressure - STANDARD_ATMOSPHERE)
-    return list(dict.fromkeys(min(factor * wish.torque, held) for factor in _REQUESTS))
+    held = actuator.values["torque_constant"] * (requirements.pressure - STANDARD_ATMOSPHERE)
+    return list(dict.fromkeys(min(factor * requirements.torque, held) for factor in _REQUESTS))
 
 
-def _lifts(request: float, wish: Wish, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
+def _lifts(request: float, requirements: DesignRequirements, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
     """Return overrides of the lift in the swing: the walk's own, then one that begins at toe-off, with all torque.
 
     A pair of solenoid valves has its own alone.
     """
     if valve.kind != _PROPORTIONAL:
         return [()]
-    held = actuator.values["torque_constant"] * _DORSIFLEXION * (wish.pressure - STANDARD_ATMOSPHERE)
+    held = actuator.values["torque_constant"] * _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     # The limit as its override has it, with four digits.
     torque = min(held, max(float(f"{request:.4g}"), _LIMIT))
     return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]

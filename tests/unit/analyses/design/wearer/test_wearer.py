@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import ppafo
-from ppafo.analyses.design.wearer import shelf as shelves
+from ppafo.analyses.design.wearer import available_parts as shelves
+from ppafo.analyses.design.wearer.alternatives import alternatives_to
 from ppafo.analyses.design.wearer.answer import finding_of
+from ppafo.analyses.design.wearer.available_parts import shelf_of
 from ppafo.analyses.design.wearer.bottle import lightest_on_bottle
 from ppafo.analyses.design.wearer.electrical import electrical_of, valve_power
-from ppafo.analyses.design.wearer.offers import offers_instead
-from ppafo.analyses.design.wearer.shelf import shelf_of
+from ppafo.analyses.design.wearer.requirements import DesignRequirements, SizedDevice, WearerSizing, check_requirements
 from ppafo.analyses.design.wearer.strides import few_strides
-from ppafo.analyses.design.wearer.wish import SizedDevice, WearerSizing, Wish, check_wish
 from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, StudyError
 from ppafo.parameters.parts import load_catalogue
@@ -74,7 +74,7 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
     assert device.bottle.name == "co2-3_5oz", "the lightest bottle that lasts"
     assert device.tried.valve.name == "festo-mpye-5-1-8-lf-010-b", "the lighter pair drags the toes"
     assert [one.toes < 0.0 for one in found.tried if one.valve.name == "festo-vovg-5v-pair"] == [True]
-    assert device.toes >= found.wish.clearance == pytest.approx(found.healthy_toes, abs=1e-4)
+    assert device.toes >= found.requirements.clearance == pytest.approx(found.healthy_toes, abs=1e-4)
     said = text_of(finding_of(found))
     assert device.command in said.splitlines()
     assert f"lowest toes  {1e3 * device.toes:.1f} mm over the ground" in said
@@ -95,8 +95,8 @@ def test_what_is_suggested_is_the_walk_that_is_shown_and_its_toes_clear_the_grou
 
 @pytest.mark.usefixtures("little")
 def test_toes_may_be_asked_to_drag_no_more_than_the_ground_and_no_device_lifts_them_by_five_centimetres() -> None:
-    wish = Wish(72.5, 1.75, 2.5, 101325.0 + 50.0 * PSI, 12.0, 0.004)
-    assert (wish.clearance, wish.toes) == (0.004, 0.004)
+    requirements = DesignRequirements(72.5, 1.75, 2.5, 101325.0 + 50.0 * PSI, 12.0, 0.004)
+    assert (requirements.clearance, requirements.toes) == (0.004, 0.004)
     high = sized(2.5, 0.2, toes=0.05)
     assert high.device is None
     said = text_of(finding_of(high))
@@ -137,14 +137,14 @@ def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_g
     valve, actuator = whole.groups["valves"]["enfield-ls-v05s"], whole.groups["actuators"]["smc-crb2bw40-90d"]
     bottles = {"co2-3_5oz": whole.groups["bottles"]["co2-3_5oz"]}
     shelf = replace(whole, groups={**whole.groups, "bottles": bottles})
-    wish = Wish(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 144.0, 0.001)
-    tried = few_strides(wish, valve, actuator)
-    assert tried[0].has(wish)
-    assert lightest_on_bottle(wish, tried, shelf, report_nothing) is None
-    (offer, *_) = offers_instead(wish, tried, shelf, report_nothing)
-    words = re.fullmatch(r"less pressure" + OFFER, offer.text(wish))
-    assert words is not None, offer.text(wish)
-    asked = replace(wish, pressure=101325.0 + float(words[2]) * PSI)
+    requirements = DesignRequirements(72.5, 1.75, 1.2, 101325.0 + 80.0 * PSI, 144.0, 0.001)
+    tried = few_strides(requirements, valve, actuator)
+    assert tried[0].has(requirements)
+    assert lightest_on_bottle(requirements, tried, shelf, report_nothing) is None
+    (alternative, *_) = alternatives_to(requirements, tried, shelf, report_nothing)
+    words = re.fullmatch(r"less pressure" + OFFER, alternative.text(requirements))
+    assert words is not None, alternative.text(requirements)
+    asked = replace(requirements, pressure=101325.0 + float(words[2]) * PSI)
     strides = few_strides(asked, valve, actuator)
     assert lightest_on_bottle(asked, strides, shelf, report_nothing) is not None
 
@@ -155,11 +155,11 @@ def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assu
         catalogue.part("valves", "enfield-ls-v05s"),
         catalogue.part("actuators", "smc-crb2bw40-90d"),
     )
-    wish = Wish(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
-    found = few_strides(wish, valve, actuator)
+    requirements = DesignRequirements(60.0, None, 5.0, 101325.0 + 60.0 * PSI, 60.0)
+    found = few_strides(requirements, valve, actuator)
     assert found[0].torque >= 5.0
-    assert wish.height == pytest.approx(math.sqrt(60.0 / 22.0))
-    said = text_of(finding_of(WearerSizing(wish, 0.0052, tuple(found), None, ())))
+    assert requirements.height == pytest.approx(math.sqrt(60.0 / 22.0))
+    said = text_of(finding_of(WearerSizing(requirements, 0.0052, tuple(found), None, ())))
     assert "1.651 m (assumed: a body mass index of 22 kg/m^2; give --stature)" in said
 
 
@@ -168,10 +168,10 @@ def test_a_stature_that_no_adult_has_is_asked_for_and_not_clamped(mass: float, t
     with pytest.raises(ppafo.StudyError) as caught:
         ppafo.design(mass=mass, torque=2.5, pressure=4.5e5, minutes=1.0)
     assert str(caught.value) == (
-        f"--mass: {mass:g} kg: with a body mass index of 22 kg/m^2 the wearer would be {tall} m tall, and segments are "
-        "known of adults of 1.45 to 2 m; give --stature"
+        f"--mass: {mass:g} kg: with a body mass index of 22 kg/m^2 the wearer would be {tall} m tall, but body segment "
+        "lengths are known for adults of 1.45 to 2 m; give --stature"
     )
-    check_wish(Wish(mass, 1.5, 2.5, 4.5e5, 60.0))
+    check_requirements(DesignRequirements(mass, 1.5, 2.5, 4.5e5, 60.0))
 
 
 PARTS = """

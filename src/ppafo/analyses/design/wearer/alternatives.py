@@ -5,10 +5,16 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from ppafo.analyses.design.wearer.available_parts import AvailableParts
 from ppafo.analyses.design.wearer.bottle import keeps, lasting_flow, walk_on_bottle, walking_time
-from ppafo.analyses.design.wearer.shelf import Shelf
+from ppafo.analyses.design.wearer.requirements import (
+    SHORTEST,
+    Alternative,
+    DesignRequirements,
+    WalkedDevice,
+    shown_clearance,
+)
 from ppafo.analyses.design.wearer.strides import few_strides
-from ppafo.analyses.design.wearer.wish import SHORTEST, Offer, WalkedDevice, Wish, shown_clearance
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import rated_pressure
@@ -21,52 +27,66 @@ _LESS_PRESSURE = tuple(0.95 - 0.05 * step for step in range(12))
 _MOST_PAIRS = 5
 """Pairs of parts that are tried at less pressure: those with the most torque for their gas."""
 _MOST_WALKED = 4
-"""Pairs and pressures, from the least gas, that are walked on a bottle for an offer."""
+"""Pairs and pressures, from the least gas, that are walked on a bottle to find an alternative."""
 _USABLE = 0.8
-"""Share of its gas above which no walk on a bottle is tried for an offer; the walk decides."""
+"""Share of its gas above which no walk on a bottle is tried for an alternative; the walk decides."""
 _SHOWN_TIME = 0.6
-"""Time [s] to which an offer rounds times down: a hundredth of a minute."""
+"""Time [s] to which an alternative rounds times down: a hundredth of a minute."""
 _SHOWN_TORQUE = 100.0
-"""Parts of a newton metre to which an offer rounds torques down."""
+"""Parts of a newton metre to which an alternative rounds torques down."""
 
 
 class _Candidate(NamedTuple):
-    """A pair of parts as it walked a few strides, and the wish with the pressure of that walk."""
+    """A pair of parts as it walked a few strides, and the requirements at the pressure of that walk."""
 
-    wish: Wish
+    requirements: DesignRequirements
     pair: WalkedDevice
 
 
-def offers_instead(wish: Wish, tried: Sequence[WalkedDevice], shelf: Shelf, report: Report) -> Iterator[Offer]:
+def alternatives_to(
+    requirements: DesignRequirements, tried: Sequence[WalkedDevice], shelf: AvailableParts, report: Report
+) -> Iterator[Alternative]:
     """Yield what would do instead, each as it walked on the largest bottle: who asks for exactly that gets it."""
     bottle = max(shelf.bottles, key=lambda bottle: bottle.values["content"])
-    candidates = [_Candidate(wish, pair) for pair in tried]
-    candidates += _at_less_pressure(wish, tried, report)
-    able = sorted((at for at in candidates if at.pair.has(wish)), key=lambda at: at.pair.flow)
-    # A device whose toes drag is no offer.
+    candidates = [_Candidate(requirements, pair) for pair in tried]
+    candidates += _at_less_pressure(requirements, tried, report)
+    able = sorted((at for at in candidates if at.pair.has(requirements)), key=lambda at: at.pair.flow)
+    # A device whose toes drag is no alternative.
     weak = sorted(
-        (at for at in candidates if at.pair.toes >= wish.clearance and not wish.is_reached_by(at.pair.torque)),
+        (
+            at
+            for at in candidates
+            if at.pair.toes >= requirements.clearance and not requirements.is_reached_by(at.pair.torque)
+        ),
         key=lambda at: -at.pair.torque,
     )
     low = sorted(
-        (at for at in candidates if wish.is_reached_by(at.pair.torque) and 0.0 <= at.pair.toes < wish.clearance),
+        (
+            at
+            for at in candidates
+            if requirements.is_reached_by(at.pair.torque) and 0.0 <= at.pair.toes < requirements.clearance
+        ),
         key=lambda at: -at.pair.toes,
     )
     report(Progress(f"walking on {bottle.name}", 0, 0, noun="bottles"))
-    nearest = [] if able else [_offered(lesser[0], bottle, shelf) for lesser in (weak, low) if lesser]
-    offers = [offer for offer in (_thriftiest(able, bottle, shelf), *nearest) if offer is not None]
-    yield from offers
+    nearest = [] if able else [_alternative(lesser[0], bottle, shelf) for lesser in (weak, low) if lesser]
+    alternatives = [
+        alternative for alternative in (_thriftiest(able, bottle, shelf), *nearest) if alternative is not None
+    ]
+    yield from alternatives
     if not able:
-        stronger = (_offered(candidate, bottle, shelf) for candidate in _at_more_pressure(wish, tried))
-        first = next((offer for offer in stronger if offer is not None), None)
+        stronger = (_alternative(candidate, bottle, shelf) for candidate in _at_more_pressure(requirements, tried))
+        first = next((alternative for alternative in stronger if alternative is not None), None)
         yield from [] if first is None else [first]
     # A walk that ends early is no full answer: less torque for the whole time is offered beside it.
-    if all(offer.wish.seconds < wish.seconds for offer in offers):
-        lasting = _lasting(wish, weak, bottle, shelf)
+    if all(alternative.requirements.seconds < requirements.seconds for alternative in alternatives):
+        lasting = _lasting(requirements, weak, bottle, shelf)
         yield from [] if lasting is None else [lasting]
 
 
-def _at_less_pressure(wish: Wish, tried: Sequence[WalkedDevice], report: Report) -> list[_Candidate]:
+def _at_less_pressure(
+    requirements: DesignRequirements, tried: Sequence[WalkedDevice], report: Report
+) -> list[_Candidate]:
     """Return the pairs that have the most torque for their gas, at pressures below the wanted one."""
     thrifty = sorted((pair for pair in tried if pair.flow > 0.0), key=lambda pair: -pair.torque / pair.flow)
     # Actuators of the same numbers walk alike: one of them is enough.
@@ -74,14 +94,14 @@ def _at_less_pressure(wish: Wish, tried: Sequence[WalkedDevice], report: Report)
     candidates = []
     for number, factor in enumerate(_LESS_PRESSURE):
         report(Progress("walking at less pressure", number, len(_LESS_PRESSURE), noun="pressures"))
-        lower = wish.at_gauge(factor)
-        if STANDARD_ATMOSPHERE < lower.pressure < wish.pressure:
+        lower = requirements.at_gauge(factor)
+        if STANDARD_ATMOSPHERE < lower.pressure < requirements.pressure:
             for pair in list(unlike.values())[:_MOST_PAIRS]:
                 candidates += [_Candidate(lower, again) for again in few_strides(lower, pair.valve, pair.actuator)]
     return candidates
 
 
-def _at_more_pressure(wish: Wish, tried: Sequence[WalkedDevice]) -> Iterator[_Candidate]:
+def _at_more_pressure(requirements: DesignRequirements, tried: Sequence[WalkedDevice]) -> Iterator[_Candidate]:
     """Yield what does it at more pressure, the lowest first: of each kind of valve the strongest and the highest."""
     best: list[WalkedDevice] = []
     for kind in dict.fromkeys(pair.valve.kind for pair in tried):
@@ -89,40 +109,42 @@ def _at_more_pressure(wish: Wish, tried: Sequence[WalkedDevice]) -> Iterator[_Ca
         strongest, highest = max(of_kind, key=lambda pair: pair.torque), max(of_kind, key=lambda pair: pair.toes)
         best += {(pair.valve.name, pair.actuator.name): pair for pair in (strongest, highest)}.values()
     for factor in _MORE_PRESSURE:
-        higher = wish.at_gauge(factor)
+        higher = requirements.at_gauge(factor)
         for pair in best:
             if rated_pressure(pair.valve, pair.actuator) >= higher.pressure:
                 again = few_strides(higher, pair.valve, pair.actuator)
-                yield from (_Candidate(higher, strides) for strides in again if strides.has(wish))
+                yield from (_Candidate(higher, strides) for strides in again if strides.has(requirements))
 
 
-def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: Shelf) -> Offer | None:
+def _thriftiest(able: Sequence[_Candidate], bottle: Part, shelf: AvailableParts) -> Alternative | None:
     """Return what walks on a bottle with the least gas, of the first few the one whose toes stay as high as wanted."""
-    first: Offer | None = None
+    first: Alternative | None = None
     for candidate in able[:_MOST_WALKED]:
-        offer = _offered(candidate, bottle, shelf)
-        if offer is not None and offer.wish.clearance >= candidate.wish.clearance:
-            return offer
-        first = offer if first is None else first
+        alternative = _alternative(candidate, bottle, shelf)
+        if alternative is not None and alternative.requirements.clearance >= candidate.requirements.clearance:
+            return alternative
+        first = alternative if first is None else first
     return first
 
 
-def _lasting(wish: Wish, weak: Sequence[_Candidate], bottle: Part, shelf: Shelf) -> Offer | None:
+def _lasting(
+    requirements: DesignRequirements, weak: Sequence[_Candidate], bottle: Part, shelf: AvailableParts
+) -> Alternative | None:
     """Return what walks on a bottle for all of the time, of pairs with the most torque first; None if none does."""
-    largest_flow = _USABLE * bottle.values["content"] / wish.seconds
+    largest_flow = _USABLE * bottle.values["content"] / requirements.seconds
     for candidate in weak:
         if candidate.pair.flow > largest_flow:
             continue
-        offer = _offered(candidate, bottle, shelf)
-        if offer is not None and offer.wish.seconds == wish.seconds:
-            return offer
-        lasted = 0.0 if offer is None else offer.wish.seconds
-        largest_flow = lasting_flow(candidate.pair, lasted, wish.seconds)
+        alternative = _alternative(candidate, bottle, shelf)
+        if alternative is not None and alternative.requirements.seconds == requirements.seconds:
+            return alternative
+        lasted = 0.0 if alternative is None else alternative.requirements.seconds
+        largest_flow = lasting_flow(candidate.pair, lasted, requirements.seconds)
     return None
 
 
-def _offered(candidate: _Candidate, bottle: Part, shelf: Shelf) -> Offer | None:
-    """Return what a pair has of a wish, rounded down, as it walked on a bottle; None where that is nothing."""
+def _alternative(candidate: _Candidate, bottle: Part, shelf: AvailableParts) -> Alternative | None:
+    """Return the requirements that a pair met in a walk on a bottle, rounded down; None where it meets none."""
     lesser, pair = candidate
     if not lesser.is_reached_by(pair.torque):
         lesser = replace(lesser, torque=math.floor(_SHOWN_TORQUE * pair.torque) / _SHOWN_TORQUE)
@@ -139,8 +161,8 @@ def _offered(candidate: _Candidate, bottle: Part, shelf: Shelf) -> Offer | None:
         if [strides.overrides for strides in few_strides(lesser, pair.valve, pair.actuator)] != [again.overrides]:
             return None
     lasted = walking_time(walked)
-    # Rounded down to what a command line can say, so that a run from that line still meets the offer.
+    # Rounded down to what a command line can say, so that a run from that line still meets the alternative.
     shown_time = _SHOWN_TIME * math.floor(min(lasted, lesser.seconds) / _SHOWN_TIME)
     seconds = lesser.seconds if lasted >= lesser.seconds else shown_time
     helps = lesser.torque > 0.0 and lesser.clearance >= 0.0 and keeps(walked, lesser)
-    return Offer(replace(lesser, seconds=seconds), again, bottle) if helps and seconds >= SHORTEST else None
+    return Alternative(replace(lesser, seconds=seconds), again, bottle) if helps and seconds >= SHORTEST else None

@@ -25,18 +25,18 @@ WALKS = {"solenoid": "solenoid-regulators", "proportional": "proportional-regula
 BODY_MASS_INDEX = 22.0
 """Body mass over the square of the stature [kg/m^2] of a wearer of whom the mass alone is known."""
 TOES = 0.01
-"""Clearance of the toes [m] that is wanted where none is given, unless the healthy gait itself has less."""
+"""Clearance of the toes [m] that is required where none is given, unless the healthy gait itself has less."""
 REACHED = 0.95
-"""Peak torque of the mean stride over the wanted one from which on a device reaches it: in offers and in refusals."""
+"""Least ratio [-] of the peak torque of the mean stride to the required torque that counts as reached."""
 SHORTEST = 6.0
 """Time [s] that a walk on a bottle takes at least."""
 _STRONGEST, _HIGHEST_TOES = 100.0, 0.2
-"""Torque [N m] and clearance [m] from which on a wish is a slip of the pen."""
+"""Torque [N m] and clearance [m] above which a requirement is refused as a typing error."""
 TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part mass"), Kind("", "m", "length", ".1f")
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class DesignRequirements:
     """Design requirements: body mass [kg], stature [m] or None, torque [N m], supply [Pa absolute], time [s].
 
     ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted.
@@ -60,8 +60,8 @@ class Wish:
         """Clearance of the toes [m]."""
         return self.usual_toes if self.toes is None else self.toes
 
-    def at_gauge(self, share: float) -> "Wish":
-        """Return this wish at a share of its gauge pressure, rounded to what gauges show: 0.1 psi, 0.01 bar, 1 kPa."""
+    def at_gauge(self, share: float) -> "DesignRequirements":
+        """Return the requirements at a share of their gauge pressure, rounded to 0.1 psi, 0.01 bar or 1 kPa."""
         unit = shown_unit("Pa_d")
         step = to_si(10.0 ** round(math.log10(from_si(0.1 * PASCALS_PER_PSI, unit, "Pa_d"))), unit, "Pa_d")
         return replace(
@@ -80,37 +80,32 @@ class Wish:
         return f"{TORQUE.text(self.torque)} at {pressure} for {self.seconds / 60.0:.4g} min, {toes}"
 
 
-def check_wish(wish: Wish) -> None:
-    """Raise StudyError for a wish that no device can be sized for, with the argument and what is allowed."""
+def check_requirements(requirements: DesignRequirements) -> None:
+    """Raise StudyError for requirements outside the ranges in which a device can be sized, naming the argument."""
     low, high = STATURES
     mass = next(quantity for quantity in WEARER if quantity.name == "body_mass")
-    if not mass.minimum <= wish.mass <= mass.maximum:
+    weight, height, toes = requirements.mass, requirements.height, requirements.toes
+    known = f"body segment lengths are known for adults of {low:g} to {high:g} m"
+    if not mass.minimum <= weight <= mass.maximum:
+        raise StudyError(f"--mass: {weight:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg")
+    if requirements.stature is None and not low <= height <= high:
         raise StudyError(
-            f"--mass: {wish.mass:g} kg: must be at least {mass.minimum:g} kg and at most {mass.maximum:g} kg"
+            f"--mass: {weight:g} kg: with a body mass index of {BODY_MASS_INDEX:g} kg/m^2 the wearer would be "
+            f"{height:.3g} m tall, but {known}; give --stature"
         )
-    if wish.stature is None and not low <= wish.height <= high:
-        raise StudyError(
-            f"--mass: {wish.mass:g} kg: with a body mass index of {BODY_MASS_INDEX:g} kg/m^2 the wearer would be "
-            f"{wish.height:.3g} m tall, and segments are known of adults of {low:g} to {high:g} m; give --stature"
-        )
-    if not wish.pressure > STANDARD_ATMOSPHERE:
+    if not requirements.pressure > STANDARD_ATMOSPHERE:
         raise StudyError("--pressure: must be above the atmosphere, for example '50 psi_g'")
-    if not 0.0 < wish.torque < _STRONGEST:
-        text, most = TORQUE.text(wish.torque), TORQUE.text(_STRONGEST)
+    if not 0.0 < requirements.torque < _STRONGEST:
+        text, most = TORQUE.text(requirements.torque), TORQUE.text(_STRONGEST)
         raise StudyError(f"--torque: {text}: must be above 0 and below {most}")
-    if not SHORTEST <= wish.seconds <= 60.0 * LONGEST_MINUTES:
-        raise StudyError(
-            f"--minutes: {wish.seconds / 60.0:g} min: a walk on a bottle is followed for 0.1 to {LONGEST_MINUTES:g} min"
-        )
-    if wish.toes is not None and not 0.0 <= wish.toes <= _HIGHEST_TOES:
-        raise StudyError(
-            f"--toes: {1000.0 * wish.toes:g} mm: must be at least 0 mm and at most {1000.0 * _HIGHEST_TOES:g} mm"
-        )
-    if wish.stature is not None and not low <= wish.stature <= high:
-        raise StudyError(
-            f"--stature: {wish.stature:g} m: segments are known of adults of {low:g} to {high:g} m; take a gait and "
-            "a wearer of your own in a walk file"
-        )
+    if not SHORTEST <= requirements.seconds <= 60.0 * LONGEST_MINUTES:
+        minutes = requirements.seconds / 60.0
+        raise StudyError(f"--minutes: {minutes:g} min: must be at least 0.1 min and at most {LONGEST_MINUTES:g} min")
+    if toes is not None and not 0.0 <= toes <= _HIGHEST_TOES:
+        highest = 1000.0 * _HIGHEST_TOES
+        raise StudyError(f"--toes: {1000.0 * toes:g} mm: must be at least 0 mm and at most {highest:g} mm")
+    if requirements.stature is not None and not low <= height <= high:
+        raise StudyError(f"--stature: {height:g} m: {known}; give a gait and a wearer of your own in a walk file")
 
 
 def shown_clearance(toes: float) -> float:
@@ -137,9 +132,9 @@ class WalkedDevice:
         """Mass of both parts [kg]."""
         return self.valve.full_mass + self.actuator.full_mass
 
-    def has(self, wish: Wish) -> bool:
-        """Tell whether a few strides have the torque and the clearance of a wish."""
-        return wish.is_reached_by(self.torque) and self.toes >= wish.clearance
+    def has(self, requirements: DesignRequirements) -> bool:
+        """Tell whether a few strides have the torque and the clearance that are required."""
+        return requirements.is_reached_by(self.torque) and self.toes >= requirements.clearance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -177,24 +172,24 @@ class SizedDevice:
 
 
 @dataclass(frozen=True, slots=True)
-class Offer:
-    """A wish that can be met in place of another, with the parts that walked."""
+class Alternative:
+    """Requirements that can be met in place of those given, with the parts that met them in a walk."""
 
-    wish: Wish
+    requirements: DesignRequirements
     tried: WalkedDevice
     bottle: Part
 
-    def text(self, asked: Wish) -> str:
-        """Return the offer whole, with what it changes of the wish that was asked in front, and its parts."""
+    def text(self, asked: DesignRequirements) -> str:
+        """Return the alternative in full: first what it changes of the given requirements, then its parts."""
         changes = [
-            *(["less torque"] if self.wish.torque < asked.torque else []),
-            *(["lower toes"] if self.wish.clearance < asked.clearance else []),
-            *(["less pressure"] if self.wish.pressure < asked.pressure else []),
-            *(["more pressure"] if self.wish.pressure > asked.pressure else []),
-            *(["fewer minutes"] if self.wish.seconds < asked.seconds else []),
+            *(["less torque"] if self.requirements.torque < asked.torque else []),
+            *(["lower toes"] if self.requirements.clearance < asked.clearance else []),
+            *(["less pressure"] if self.requirements.pressure < asked.pressure else []),
+            *(["more pressure"] if self.requirements.pressure > asked.pressure else []),
+            *(["fewer minutes"] if self.requirements.seconds < asked.seconds else []),
         ]
         parts = f"{self.tried.valve.name} and {self.tried.actuator.name} on {self.bottle.name}"
-        return f"{', '.join(changes)}: {self.wish.text()}, with {parts}"
+        return f"{', '.join(changes)}: {self.requirements.text()}, with {parts}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -204,7 +199,7 @@ class WearerSizing:
     ``healthy_toes`` is the clearance of the toes in the healthy gait [m].
     """
 
-    wish: Wish
+    requirements: DesignRequirements
     healthy_toes: float
     tried: tuple[WalkedDevice, ...]
     device: SizedDevice | None
@@ -225,20 +220,20 @@ class WearerSizing:
 
     def json_document(self) -> dict[str, Any]:
         """Return the device and all that was tried as plain data in SI."""
-        wish, device = self.wish, self.device
+        requirements, device = self.requirements, self.device
         return {
             "format": "ppafo wearer sizing",
             "schema_version": 1,
             "kind": "simulated",
             "ppafo": __version__,
             "wish": {
-                "body_mass": wish.mass,
-                "stature": wish.height,
-                "stature_is_assumed": wish.stature is None,
-                "torque": wish.torque,
-                "pressure": wish.pressure,
-                "time": wish.seconds,
-                "toes": wish.clearance,
+                "body_mass": requirements.mass,
+                "stature": requirements.height,
+                "stature_is_assumed": requirements.stature is None,
+                "torque": requirements.torque,
+                "pressure": requirements.pressure,
+                "time": requirements.seconds,
+                "toes": requirements.clearance,
             },
             "healthy_toes": self.healthy_toes,
             "device": None

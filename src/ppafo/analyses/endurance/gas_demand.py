@@ -17,7 +17,7 @@ _MOST_RETURNED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Draw:
+class GasDemand:
     """Gas use: mass per stride [kg], time of a stride [s], largest flow [kg/s], and where the numbers come from.
 
     A stride is one cycle of the device's leg, heel strike to heel strike of the same foot.
@@ -34,7 +34,7 @@ class Draw:
         return self.mass_per_stride / self.stride_time
 
 
-def draw_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: float | None) -> Draw:
+def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: float | None) -> GasDemand:
     """Return the draw of given numbers [kg, s, kg/s]; without a largest flow the mean one is taken for it."""
     for name, value, unit in (("gas per stride", mass_per_stride, "kg"), ("stride time", stride_time, "s")):
         if not (math.isfinite(value) and value > 0.0):
@@ -45,10 +45,10 @@ def draw_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: float
             f"the largest flow, {peak_flow * GRAMS_PER_KILOGRAM:.4g} g/s, must be at least the mean flow, "
             f"{mean * GRAMS_PER_KILOGRAM:.4g} g/s"
         )
-    return Draw(mass_per_stride, stride_time, mean if peak_flow is None else peak_flow, "numbers given")
+    return GasDemand(mass_per_stride, stride_time, mean if peak_flow is None else peak_flow, "numbers given")
 
 
-def draw_of_recording(recording: Recording, stride_time: float | None) -> Draw:
+def demand_of_recording(recording: Recording, stride_time: float | None) -> GasDemand:
     """Return the draw of a recording with ``supplied_mass``, repeated for ever; all of it is one stride by default."""
     if "supplied_mass" not in recording:
         raise DataError(f"{recording.label}: has no channel 'supplied_mass'; available: {', '.join(recording.names)}")
@@ -71,7 +71,7 @@ def draw_of_recording(recording: Recording, stride_time: float | None) -> Draw:
         )
     mean = gain / recording.duration
     peak = max(mean, largest_flow(recording))
-    return Draw(mean * stride, stride, peak, f"recording '{recording.label}', {recording.kind}, repeated")
+    return GasDemand(mean * stride, stride, peak, f"recording '{recording.label}', {recording.kind}, repeated")
 
 
 def _gas_use(recording: Recording) -> Floats:

@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ppafo.analyses.design.wearer.wish import WALKS
+from ppafo.analyses.design.wearer.requirements import WALKS
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import rated_pressure
 
 
 @dataclass(frozen=True, slots=True)
-class Shelf:
+class AvailableParts:
     """Parts available for a device, by group, and the user's catalogue file, if any."""
 
     groups: Mapping[str, Mapping[str, Part]]
@@ -45,7 +45,7 @@ class Shelf:
         ]
 
 
-def shelf_of(catalogue: str | Path) -> Shelf:
+def shelf_of(catalogue: str | Path) -> AvailableParts:
     """Return the parts of a catalogue, by name or file; what it has no group of is the package's.
 
     ParameterError where it cannot be read, StudyError where its valves have no walk.
@@ -56,4 +56,4 @@ def shelf_of(catalogue: str | Path) -> Shelf:
     if not groups["valves"]:
         raise StudyError(f"--catalogue {catalogue}: no valve is of a kind that walks: {', '.join(WALKS)}")
     is_own = Path(catalogue).suffix == ".toml"
-    return Shelf(groups, frozenset(name for name in own if own[name] and is_own), str(catalogue))
+    return AvailableParts(groups, frozenset(name for name in own if own[name] and is_own), str(catalogue))
