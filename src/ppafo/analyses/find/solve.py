@@ -17,8 +17,6 @@ from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import RunCounter, Runs, oscillating, settled, tracking_violation, with_companions
 from ppafo.units import split_quantity
 
-DEFAULT_GRID = 64
-"""Values that are tried first, unless another number is given."""
 FEWEST, MOST = 3, 100_000
 """Values that may be tried first, from both ends with one between."""
 _PARTS = 32
