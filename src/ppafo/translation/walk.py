@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import Any, Protocol
+from typing import Any
 
 from ppafo.engine.compilers import LIBRARY, UntranslatableError
 from ppafo.engine.plain_python import parse_module, place_in, refusal
@@ -64,7 +64,7 @@ class Expressions:
     library: frozenset[str]
     made: Callable[[str, tuple[Type, ...]], Function]
     refused: Callable[[ast.AST, str], ProgramError]
-    mistaken: "Mistaken"
+    mistaken: Callable[..., ProgramError]
 
     def term(self, node: ast.expr) -> Term:
         """The value of an expression."""
@@ -383,13 +383,6 @@ def _linked(node: ast.BoolOp, parts: list[Term]) -> Term:
     for part in parts[1:]:
         made = Term(SIGN_OF[type(node.op)], BOOL, (made, part))
     return made
-
-
-class Mistaken(Protocol):
-    """The error for a mistake: its place in the composed text, what it is, and what the line has that is at fault."""
-
-    def __call__(self, where: ast.AST, problem: str, sought: str = "") -> ProgramError:
-        """Make it."""
 
 
 def _as_written(problem: str, written: str) -> str:

@@ -32,6 +32,11 @@ SCENARIOS = {
         "controller.converter_bits=14",
         "controller.converter_range=1.2 MPa_a",
     ),
+    "pid beyond a dead band": (
+        "torque-task-proportional",
+        "controller.kind=pid_fixed_point",
+        "valve.dead_band=0.3",
+    ),
     "on_off": ("torque-task-solenoid", "controller.kind=on_off_fixed_point"),
     "on_off_dead_zone": ("torque-task-proportional", "controller.kind=on_off_dead_zone_fixed_point"),
 }

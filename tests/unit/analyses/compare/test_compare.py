@@ -179,6 +179,12 @@ def test_mistakes_are_one_line() -> None:
         compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
 
 
+def test_draws_without_anything_to_draw_are_refused_before_any_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("ppafo.analyses.compare.solve.simulate_many", lambda *_: pytest.fail("it ran"))
+    with pytest.raises(StudyError, match="draws = 64"):
+        compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
+
+
 def test_a_scenario_that_was_changed_in_python_is_not_changed_back_in_silence() -> None:
     scenario = ppafo.load_scenario("torque-task-proportional")
     other = replace(scenario, name="longer", run=replace(scenario.run, duration=4.0))
