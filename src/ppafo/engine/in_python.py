@@ -157,13 +157,15 @@ def _links_of(program: Program) -> tuple[dict[Any, Any], dict[Any, tuple[str, ..
     return collector.links, collector.effects
 
 
-def in_program(function: PlainFunction, program: Program, effects: Sequence[Any]) -> PlainFunction:
+def in_program(
+    function: PlainFunction, program: Program, effects: Sequence[Any], operations: "Operations | None" = None
+) -> PlainFunction:
     """Return a function of the model as a program has it, with parameters of its effects.
 
     Before its own arguments it takes the states of effects by name, an empty mapping where there are none.
     """
     rows = {effect.name: row for effect, row in zip(program.effects, effects, strict=True)}
-    own = functions_of(program, rows).of(function)
+    own = functions_of(program, rows, operations).of(function)
 
     def called(states: Mapping[str, Any], *arguments: Any) -> Any:
         rows.update(states)
@@ -322,7 +324,7 @@ class _ForColumns(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> Any:
         """Write a node."""
         if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not self.is_elementwise(node):
-            raise ProgramError(f"'{ast.unparse(node)}' has no form for columns")
+            raise ProgramError(f"'{ast.unparse(node)}' cannot be evaluated for columns")
         return super().visit(node)
 
     def is_elementwise(self, node: ast.AST) -> bool:
