@@ -7,7 +7,9 @@
 
 Writes one program for each shipped scenario and walk into ``src/ppafo/page/wasm/programs``, with an index that says
 of which text each was made; needs the package ziglang of the lock file. ``--check`` writes nothing and says what
-differs.
+differs. Beside the folder stands ``shipped.json``, by which a page finds the program of a shipped scenario without
+composing its text. It holds for the files of the package as they are: after any change of them, also of a comment,
+programs are found more slowly until ``--keys``, which builds nothing, has written it anew.
 
 ``--compare`` draws settings, runs them under node and in Python, and stops at the first number that differs.
 ``--time`` prints a table: size, a run of the settings as they are, and a map of 1,024 runs of a valve area and a
@@ -16,11 +18,14 @@ pressure, on one thread under node, in time of the processor. A walk lasts six s
 
 import argparse
 import gzip
+import importlib
 import json
+import pkgutil
 import subprocess
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +33,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
+from ppafo.engine.package_key import package_key
 from ppafo.exports.c_library import library_of
 from ppafo.loading import load_scenario
 from ppafo.page import wasm
@@ -37,6 +43,7 @@ from ppafo.walking.loading import list_walks
 from tests.modules_under_node import compared, drawn, drawn_walks
 
 FOLDER = Path(wasm.__file__).parent / "programs"
+PACKAGE = Path(wasm.__file__).parents[2]
 SIDE, SIDE_OF_WALKS = 32, 8
 """Values of each of both settings of a map."""
 
@@ -72,6 +79,33 @@ def write(is_check: bool) -> int:
                 FOLDER.mkdir(exist_ok=True)
                 FOLDER.joinpath(name).write_bytes(built[name])
     return int(is_check and bool(differing))
+
+
+def keys_of(names: Iterable[str]) -> dict[str, Any]:
+    """Digests of the texts of scenarios and walks, with the files and values of the loaded package as they are now."""
+    digests, key = {}, None
+    for name in names:
+        scenario = load_scenario(name)
+        key = package_key(scenario, wasm.WRITTEN_BY)
+        assert key is not None, f"{name} is made of functions of the package alone"
+        digests[wasm.short_digest(key.described)] = wasm.digest_of(wasm.source_of(library_of(scenario)))
+    assert key is not None, "there is a scenario"
+    return {"files": key.files, "values": dict(sorted(key.values.items())), "digests": digests}
+
+
+def write_keys(is_check: bool) -> int:
+    """Write the keys of the shipped programs; 1 where only asked whether they differ, and they do."""
+    # All modules, as a process may have loaded any of them.
+    for folder in wasm.WRITTEN_BY:
+        for module in pkgutil.walk_packages([str(PACKAGE / folder)], f"ppafo.{folder}."):
+            importlib.import_module(module.name)
+    file, keys = FOLDER.with_name(wasm.SHIPPED_KEYS), f"{json.dumps(keys_of(shipped()), indent=2)}\n"
+    differs = not file.is_file() or file.read_text(encoding="utf-8") != keys
+    if differs:
+        print(f"{file.name}: differs")
+        if not is_check:
+            file.write_text(keys, encoding="utf-8")
+    return int(is_check and differs)
 
 
 def compare(names: list[str], draws: int) -> int:
@@ -133,13 +167,16 @@ def main() -> int:
     """Write the programs, or do what is asked instead."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--check", action="store_true", help="only say what differs")
+    parser.add_argument("--keys", action="store_true", help="only the keys of shipped programs; builds nothing")
     parser.add_argument("--compare", metavar="DRAWS", type=int, default=0, help="compare drawn runs with Python")
     parser.add_argument("--time", action="store_true", help="print sizes and times")
     parser.add_argument("--names", nargs="+", default=list(shipped()), help="of what (default: all)")
     parsed = parser.parse_args()
     if parsed.compare:
         return compare(parsed.names, parsed.compare)
-    return time_programs(parsed.names) if parsed.time else write(parsed.check)
+    if parsed.time:
+        return time_programs(parsed.names)
+    return max(0 if parsed.keys else write(parsed.check), write_keys(parsed.check))
 
 
 if __name__ == "__main__":

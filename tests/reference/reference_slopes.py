@@ -59,6 +59,25 @@ class ThermalGasRates(NamedTuple):
     leaked: float
 
 
+def real_gas_rates(
+    plant: PlantParameters,
+    angle: float,
+    angular_velocity: float,
+    flow_1: float,
+    flow_2: float,
+    content_1: float,
+    content_2: float,
+) -> tuple[float, float]:
+    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    # The chambers are opposite: what one gains in volume the other loses.
+    growth = plant.displacement_per_radian * angular_velocity
+    return (
+        content_rate(content_1, volume_1, growth, flow_1),
+        content_rate(content_2, volume_2, -growth, flow_2),
+    )
+
+
 def gas_rates(
     plant: PlantParameters,
     valve_orifice: ExactOrifice,
@@ -157,25 +176,6 @@ def thermal_gas_rates(
         supplied=source_1.mass + source_2.mass,
         vented=vent_1.mass + vent_2.mass,
         leaked=abs(leak.mass),
-    )
-
-
-def real_gas_rates(
-    plant: PlantParameters,
-    angle: float,
-    angular_velocity: float,
-    flow_1: float,
-    flow_2: float,
-    content_1: float,
-    content_2: float,
-) -> tuple[float, float]:
-    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    # The chambers are opposite: what one gains in volume the other loses.
-    growth = plant.displacement_per_radian * angular_velocity
-    return (
-        content_rate(content_1, volume_1, growth, flow_1),
-        content_rate(content_2, volume_2, -growth, flow_2),
     )
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol
 
 from ppafo.model.columns import Problem
 from ppafo.model.controlled import TORQUE
@@ -57,6 +57,18 @@ NOMINAL = {
 
 ``simulation.nominal`` gives each its value.
 """
+
+DEAD_BAND = Quantity(
+    "dead_band",
+    "",
+    "believed smallest command that opens the valve",
+    None,
+    0.0,
+    0.99,
+    follows=(NOMINAL["dead_band"],),
+)
+BelievedBand = Annotated[float, DEAD_BAND]
+"""Setting of a law that opens the valve beyond its dead band, by ``control.torque_loop.beyond_dead_band``."""
 
 Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
 """Function that computes the numbers of a law from its settings."""

@@ -54,13 +54,21 @@ USUAL_LEAD = 0.0185
 SAMPLES_LATE = 1.5
 """Sample periods by which a sampled command is late: one to compute it, half of one for which it is held."""
 
-SHARPNESS = 0.01
-"""Command [-] within which a dead band is passed through: a jump at 0 would let the valve chatter."""
+SHARPNESS = 1.0 / 128.0
+"""Opening [-] within which a dead band is passed through: a jump at 0 would let the valve chatter.
+
+A power of two, so that laws on whole numbers pass it within the same one.
+"""
 
 
-def beyond_dead_band(command: float, dead_band: float) -> float:
-    """Command [-] whose opening is a command from -1 to 1, of a valve that opens beyond a dead band [-]."""
-    return (1.0 - dead_band) * command + dead_band * max(-1.0, min(1.0, command / SHARPNESS))
+def beyond_dead_band(opening: float, dead_band: float) -> float:
+    """Command u [-] for an opening o from -1 to 1 that a law asks for, of a valve that opens beyond a dead band d [-]:
+
+        u = (1 - d) o + d min(1, max(-1, o / SHARPNESS))
+
+    Every law that asks for openings between shut and open ends with it. With d = 0 the command is the opening.
+    """
+    return (1.0 - dead_band) * opening + dead_band * max(-1.0, min(1.0, opening / SHARPNESS))
 
 
 def torque_in_dead_time(loop: TorqueLoop) -> float:

@@ -29,10 +29,25 @@ _PLAIN = (bool, int, float, str)
 
 
 class Key(NamedTuple):
-    """Inputs of a text, in words, and the names that it depends on with their values."""
+    """Inputs of a text.
 
-    words: str
+    Attributes:
+        described: parts of the program in words
+        files: hash of the files of the package that compose the text
+        values: hash of the numbers and texts that each loaded module of them has under its names, by module
+        made_from: names that the text depends on, with their values
+    """
+
+    described: str
+    files: str
+    values: Mapping[str, str]
     made_from: MadeFrom
+
+    @property
+    def words(self) -> str:
+        """All inputs in one text; also Python's version, as each writes a syntax tree in its own way."""
+        values = " ".join(self.values.values())
+        return f"{sys.version} {self.files} {values} {self.described}"
 
 
 def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
@@ -43,12 +58,13 @@ def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
     except _ElsewhereError:
         return None
     # Beside the bytes of the files: a session may have given a name another number.
-    numbers = hashlib.sha256()
+    numbers: dict[str, Any] = {}
     for read in reads:
         if not isinstance(read.value, FunctionType):
-            numbers.update(f"{read.name} {read.value!r}\n".encode("utf-8", "surrogatepass"))
-    words = f"{_hash_of_files(folders)} {numbers.hexdigest()} {described}"
-    return Key(words, MadeFrom(reads))
+            digest = numbers.setdefault(read.scope["__name__"], hashlib.sha256())
+            digest.update(f"{read.name} {read.value!r}\n".encode("utf-8", "surrogatepass"))
+    values = {module: digest.hexdigest()[:16] for module, digest in numbers.items()}
+    return Key(described, _hash_of_files(folders), values, MadeFrom(reads))
 
 
 class _ElsewhereError(Exception):
@@ -57,8 +73,8 @@ class _ElsewhereError(Exception):
 
 @cache
 def _hash_of_files(folders: tuple[str, ...]) -> str:
-    """The bytes of the files, and Python, which writes the text of a syntax tree in its own way."""
-    digest = hashlib.sha256(sys.version.encode())
+    """Hash of the paths and bytes of the files."""
+    digest = hashlib.sha256()
     root = str(_PACKAGE)
     # Names as texts: paths of hundreds of files take longer than their bytes.
     files = [

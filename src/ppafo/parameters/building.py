@@ -45,7 +45,7 @@ _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
 _COVERED = 1.01
 """A supply this much beyond the pressures of a table is still covered by it."""
-_BESIDE_ANOTHER = "; the other supply is above it, and both must be on one side"
+_BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
 """Function that reads a section by its declared quantities: numbers in SI, by name."""

@@ -6,6 +6,7 @@ A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 1
 import math
 from typing import NamedTuple
 
+from ppafo.control.torque_loop import SHARPNESS
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
 
@@ -15,8 +16,8 @@ LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
 """Largest fraction in 16 bits with a sign."""
 MOST_PLACES = 30
 """Places that a product of 32 bits is shifted right by at most."""
-WIDEST = 2**30
-"""Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
+SHARPENED = int(1.0 / SHARPNESS)
+"""Openings that pass a dead band in full are this part of full opening or more."""
 
 
 class FixedPointGain(NamedTuple):
@@ -36,6 +37,16 @@ def fraction_of(value: int, fraction: int) -> int:
         total = (total + value if left & 1 == 1 else total) >> 1
         left = left >> 1
     return total
+
+
+def beyond_band(opening: int, band: int, full: int) -> int:
+    """Command for an ``opening`` from -``full`` to ``full``, beyond a dead band of ``band`` / 2^15; 0 leaves it as is.
+
+    The law of ``control.torque_loop.beyond_dead_band``, rounded down to whole parts of ``full``.
+    """
+    passed = limited(opening * SHARPENED, full)
+    # Between both, which the proof of the ranges does not see.
+    return limited(opening + fraction_of(passed - opening, band), full)
 
 
 def shifted(value: int, places: int) -> int:

@@ -429,7 +429,7 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     """The motion of a scenario of a vane alone; ScenarioError for a leg that wears the device."""
     if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
         return scenario.motion
-    raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, and here a scenario without a wearer is needed")
+    raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, but a scenario of the vane alone is needed here")
 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:

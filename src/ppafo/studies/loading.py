@@ -32,7 +32,16 @@ from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import ShiftedDistribution
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
 from ppafo.studies.study import Axis, Configuration, RandomValue, SamplingPlan, Study, valid_outputs
-from ppafo.studies.varying import VariedPath, axis_or_distribution, in_its_unit, stated_normal, texts_of, varied_path
+from ppafo.studies.varying import (
+    VariedPath,
+    axis_or_distribution,
+    given_in,
+    in_its_unit,
+    stated_normal,
+    texts_of,
+    varied_path,
+)
+from ppafo.units.shown import usual_unit
 
 STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
 
@@ -151,6 +160,11 @@ def _build(parsed: declared.StudyFile, document: dict[str, Any], source: StudySo
         outputs=valid_outputs(parsed.outputs, scenarios),
         runs_of_chunk=parsed.runs_of_chunk,
         units=_units(varied_paths, drawn),
+        given={
+            path: varied.given
+            for path, varied in varied_paths.items()
+            if varied.given not in ("", usual_unit(varied.quantity.unit))
+        },
         gauge=frozenset(gauge),
         only={entry.path: entry.only for entry in parsed.vary if entry.only},
         document=document,
@@ -215,7 +229,11 @@ def _common_path(
     with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
         first, *others = (varied_path(entry.path, each.scenario) for each in _varying(entry, configurations))
     if any(other != first for other in others):
-        raise StudyError(f"vary '{entry.path}': has different units, limits or atmospheres in different configurations")
+        raise StudyError(
+            f"vary '{entry.path}': has different units, limits or atmospheres in different "
+            f"configurations; restrict it with 'only'"
+        )
+    first = given_in(first, texts_of(entry))
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
     if isinstance(entry, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:
         return first

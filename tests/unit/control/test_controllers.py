@@ -92,7 +92,7 @@ def test_a_thin_boundary_layer_is_a_switch_and_a_wide_one_is_proportional() -> N
 
 def test_the_integral_of_the_sliding_surface_stands_still_outside_the_layer() -> None:
     update = CONTROLLERS["sliding_mode"].update
-    chosen = SlidingModeParameters(5.0, 0.5, 1.0)
+    chosen = SlidingModeParameters(5.0, 0.5, 1.0, 0.0)
     assert update(chosen, SlidingModeState(0.01), 2.0, seen(0.0), PERIOD) == (1.0, SlidingModeState(0.01))
     command, state = update(chosen, SlidingModeState(0.01), 2.0, seen(1.9), PERIOD)
     assert state.integral == pytest.approx(0.01 + 0.1 * PERIOD)
@@ -162,7 +162,13 @@ def test_anti_windup_brings_the_torque_down_in_time() -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "largest"), [("feedback_linearisation", 0.05), ("pid_feedforward", 0.05), ("damped_proportional", 0.3)]
+    ("kind", "largest"),
+    [
+        ("feedback_linearisation", 0.05),
+        ("pid_feedforward", 0.05),
+        ("damped_proportional", 0.3),
+        ("sliding_mode", 0.05),
+    ],
 )
 def test_a_law_that_knows_the_dead_band_of_its_valve_opens_it_beyond(kind: str, largest: float) -> None:
     changes = [f"controller.kind={kind}", "valve.dead_band=0.3", "reference.level=4 N m", "run.duration=1.5 s"]

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ppafo.control.catalog import CONTROLLERS
+from ppafo.control.torque_loop import beyond_dead_band
 from ppafo.engine.rows import leaf_paths, leaves, rebuilt
 from ppafo.model.sensors import Measurement
 from ppafo.processor.fixed_point import (
@@ -16,9 +17,9 @@ from ppafo.processor.fixed_point import (
     FRACTION_BITS,
     LARGEST_FRACTION,
     SETTINGS,
-    WIDEST,
     ConverterCounts,
     ConverterLimits,
+    beyond_band,
     converter_of,
     count_of,
     fraction_of,
@@ -29,12 +30,14 @@ from ppafo.processor.fixed_point import (
 )
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
-from ppafo.processor.torque_laws.pid import PID, largest_pid
+from ppafo.processor.torque_laws.pid import FULL, PID, largest_pid
 
 TORQUE_CONSTANT = 1.451e-5
 PERIOD = 1.0e-3
 BITS, RANGE = 12.0, 1.0e6
 CONVERTER = converter_of(BITS, RANGE, TORQUE_CONSTANT)
+WIDEST = 2**30
+"""Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
 
 
 PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12}
@@ -61,6 +64,14 @@ def seen(torque: float) -> Measurement:
 def test_a_product_is_at_most_one_below_the_exact_one(value: int, fraction: int) -> None:
     exact = value * fraction / 2**FRACTION_BITS
     assert exact - 1.0 <= fraction_of(value, fraction) <= exact
+
+
+@given(st.integers(-FULL, FULL), st.floats(0.0, 0.99))
+def test_a_dead_band_is_passed_on_whole_numbers_as_on_floats(opening: int, dead_band: float) -> None:
+    found = beyond_band(opening, round(dead_band * 2**FRACTION_BITS), FULL)
+    assert found == pytest.approx(FULL * beyond_dead_band(opening / FULL, dead_band), abs=3.0)
+    assert beyond_band(opening, 0, FULL) == opening
+    assert abs(beyond_band(FULL, round(dead_band * 2**FRACTION_BITS), FULL)) == FULL
 
 
 @given(st.integers(-WIDEST, WIDEST), st.integers(0, 30))
@@ -103,8 +114,12 @@ def test_what_defaults_come_to_lies_within_what_is_declared(law: FixedLaw) -> No
 
 @pytest.mark.parametrize(
     "settings",
-    [{}, {"derivative_filter": 5.0e-3, "anti_windup": 10.0, "proportional_gain": 0.5, "integral_gain": 2.0}],
-    ids=["paper", "filter and anti-windup"],
+    [
+        {},
+        {"dead_band": 0.3},
+        {"derivative_filter": 5.0e-3, "anti_windup": 10.0, "proportional_gain": 0.5, "integral_gain": 2.0},
+    ],
+    ids=["paper", "dead band", "filter and anti-windup"],
 )
 def test_pid_on_whole_numbers_follows_the_float_form(settings: dict[str, float]) -> None:
     law, float_law = PID, CONTROLLERS["pid"]

@@ -79,7 +79,7 @@ def metrics_of(result: Result) -> dict[str, float]:
     recording = result.recording
     last = float(recording["reference"][-1])
     largest = max(abs(float(recording["reference"][0])), abs(last))
-    course = ReferenceSummary(last, largest, SAME_LEVEL * largest, 0.0)
+    course = ReferenceSummary(last, largest, SAME_LEVEL * largest, 0.0, float(len(recording)))
     kinds = [
         kind
         for kind in METRICS.values()
@@ -330,8 +330,9 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
         ("pressure-loop", (), ("supply.pressure", 5.0e5)),
         ("torque-task-slow-valve", ("controller.kind=on_off_dead_zone",), ("supply.pressure", 5.0e5)),
         ("torque-task-slow-valve", ("controller.kind=feedback_linearisation",), ("valve.dead_band", 0.2)),
+        ("torque-task-slow-valve", (), ("valve.dead_band", 0.2)),
     ],
-    ids=["cylinder-servo", "pressure-loop", "dead zone", "dead band"],
+    ids=["cylinder-servo", "pressure-loop", "dead zone", "dead band", "dead band of a PID"],
 )
 def test_a_library_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
     name: str, law: tuple[str, ...], change: tuple[str, float], tmp_path: Path

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -113,6 +115,33 @@ def test_a_module_that_was_found_once_is_found_again_without_writing_its_text(
     monkeypatch.setattr(wasm, "source_of", lambda _library: pytest.fail("the text was written"))
     assert module_of(load_scenario("torque-task-proportional", MOVED)).wasm == first.wasm
     assert list(fresh_cache.rglob("digest-*"))
+
+
+_COMPOSED_NEVER = """\
+from ppafo.engine.scheme import pneumatics
+from ppafo.loading import load_scenario
+from ppafo.page import wasm
+from scripts.wasm_programs import keys_of
+
+# Again, as the first time loads modules.
+_, keys = keys_of(["step-response"]), keys_of(["step-response"])
+scenario = load_scenario("step-response")
+wasm._shipped_keys = lambda: keys
+composed = []
+wasm._known_digest = lambda library: composed.append(library) or ""
+wasm.check_can_build = lambda: None
+wasm.build = lambda text: b"built"
+assert wasm.module_of(scenario).wasm != b"built" and not composed, "as it is shipped"
+pneumatics.GAMMA = 0.3
+assert wasm.module_of(scenario).wasm == b"built" and composed, "with a number changed"
+"""
+
+
+@pytest.mark.long
+def test_a_shipped_scenario_has_its_program_without_composing_a_text(fresh_cache: Path) -> None:
+    """In a process of its own: this one has functions of the tests in the package, which then has no keys."""
+    done = subprocess.run([sys.executable, "-c", _COMPOSED_NEVER], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def as_it_is(number: float) -> float:

@@ -23,7 +23,7 @@ from ppafo.control.angle_loop import (
     TOLERANCE,
     TORQUE_LAG,
 )
-from ppafo.control.kind import NOMINAL, ControllerKind
+from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import beyond_dead_band
 from ppafo.model.controlled import ANGLE, steered
 from ppafo.model.declaration import Number, quantities_of
@@ -78,10 +78,7 @@ class CascadeParameters(NamedTuple):
     inertia: Annotated[
         float, Number("kg m^2", "believed inertia about the joint, 0 for none", None, 0.0, 1.0e3, follows=(INERTIA,))
     ]
-    dead_band: Annotated[
-        float,
-        Number("", "believed smallest command that opens the valve", None, 0.0, 0.99, follows=(NOMINAL["dead_band"],)),
-    ]
+    dead_band: BelievedBand
 
 
 class CascadeState(NamedTuple):

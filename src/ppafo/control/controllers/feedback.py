@@ -5,7 +5,7 @@ Units are those of a torque; of what else is controlled, its unit stands in the 
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import NOMINAL, ControllerKind
+from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import (
     BOUNDARY,
     INTEGRAL_GAIN,
@@ -18,7 +18,7 @@ from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
 
 
-class PidParameters(NamedTuple):
+class PidGains(NamedTuple):
     """Gains [1/(N m)], [1/(N m s)], [s/(N m)]; time constant of the derivative filter [s]; back-calculation [1/s]."""
 
     proportional_gain: Annotated[float, Number("1/(N m)", "k_p", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))]
@@ -40,6 +40,13 @@ class PidParameters(NamedTuple):
     ]
 
 
+class PidParameters(NamedTuple):
+    """Gains of a PID, and the dead band of the valve [-] that it believes in."""
+
+    gains: PidGains
+    dead_band: BelievedBand
+
+
 class PidState(NamedTuple):
     """Integral part of the command [-], error one sample ago [N m], filtered slope of the error [N m/s], start mark."""
 
@@ -49,10 +56,8 @@ class PidState(NamedTuple):
     started: float
 
 
-def pid_command(
-    parameters: PidParameters, state: PidState, error: float, ahead: float, period: float
-) -> tuple[float, PidState]:
-    """Command u from -1 to 1 for a torque error e [N m], added to the command ``ahead`` u_0 [-]. Equation (13):
+def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, period: float) -> tuple[float, PidState]:
+    """Opening u from -1 to 1 for a torque error e [N m], added to the opening ``ahead`` u_0 [-]. Equation (13):
 
         u = u_0 + k_p e + k_i (integral of e) + k_d (slope of e)
 
@@ -63,20 +68,21 @@ def pid_command(
     # The first sample has none before it: no kick of the derivative.
     change = (error - state.error) * state.started
     # Implicit filter: stable for any time constant, also 0, where it is the plain difference.
-    slope = state.slope + (change - period * state.slope) / (period + parameters.derivative_filter)
-    integral = state.integral + parameters.integral_gain * error * period
-    unlimited = ahead + parameters.proportional_gain * error + integral + parameters.derivative_gain * slope
+    slope = state.slope + (change - period * state.slope) / (period + gains.derivative_filter)
+    integral = state.integral + gains.integral_gain * error * period
+    unlimited = ahead + gains.proportional_gain * error + integral + gains.derivative_gain * slope
     command = max(-1.0, min(1.0, unlimited))
     # Back-calculation: it acts only while the command is clipped, since both are equal otherwise.
-    integral = integral + parameters.anti_windup * period * (command - unlimited)
+    integral = integral + gains.anti_windup * period * (command - unlimited)
     return command, PidState(integral=integral, error=error, slope=slope, started=1.0)
 
 
 def pid_update(
     parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidState]:
-    """Command from -1 to 1 from the torque error [N m]; rectangular integral, backward difference. Equation (13)."""
-    return pid_command(parameters, state, seen_error(reference, measurement), 0.0, period)
+    """Command from -1 to 1 from the torque error [N m], equation (13), beyond the dead band of the valve."""
+    opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement), 0.0, period)
+    return beyond_dead_band(opening, parameters.dead_band), after
 
 
 def pid_restart(state: PidState, requested: float, continues: float) -> PidState:
@@ -100,7 +106,7 @@ PID = ControllerKind(
 
 
 class SlidingModeParameters(NamedTuple):
-    """Slope of the surface [1/s], half width of the boundary layer [N m], command outside of it [-]."""
+    """Slope of the surface [1/s], half width of the boundary layer [N m], opening outside of it [-]; dead band [-]."""
 
     surface_slope: Annotated[
         float,
@@ -109,7 +115,8 @@ class SlidingModeParameters(NamedTuple):
     boundary_layer: Annotated[
         float, Number("N m", "half width of the layer without switching", None, 1.0e-6, 1.0e4, follows=(BOUNDARY,))
     ]
-    reaching_command: Annotated[float, Number("", "command outside the layer", 1.0, 0.0, 1.0)]
+    reaching_command: Annotated[float, Number("", "opening outside the layer", 1.0, 0.0, 1.0)]
+    dead_band: BelievedBand
 
 
 class SlidingModeState(NamedTuple):
@@ -125,18 +132,20 @@ def sliding_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, SlidingModeState]:
-    """Command u [-] for the torque error e [N m], with the boundary layer phi [N m] and the slope lambda [1/s]:
+    """Command [-] for the torque error e [N m], with the boundary layer phi [N m] and the slope lambda [1/s]:
 
         s = e + lambda (integral of e),    u = reaching_command min(1, max(-1, s / phi))
 
-    The integral stands still outside the layer, where a longer error could not open the valve further.
+    The opening u is made a command beyond the dead band. The integral stands still outside the layer, where a longer
+    error could not open the valve further.
     """
     error = seen_error(reference, measurement)
     integral = state.integral + period * error
     surface = error + parameters.surface_slope * integral
     is_inside = abs(surface) < parameters.boundary_layer
     fraction = max(-1.0, min(1.0, surface / parameters.boundary_layer))
-    return parameters.reaching_command * fraction, SlidingModeState(integral if is_inside else state.integral)
+    command = beyond_dead_band(parameters.reaching_command * fraction, parameters.dead_band)
+    return command, SlidingModeState(integral if is_inside else state.integral)
 
 
 def sliding_restart(state: SlidingModeState, requested: float, continues: float) -> SlidingModeState:
@@ -255,15 +264,7 @@ DAMPED_PROPORTIONAL = ControllerKind(
             Quantity(f"knot_{number}", "", f"learnt command at knot {number}", 0.0, -1.0, 1.0)
             for number in range(KNOTS)
         ),
-        Quantity(
-            "dead_band",
-            "",
-            "believed smallest command that opens the valve",
-            None,
-            0.0,
-            0.99,
-            follows=(NOMINAL["dead_band"],),
-        ),
+        DEAD_BAND,
     ),
     parameters=DampedProportionalParameters,
     initial=DampedProportionalState(0.0, TorqueSlope(0.0, 0.0, 0.0)),

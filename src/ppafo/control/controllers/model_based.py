@@ -7,8 +7,8 @@ number is the controller's own, so that it can be wrong about the device as a re
 import math
 from typing import Annotated, NamedTuple
 
-from ppafo.control.controllers.feedback import PidParameters, PidState, pid_command, pid_restart
-from ppafo.control.kind import NOMINAL, ControllerKind
+from ppafo.control.controllers.feedback import PidGains, PidState, pid_command, pid_restart
+from ppafo.control.kind import NOMINAL, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import CONVERGENCE, beyond_dead_band
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
@@ -46,7 +46,7 @@ class NominalChambers(NamedTuple):
         float, _believed("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e3, 1.0e8)
     ]
     atmospheric_pressure: Annotated[float, _believed("atmospheric_pressure", "Pa_a", "atmosphere", 1.0e3, 1.0e8)]
-    dead_band: Annotated[float, _believed("dead_band", "", "smallest command that opens the valve", 0.0, 0.99)]
+    dead_band: BelievedBand
 
 
 class TorqueRates(NamedTuple):
@@ -121,7 +121,7 @@ NEARLY_SUPPLY = 0.999
 class PidFeedforwardParameters(NamedTuple):
     """Gains of the feedback, weight of the feed-forward [-], and the believed device."""
 
-    feedback: PidParameters
+    feedback: PidGains
     feedforward: float
     nominal: NominalChambers
 
@@ -170,7 +170,7 @@ PID_FEEDFORWARD = ControllerKind(
     summary="PID on the torque error, with feed-forward from a valve model along the reference.",
     source="the paper, equation (13), with the inverse of equations (2) to (9); Åström and Hägglund 2006, Advanced PID",
     quantities=(
-        *quantities_of(PidParameters),
+        *quantities_of(PidGains),
         Quantity("feedforward", "", "weight of the feed-forward, 0 for none", 1.0, 0.0, 2.0),
         *NOMINAL_QUANTITIES,
     ),

@@ -10,8 +10,8 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.controllers import feedback, model_based, switching
-from ppafo.control.kind import ControllerKind
-from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN
+from ppafo.control.kind import BelievedBand, ControllerKind
+from ppafo.control.torque_loop import INTEGRAL_GAIN, PROPORTIONAL_GAIN, beyond_dead_band
 from ppafo.control.walking import event_on_off, learning
 from ppafo.control.walking.frame import shared_settings, walking_law
 from ppafo.kinds import Kinds
@@ -23,7 +23,7 @@ from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class ProportionalParameters(NamedTuple):
-    """Gains on the torque error [1/(N m)] and its integral [1/(N m s)]."""
+    """Gains on the torque error [1/(N m)] and its integral [1/(N m s)]; believed dead band of the valve [-]."""
 
     torque_gain: Annotated[
         float, Number("1/(N m)", "opening per torque error", None, 0.0, 1.0e3, follows=(PROPORTIONAL_GAIN,))
@@ -32,6 +32,7 @@ class ProportionalParameters(NamedTuple):
         float,
         Number("1/(N m s)", "opening per integral of the torque error", None, 0.0, 1.0e6, follows=(INTEGRAL_GAIN,)),
     ]
+    dead_band: BelievedBand
 
 
 class ProportionalState(NamedTuple):
@@ -47,16 +48,17 @@ def proportional_update(
     measurement: Measurement,
     period: float,
 ) -> tuple[float, ProportionalState]:
-    """Command u from -1 to 1 and the next state, at a torque error e [N m] every ``period`` [s].
+    """Command from -1 to 1 and the next state, at a torque error e [N m] every ``period`` [s].
 
-    u = torque_gain e + torque_integral_gain (integral of e)
+    The opening u = torque_gain e + torque_integral_gain (integral of e), beyond the dead band of the valve.
     """
     error = reference - measurement.torque
     proposed = parameters.torque_gain * error + state.integral
     # The integral waits while the valve is fully open: more of it could not be carried out.
     added = parameters.torque_integral_gain * error * period
     integral = state.integral + (added if abs(proposed) < 1.0 else 0.0)
-    return max(-1.0, min(1.0, proposed)), ProportionalState(integral)
+    command = beyond_dead_band(max(-1.0, min(1.0, proposed)), parameters.dead_band)
+    return command, ProportionalState(integral)
 
 
 def proportional_restart(state: ProportionalState, requested: float, continues: float) -> ProportionalState:

@@ -14,8 +14,8 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.controllers import feedback
 from ppafo.control.controllers.feedback import DampedGains, TorqueSlope, damped_command
-from ppafo.control.kind import ControllerKind
-from ppafo.control.torque_loop import LEAD, LEARNING_GAIN
+from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
+from ppafo.control.torque_loop import LEAD, LEARNING_GAIN, beyond_dead_band
 from ppafo.control.walking import assistance, phases, safety
 from ppafo.control.walking.assistance import (
     ASSISTING_QUANTITIES,
@@ -152,10 +152,11 @@ def next_table(table: LearntTable, place: float, weight: float, step: float, for
 
 
 class EventDampedLearningParameters(NamedTuple):
-    """Gains of the law and of learning, what is requested, and the rules of phases, safety and timing."""
+    """Gains of law and learning, believed dead band [-], requested torque, rules of phases, safety and timing."""
 
     law: DampedGains
     learning: LearningRules
+    dead_band: BelievedBand
     assistance: Assistance
     phases: PhaseRules
     safety: SafetyRules
@@ -205,7 +206,8 @@ def update(
     law = state.law._replace(
         slope=state.law.slope * assessment.continues, started=state.law.started * assessment.continues
     )
-    command, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
+    opening, law = damped_command(parameters.law, law, assessment.request.torque, torque, ahead, period)
+    command = beyond_dead_band(opening, parameters.dead_band)
     command, watch = assistance.valve_command(assessment, command, period)
     following: EventDampedLearningState = parts.state(
         phase=phase,
@@ -225,6 +227,7 @@ KIND = ControllerKind(
     quantities=(
         *feedback.GAIN_QUANTITIES,
         *quantities_of(LearningRules),
+        DEAD_BAND,
         *ASSISTING_QUANTITIES,
     ),
     parameters=EventDampedLearningParameters,

@@ -75,7 +75,7 @@ from pathlib import Path
 from typing import Any, final
 
 from ppafo.engine.cache.texts import kept_bytes
-from ppafo.engine.package_key import COMPOSED, package_key
+from ppafo.engine.package_key import COMPOSED, Key, package_key
 from ppafo.errors import PpafoError, ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
@@ -304,6 +304,11 @@ _HOW_TO_INSTALL = "pip install 'ppafo[workbench]'"
 
 _WRITERS = ("exports", "gait", "page", "parameters", "simulation", "translation", "walking")
 """Folders of the package that have a part in the text of a module, beside those of a program."""
+WRITTEN_BY = (*COMPOSED, *_WRITERS)
+SHIPPED_KEYS = "shipped.json"
+"""File that says which program each shipped scenario and walk has, and for which files of the package that holds."""
+_OF_THE_COMPUTER = "ppafo.translation.native"
+"""Module whose values are of the compilers and the processor of this computer, and in no text."""
 
 
 def program_of(library: Library, scenario: Scenario) -> bytes:
@@ -311,10 +316,10 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
 
     Neither the text nor a module is made twice on a computer.
     """
-    key = package_key(scenario, (*COMPOSED, *_WRITERS))
+    key = package_key(scenario, WRITTEN_BY)
     if key is None:
         digest = _known_digest(library)
-    else:
+    elif not (digest := _shipped_digest(key)):
         words = "\n".join([__version__, *FLAGS, key.words])
         digest = kept_bytes("module", words, lambda: _known_digest(library).encode()).decode()
     prebuilt = prebuilt_programs().get(digest)
@@ -322,6 +327,27 @@ def program_of(library: Library, scenario: Scenario) -> bytes:
         return _PROGRAMS.joinpath(prebuilt).read_bytes()
     check_can_build()
     return kept_bytes("wasm", f"{digest} {compiler_version()}", lambda: build(source_of(library)))
+
+
+def _shipped_digest(key: Key) -> str:
+    """The digest of a shipped scenario's text without composing it; empty for others, and after any change of code."""
+    shipped = _shipped_keys()
+    is_as_shipped = key.files == shipped["files"] and all(
+        shipped["values"].get(module) == value for module, value in key.values.items() if module != _OF_THE_COMPUTER
+    )
+    return str(shipped["digests"].get(short_digest(key.described), "")) if is_as_shipped else ""
+
+
+def short_digest(described: str) -> str:
+    """A short name of a described scenario."""
+    return hashlib.sha256(described.encode()).hexdigest()[:16]
+
+
+@cache
+def _shipped_keys() -> dict[str, Any]:
+    """Digests of shipped scenarios and walks, and the files and values of the package for which they hold."""
+    keys: dict[str, Any] = json.loads(files("ppafo.page.wasm").joinpath(SHIPPED_KEYS).read_text(encoding="utf-8"))
+    return keys
 
 
 def _known_digest(library: Library) -> str:

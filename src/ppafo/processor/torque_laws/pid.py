@@ -23,6 +23,7 @@ from ppafo.processor.fixed_point import (
     ConverterCounts,
     ConverterLimits,
     CountResolution,
+    beyond_band,
     converter_with,
     error_of,
     fraction_of,
@@ -59,7 +60,7 @@ SHARE = float(2**FRACTION_BITS)
 
 
 class PidNumbers(NamedTuple):
-    """Limits of the readings, gains as fractions of 15 bits and places, shares of filter and anti-windup in 1/2^15."""
+    """Limits of the readings, gains as fractions of 15 bits and places; filter, anti-windup, dead band in 1/2^15."""
 
     limits: ConverterLimits
     proportional: int
@@ -70,6 +71,7 @@ class PidNumbers(NamedTuple):
     derivative_places: int
     filter_share: int
     anti_windup: int
+    dead_band: int
 
 
 class PidCounts(NamedTuple):
@@ -112,8 +114,9 @@ def pid_sample(numbers: PidNumbers, state: PidCounts, readings: ConverterCounts)
     excess = limited(command - unlimited, LARGEST_EXCESS)
     integral = limited(integral + fraction_of(excess * FINE, numbers.anti_windup), LARGEST_INTEGRAL)
     after = PidCounts(integral=integral, error=error, slope=slope, started=1, sound=sound)
+    sent = beyond_band(command, numbers.dead_band, FULL)
     # A half first: the shift rounds down.
-    return ((command + HALF_STEP) >> PART_BITS if sound == 1 else 0), after
+    return ((sent + HALF_STEP) >> PART_BITS if sound == 1 else 0), after
 
 
 def pid_update(
@@ -162,7 +165,8 @@ def prepare_pid(settings: Mapping[str, float], period: float, torque_step: float
     factors = pid_factors(settings, period, torque_step)
     scaled = [number for gain in factors.gains for number in gain_of(gain)]
     shares = [
-        float(min(LARGEST_FRACTION, int(share * SHARE + 0.5))) for share in (factors.filter_share, factors.anti_windup)
+        float(min(LARGEST_FRACTION, int(share * SHARE + 0.5)))
+        for share in (factors.filter_share, factors.anti_windup, settings["dead_band"])
     ]
     return (*scaled, *shares)
 
@@ -186,6 +190,7 @@ _PID_NUMBERS = (
         "filter_share", "", "share of a change that the slope takes at once, in 1/2^15", None, 0.0, _MOST_OF_FRACTION
     ),
     Quantity("anti_windup", "", "share of the excess that is pulled back, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
+    Quantity("dead_band", "", "dead band of the valve, in 1/2^15", None, 0.0, _MOST_OF_FRACTION),
 )
 _PID_BEGINS = PidCounts(integral=0, error=0, slope=0, started=0, sound=1)
 _LARGEST_ERROR = 2 * LARGEST_READING

@@ -27,6 +27,7 @@ from ppafo.simulation.tracking.remedies import (
     stiffer_laws,
     torque_asked,
 )
+from ppafo.simulation.tracking.rule import LARGEST_SHARE
 
 _MOSTLY = 0.5
 """Share of the settled part that is most of it [-]."""
@@ -55,7 +56,11 @@ def _shut_valve(case: Case) -> TrackingCause | None:
         return TrackingCause("its law asks for nothing: its gains are 0, or its dead zone is wider than the error")
     if asked > _EDGE * band or settled.turns or case.failure == "overshoots":
         return None
-    remedies = larger_gains(scenario, case.law, (1.5 * band / asked, 3.0 * band / asked))
+    believed = float(scenario.controller.settings.get("dead_band", band))
+    remedies = [remedy(scenario, {"controller.dead_band": band})] if believed < band else []
+    # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
+    lacking = band / asked if believed < band else settled.error / (LARGEST_SHARE * settled.wanted)
+    remedies += larger_gains(scenario, case.law, (1.5 * lacking, 3.0 * lacking))
     remedies += integral_of_device(scenario, case.law)
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
