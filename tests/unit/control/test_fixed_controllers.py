@@ -39,8 +39,10 @@ BITS, RANGE = 12.0, 1.0e6
 CONVERTER = converter_of(BITS, RANGE, TORQUE_CONSTANT)
 
 
-PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12}
-"""Gains of the paper's torque task, and an opening."""
+PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12} | {
+    "converter_range": RANGE
+}
+"""Gains of the paper's torque task, an opening, and the range of the converter."""
 
 
 def parameters(law: FixedLaw, **changed: float) -> Any:
