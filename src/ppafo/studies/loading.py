@@ -227,7 +227,10 @@ def _common_path(
     with refused_as(StudyError, f"vary '{entry.path}'", ScenarioError):
         first, *others = (varied_path(entry.path, each.scenario) for each in _varying(entry, configurations))
     if any(other != first for other in others):
-        raise StudyError(f"vary '{entry.path}': has different units, limits or atmospheres in different configurations")
+        raise StudyError(
+            f"vary '{entry.path}': has different units, limits or atmospheres in different "
+            f"configurations; restrict it with 'only'"
+        )
     first = given_in(first, texts_of(entry))
     # Where the atmosphere is fixed, gauge is a constant away from absolute; where it varies, each run has its own zero.
     if isinstance(entry, declared.SameAs) or ATMOSPHERE_PATH not in {other.path for other in parsed.vary}:

@@ -149,8 +149,8 @@ def _drawn_runs(
     if not uncertainty.drawn:
         if draws.requested is not None:
             raise StudyError(
-                f"draws = {draws.requested}: nothing is drawn here; give a study, or sensors with noise, or leave it "
-                "out"
+                f"draws = {draws.requested}: nothing in this comparison is random; give a study or sensors with "
+                f"noise, or omit draws"
             )
         return {}
     if study is not None:
