@@ -347,7 +347,7 @@ def begin_block(batch: Batch, effort: Effort = Effort.FULL) -> LaneBlock:
     """Block of all runs of a batch, before its first step; ValueError for more runs than its program takes at once."""
     runs, lanes = batch.states.shape[1], lanes_of(batch.program)
     if runs > lanes:
-        raise ValueError(f"{runs} runs do not fit a block of {lanes}; the others would stand still")
+        raise ValueError(f"{runs} runs do not fit a block of {lanes} lanes")
     module = load_program(batch.program, effort)
     return LaneBlock(module, batch.program, batch.clock, batch.parameters, batch.states)
 

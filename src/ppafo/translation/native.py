@@ -97,7 +97,7 @@ class CCompiler:
                 compile_library(translated, library, self.command, self.flags)
                 fill_module(module, library, parameters_of(source))
         except OSError as error:
-            problem = f"what {self.name} makes cannot be kept for an instant: {reason(error)}"
+            problem = f"the output of {self.name} cannot be written to a temporary folder: {reason(error)}"
             raise CompilerError(problem, passing=True) from error
 
     def run_text(self, source: str, path: str, module: ModuleType) -> None:

@@ -1,5 +1,7 @@
 """The messages while models are compiled, and several at once."""
 
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -10,7 +12,13 @@ import pytest
 
 from ppafo.engine import loading
 from ppafo.engine.cache import announcing
-from ppafo.engine.cache.announcing import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
+from ppafo.engine.cache.announcing import (
+    SECONDS_FILE,
+    announce,
+    compile_side_by_side,
+    estimate_seconds,
+    processor_seconds,
+)
 from ppafo.engine.cache.making import load_all
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
@@ -122,8 +130,22 @@ def test_some_runs_of_seconds_are_compiled_quickly_and_many_runs_are_not() -> No
     assert efforts == [Effort.QUICK, Effort.QUICK, Effort.FULL, Effort.FULL]
 
 
-def test_an_empty_program_in_the_cache_does_not_stop_an_estimate(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("seconds", "program"),
+    [(b"1.0", ""), (b"", "x"), (b"nan", "x"), (b"inf", "x"), (b"-3", "x"), (b"0.00", "x"), (b"\xff\x00", "x")],
+)
+def test_a_damaged_file_in_the_cache_does_not_stop_an_estimate(seconds: bytes, program: str, tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
-    (tmp_path / "one" / SECONDS_FILE).write_text("1.0")
-    (tmp_path / "one" / "program.py").write_text("")
+    (tmp_path / "one" / SECONDS_FILE).write_bytes(seconds)
+    (tmp_path / "one" / "program.py").write_text(program)
     assert estimate_seconds("y" * 1000, [tmp_path / "one"], 1.0e-3) == pytest.approx(1.0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes have no children's time here")
+def test_time_in_which_others_use_the_processor_is_none_of_a_compilation() -> None:
+    before = processor_seconds()
+    time.sleep(0.3)
+    assert processor_seconds() - before < 0.1
+    compiler = [sys.executable, "-c", "while __import__('time').process_time() < 0.2: pass"]
+    subprocess.run(compiler, check=True)
+    assert processor_seconds() - before > 0.15
