@@ -163,7 +163,7 @@ def effects(draw: random.Random) -> Iterator[Entry]:
 
 def meters(draw: random.Random) -> Iterator[Entry]:
     """What is worked out sample by sample for the metrics."""
-    course = ReferenceSummary(2.0, 2.0, 1.0e-6, 20.0)
+    course = ReferenceSummary(2.0, 2.0, 1.0e-6, 20.0, 60.0)
     samples = []
     for number in range(60):
         drawn = [draw.uniform(-2.0, 2.0) for _ in range(6)]

@@ -15,7 +15,6 @@ import pytest
 
 import ppafo
 from ppafo.analyses.endurance.solve import LONGEST
-from ppafo.analyses.find.solve import DEFAULT_GRID
 from ppafo.analyses.linearise.solve import EQUILIBRIUM
 from ppafo.analyses.reproduce.publication import SEED
 from ppafo.cli import output
@@ -83,7 +82,6 @@ def test_defaults_that_are_written_in_a_signature_are_those_of_the_modules() -> 
         "validate longest_delay": DEFAULT_LIMIT,
         "linearise at": EQUILIBRIUM,
         "reproduce study": SEED,
-        "find grid": DEFAULT_GRID,
     }
     for words, value in defaults.items():
         name, argument = words.split()

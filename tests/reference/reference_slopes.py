@@ -5,13 +5,14 @@ import re
 from collections.abc import Callable
 from typing import NamedTuple
 
-from ppafo.engine.continuous_time import free_motion, real_gas_rates
+from ppafo.engine.continuous_time import free_motion
 from ppafo.engine.entries import ARRAY, FLOAT, HEADER, INLINE, entry_text
 from ppafo.engine.generator import StepText
 from ppafo.engine.groups import Role, rows_of
 from ppafo.engine.linking import link_program
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, row_expression
+from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
 from ppafo.model.actuators.vane import chambers
@@ -24,6 +25,7 @@ from ppafo.model.plant import (
     ThermalParameters,
     admitted_flow,
     chamber_pressures,
+    chamber_volumes,
 )
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
 
@@ -55,6 +57,25 @@ class ThermalGasRates(NamedTuple):
     supplied: float
     vented: float
     leaked: float
+
+
+def real_gas_rates(
+    plant: PlantParameters,
+    angle: float,
+    angular_velocity: float,
+    flow_1: float,
+    flow_2: float,
+    content_1: float,
+    content_2: float,
+) -> tuple[float, float]:
+    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
+    volume_1, volume_2 = chamber_volumes(plant, angle)
+    # The chambers are opposite: what one gains in volume the other loses.
+    growth = plant.displacement_per_radian * angular_velocity
+    return (
+        content_rate(content_1, volume_1, growth, flow_1),
+        content_rate(content_2, volume_2, -growth, flow_2),
+    )
 
 
 def gas_rates(

@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 from ppafo.errors import ArgumentError, UnitError, one_line
 from ppafo.units import SI, number_text, parse_quantity, split_number
-from ppafo.units.shown import pressure_units
+from ppafo.units.shown import units_beside
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _EXAMPLES = {
@@ -147,7 +147,7 @@ def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
     units: dict[str, str] = {}
     for si_unit, value in by_si_unit.items():
         if isinstance(value, NumberWithUnit) and value.unit != SI:
-            units |= pressure_units(value.unit) if si_unit == "Pa_a" else {si_unit: value.unit}
+            units |= units_beside(si_unit, value.unit)
     return units
 
 
@@ -333,7 +333,7 @@ def _plain(value: Any, path: str, level: int, copies: dict[int, tuple[Any, Any]]
         return copies[id(value)][1]
     given = _single(value)
     if given is None:
-        raise ArgumentError(f"{path} = {one_line(repr(value))}: is no value; leave out the key of what is not given")
+        raise ArgumentError(f"{path} = {one_line(repr(value))}: is not a value; omit the key")
     # What is nested deeper than any file is refused by whoever takes it as one.
     if isinstance(given, bytes) or level > _MAXIMUM_LEVELS:
         return given

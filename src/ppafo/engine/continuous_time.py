@@ -24,7 +24,6 @@ from ppafo.model.plant import (
     blended_port_flow,
     blended_ports,
     chamber_mass,
-    chamber_volumes,
     driving_torque,
     holds_still,
     vane_acceleration,
@@ -163,25 +162,6 @@ def pressure_rates(
     rate_1 = (product * gained_1 - pressure_1 * at.growth_1) / (now.volume_1 + pressure_1 * now.compliance_1)
     rate_2 = (product * gained_2 - pressure_2 * at.growth_2) / (now.volume_2 + pressure_2 * now.compliance_2)
     return rate_1, rate_2
-
-
-def real_gas_rates(
-    plant: PlantParameters,
-    angle: float,
-    angular_velocity: float,
-    flow_1: float,
-    flow_2: float,
-    content_1: float,
-    content_2: float,
-) -> tuple[float, float]:
-    """Rates of both contents [kg/s] of gas that is not ideal, from the flows into its chambers. Equation (3)."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
-    # The chambers are opposite: what one gains in volume the other loses.
-    growth = plant.displacement_per_radian * angular_velocity
-    return (
-        content_rate(content_1, volume_1, growth, flow_1),
-        content_rate(content_2, volume_2, -growth, flow_2),
-    )
 
 
 def free_motion(

@@ -5,13 +5,11 @@ what the entries call. Every compiler reads them there; Python itself runs the t
 """
 
 import ast
-import inspect
-import textwrap
 import threading
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Any, Protocol, TypeAlias, get_type_hints, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +20,6 @@ SystemError where the garbage collector lets a second one parse before the first
 
 FLOAT, INT = "float64", "int64"
 ARRAY, ARRAY_2D, ARRAY_3D = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
-
-Vector: TypeAlias = Annotated[NDArray[np.float64], ARRAY]
-"""Numbers in a row, as a parameter of a function for ``array_module``."""
-Table: TypeAlias = Annotated[NDArray[np.float64], ARRAY_2D]
-"""Numbers in rows, the last index running quickest."""
 
 HEADER = '''"""Generated from the functions of ppafo; their hash is in the file name. Not to be edited."""
 
@@ -94,22 +87,3 @@ def entry_types(source: str) -> dict[str, list[str]]:
 def without_origins(source: str) -> str:
     """Return the text without the lines that say where its functions stand: what decides the machine code."""
     return "\n".join(line for line in source.split("\n") if not line.startswith(ORIGIN))
-
-
-def array_module(functions: Iterable[Callable[..., None]]) -> str:
-    """Text of a module with these functions as its entries: each goes through its arrays and calls only ``math``.
-
-    Their parameters are annotated as ``Vector``, ``Table``, ``float`` or ``int``.
-    """
-    plain: dict[Any, str] = {float: FLOAT, int: INT}
-    entries = []
-    for function in functions:
-        hints = get_type_hints(function, include_extras=True)
-        types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
-        with PARSING:
-            (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
-        assert isinstance(tree, ast.FunctionDef)
-        body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
-        lines = [line for item in body for line in ast.unparse(item).split("\n")]
-        entries.append(entry_text(function.__name__, types, lines))
-    return "\n\n".join([HEADER, *entries])

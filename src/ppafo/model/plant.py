@@ -219,11 +219,6 @@ def chamber_volumes(plant: PlantParameters, angle: Numeric) -> tuple[Numeric, Nu
     return volume_1, volume_2
 
 
-def chamber_pressure(mass: Numeric, volume: Numeric, gas_product: float) -> Numeric:
-    """Absolute pressure [Pa] of ``mass`` [kg] in ``volume`` [m^3]; ``gas_product`` is R T / M [J/kg]. Equation (3)."""
-    return mass * gas_product / volume
-
-
 def chamber_mass(pressure: float, volume: Numeric, gas_product: float) -> Numeric:
     """Mass [kg] that fills ``volume`` [m^3] at an absolute pressure [Pa]; the inverse of equation (3)."""
     return pressure * volume / gas_product

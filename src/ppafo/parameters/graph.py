@@ -4,7 +4,7 @@ Every door takes its settings through here: overrides, columns of studies, tuned
 and units, episodes of agents. So a setting means the same at all of them.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -219,11 +219,3 @@ def _holds(path: str, link: LinkedDefault, present: Mapping[str, Any]) -> bool:
         return bool(np.all(np.isclose(number, followed, rtol=SAME_PRESSURE, atol=0.0)))
     # Exactly: what follows was computed by this same link.
     return bool(np.all(number == followed))
-
-
-def joined(parts: Iterable[Graph]) -> dict[str, tuple[LinkedDefault, ...]]:
-    """Return several graphs as one; links of sources come first."""
-    links: dict[str, tuple[LinkedDefault, ...]] = {}
-    for part in parts:
-        links |= part
-    return links

@@ -1,7 +1,8 @@
 """A parameter set: every value with its origin, as it was given, and in SI."""
 
+import contextlib
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -24,8 +25,8 @@ from ppafo.parameters.graph import (
     gauge_link,
 )
 from ppafo.parameters.joint import ANKLE, JointNames
-from ppafo.units import base_value, format_quantity, to_si
-from ppafo.units.shown import pressure_units
+from ppafo.units import SI, base_value, format_quantity, split_quantity, to_si
+from ppafo.units.shown import units_beside, usual_unit
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table
@@ -155,24 +156,44 @@ _SPEAKING_ENDS = {
 def written_units(numbers: Mapping[str, Entry]) -> dict[str, str]:
     """Return the unit in which the author of a set writes pressures, torques, angles, flows, by unit in SI.
 
-    ``numbers`` are the entries of the set by path. What follows is in step: the difference of two levels in ``bar_g``
-    is in ``bar_d``, an angular velocity beside ``deg`` in ``deg/s``. A quantity without a number is left out.
+    ``numbers`` are the entries of the set by path. A quantity without a number is left out.
     """
     by_end = {
         si_unit: tuple(path for path in numbers if path.endswith(ends)) for si_unit, ends in _SPEAKING_ENDS.items()
     }
     speaking = {**_SPEAKING, **by_end}
-    units = {
-        si_unit: unit
-        for si_unit, paths in speaking.items()
-        for unit in [numbers[path].unit for path in reversed(paths) if path in numbers]
-        if fits(unit, si_unit)
-    }
-    if "Pa_a" in units:
-        units |= pressure_units(units["Pa_a"])
-    if "rad" in units:
-        units["rad/s"] = f"{units['rad']}/s"
+    units: dict[str, str] = {}
+    for si_unit, paths in speaking.items():
+        for unit in [numbers[path].unit for path in reversed(paths) if path in numbers]:
+            units |= units_beside(si_unit, unit) if fits(unit, si_unit) else {}
     return units
+
+
+def units_of_texts(texts: Iterable[object]) -> dict[str, str]:
+    """Return the units in which the author of some texts writes pressures, torques and angles, by unit in SI.
+
+    The last text of a quantity decides. A number, and one that is said to be in SI, says nothing.
+    """
+    units: dict[str, str] = {}
+    for unit in map(unit_in, texts):
+        for si_unit in _SPEAKING if unit not in ("", SI) else ():
+            units |= units_beside(si_unit, unit) if fits(unit, si_unit) else {}
+    return units
+
+
+def chosen_units(texts: Iterable[object]) -> dict[str, str]:
+    """Return the units of some texts as of ``units_of_texts``, without the package's own.
+
+    A file that writes these chooses nothing: a set in other units goes before it.
+    """
+    return {si_unit: unit for si_unit, unit in units_of_texts(texts).items() if unit != usual_unit(si_unit)}
+
+
+def unit_in(text: object) -> str:
+    """Return the unit of a text that is a number with a unit; empty for anything else."""
+    with contextlib.suppress(UnitError):
+        return split_quantity(text)[1] if isinstance(text, str) else ""
+    return ""
 
 
 def chosen_valve(parameter_set: ParameterSet, valve: str | None) -> str:

@@ -17,8 +17,6 @@ LARGEST_FRACTION: int = 2**FRACTION_BITS - 1
 """Largest fraction in 16 bits with a sign."""
 MOST_PLACES = 30
 """Places that a product of 32 bits is shifted right by at most."""
-WIDEST = 2**30
-"""Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
 SHARPENED = int(1.0 / SHARPNESS)
 """Openings that pass a dead band in full are this part of full opening or more."""
 

@@ -4,8 +4,8 @@ First what makes a Scenario of a document with overrides, and says what no sourc
 """
 
 import copy
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,14 @@ from ppafo.parameters.overrides import (
     read_overrides,
     with_overrides,
 )
-from ppafo.parameters.parameter_set import atmospheric_pressure, chosen_valve, entry_text, links_of_set
+from ppafo.parameters.parameter_set import (
+    atmospheric_pressure,
+    chosen_units,
+    chosen_valve,
+    entry_text,
+    links_of_set,
+    units_of_texts,
+)
 from ppafo.simulation.clock import MAXIMUM_STEPS_OF_DELAY, read_clock
 from ppafo.simulation.declaration import (
     ACCURACY,
@@ -86,6 +93,8 @@ from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_in, shown_text, written_text
 
 _SECTION = "assumed"
+_SPEAKING = ("initial", "motion", "controller", "reference")
+"""Sections whose quantities say in which units their author writes, the ones that say it first last."""
 _NOTHING_TO_FOLLOW = ProfileChoice("constant", {"level": 0.0})
 
 
@@ -234,9 +243,21 @@ def set_name(name: str, folder: Path) -> str:
 def read_device(reading: DocumentReader, hardware: Hardware) -> Device:
     """Return the device of a parameter set with its overrides; ParameterError for what is missing or contradicts."""
     try:
-        return build_device(hardware.parameter_set, hardware.valve, hardware.links)
+        device = build_device(hardware.parameter_set, hardware.valve, hardware.links)
     except ParameterError as error:
         raise _of_device(reading, error) from error
+    written = chosen_units(_texts([reading.document.get(section) for section in _SPEAKING]))
+    overridden = units_of_texts(value_at(reading.document, path) for path in sorted(reading.overridden))
+    return replace(device, units={**device.units, **written, **overridden})
+
+
+def _texts(values: Iterable[Any]) -> Iterator[Any]:
+    """Yield what tables and lists hold, in their order."""
+    for value in values:
+        if isinstance(value, Mapping | list):
+            yield from _texts(value.values() if isinstance(value, Mapping) else value)
+        else:
+            yield value
 
 
 def _of_device(reading: DocumentReader, error: ParameterError) -> ParameterError:

@@ -34,11 +34,6 @@ OTHER_READERS = {
 """Call that reads a table into pandas with another library, by its suffix."""
 
 
-def is_frame(value: object) -> bool:
-    """Tell whether a value is a pandas DataFrame or an xarray Dataset."""
-    return any(kind.__name__ in ("DataFrame", "Dataset") for kind in type(value).__mro__)
-
-
 def remedy_for(path: str | Path) -> str:
     """Advice to read a table of another format with pandas, as the end of a message; empty for an unknown suffix."""
     table = _read_by_pandas(path)

@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,6 +12,7 @@ from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refus
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
+from ppafo.parameters.parameter_set import chosen_units
 from ppafo.simulation.ensemble.running import lacking, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
@@ -127,6 +128,10 @@ class SamplingPlan:
     seed: int
 
 
+NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
+"""Refusal of a study that is to be drawn, and does not say how often."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Study:
     """Configurations, each run at every grid point with every draw.
@@ -136,7 +141,8 @@ class Study:
     their run [Pa], all others are absolute; ``scores`` is the lower Cholesky factor of the correlation of the
     normal scores, None where there is none; ``runs_of_chunk`` is how many runs are computed together, None for a
     choice that keeps memory small; ``document`` is the study file as plain data, with what was changed on the command
-    line; ``text`` the bytes of the file, none where the study came as data.
+    line; ``text`` the bytes of the file, none where the study came as data. ``given`` has the unit in which the values
+    of a path were given, by path, where it is not the package's own.
     """
 
     name: str
@@ -154,6 +160,7 @@ class Study:
     document: Mapping[str, Any]
     text: bytes
     gauge: frozenset[str] = frozenset()
+    given: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Return name, number of runs, configurations and varied paths."""
@@ -173,6 +180,10 @@ class Study:
     def runs(self) -> int:
         """Number of all runs."""
         return len(self.configurations) * self.runs_of_configuration
+
+    def shown_for(self, scenario: Scenario) -> dict[str, str]:
+        """Return the units, by unit in SI, in which people read its runs of a scenario: as given, else the device's."""
+        return {**scenario.device.shown, **chosen_units(f"0 {unit}" for unit in self.given.values())}
 
     def same_in(self, configuration: str) -> dict[str, str]:
         """Return the path that a path follows, by path, in a configuration."""
@@ -243,3 +254,13 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
         )
     return reloaded(scenario, changes)
+
+
+def check_can_be_swept(study: Study) -> None:
+    """Refuse a study that does not say how often it is drawn, or that keeps nothing: other commands need neither."""
+    with refused_as(StudyError, f"study '{study.name}'", StudyError):
+        if study.drawn and study.sample.method is None:
+            raise StudyError(NO_SAMPLE)
+        if not (study.outputs.metrics or study.outputs.traces):
+            known = ", ".join(list(METRICS)[:4])
+            raise StudyError(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")

@@ -13,7 +13,7 @@ from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, fits, is_within, limits_text
 from ppafo.parameters.graph import counts_from, gauge_link
-from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si
+from ppafo.parameters.parameter_set import atmospheric_pressure, entry_in_si, unit_in
 from ppafo.simulation import declaration
 from ppafo.simulation.loading import parameter_set_of
 from ppafo.simulation.numbers import declared_numbers, number_at
@@ -130,8 +130,7 @@ def value_at(path: str, scenario: Scenario) -> float | None:
 
 def given_in(varied: VariedPath, texts: Iterable[object]) -> VariedPath:
     """Return a path whose values are said in the unit of the first text that has one."""
-    units = (split_quantity(text)[1] for text in texts if isinstance(text, str))
-    unit = next(filter(None, units), "")
+    unit = next(filter(None, map(unit_in, texts)), "")
     return replace(varied, given=unit) if fits(unit, varied.quantity.unit) else varied
 
 

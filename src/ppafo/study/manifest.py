@@ -21,6 +21,7 @@ from ppafo.documents.models import quote, validate
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError, UnitError, one_line
 from ppafo.metrics import METRICS
+from ppafo.parameters.declaration import fits
 from ppafo.signals.recording import CHANNELS
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import scenario_document
@@ -165,8 +166,8 @@ def manifest(study: Study) -> dict[str, Any]:
         "runs_of_configuration": study.runs_of_configuration,
         "chunks": chunk_count(study),
         "runs_of_chunk": chunk_size(study),
-        "shown": dict(study.configurations[0].scenario.device.shown),
-        "varied": {path: {"unit": study.units[path]} for path in study.paths},
+        "shown": study.shown_for(study.configurations[0].scenario),
+        "varied": {path: {"unit": study.units[path], "given": study.given.get(path, "")} for path in study.paths},
         "metrics": {
             name: {"unit": METRICS[name].unit, "summary": METRICS[name].summary} for name in study.outputs.metrics
         },
@@ -183,8 +184,8 @@ def read_manifest(location: Place) -> dict[str, Any]:
         raise DataError(f"{location.address}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, "
-            f"this version of ppafo reads {SCHEMA_VERSION}"
+            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo "
+            f"reads {SCHEMA_VERSION}; make the result again with this version"
         )
     validate(_Stored, document, f"{location.address}: {MANIFEST}", DataError)
     return document
@@ -245,6 +246,17 @@ class _StoredUnit(_Part):
     unit: str
 
 
+class _StoredGiven(_StoredUnit):
+    given: str = ""
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        """Refuse a unit in which no such value can be given."""
+        if self.given and not fits(self.given, self.unit):
+            raise ValueError(f"given: '{one_line(self.given)}' is no unit of what is in '{one_line(self.unit)}'")
+        return self
+
+
 class _StoredAssumption(_Part):
     path: str
     value: str
@@ -263,7 +275,7 @@ class _Stored(_Part):
     sha256: str
     runs: Annotated[int, Field(ge=1)]
     chunks: Annotated[int, Field(ge=1)]
-    varied: dict[str, _StoredUnit]
+    varied: dict[str, _StoredGiven]
     metrics: dict[str, _StoredUnit]
     shown: dict[str, str] = Field(default_factory=dict)
 

@@ -119,6 +119,16 @@ def pressure_units(level: str) -> dict[str, str]:
     return {"Pa_a": f"{unit}_{kind}", "Pa_d": f"{unit}_d"}
 
 
+def units_beside(si_unit: str, unit: str) -> dict[str, str]:
+    """Return the display units, by SI unit, of whoever writes quantities of ``si_unit`` in ``unit``.
+
+    The difference of two levels in ``bar_g`` is in ``bar_d``, an angular velocity beside ``deg`` in ``deg/s``.
+    """
+    if si_unit == "Pa_a":
+        return pressure_units(unit)
+    return {si_unit: unit, "rad/s": f"{unit}/s"} if si_unit == "rad" else {si_unit: unit}
+
+
 def counted_from(units: Mapping[str, str], atmosphere: float) -> dict[str, str]:
     """Return units by unit in SI with the atmosphere [Pa absolute] from which gauge pressures count."""
     return {**units, GAUGE_ZERO: f"{atmosphere!r} Pa_a"}
@@ -143,6 +153,12 @@ def quantity_of_unit(si_unit: str) -> str:
     return _OF_UNIT.get(si_unit, "")
 
 
+def usual_unit(si_unit: str) -> str:
+    """Return the unit of the package's own table in which numbers of a unit in SI are shown; "" for a number."""
+    quantity = quantity_of_unit(si_unit)
+    return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
+
+
 def shown_unit(si_unit: str) -> str:
     """Return the unit in which numbers of a unit in SI are shown: the chosen one, else the table's; "" for a number."""
     chosen, si_unit = _chosen.get(), _WRITTEN.get(si_unit, si_unit)
@@ -150,8 +166,7 @@ def shown_unit(si_unit: str) -> str:
         return chosen[si_unit]
     if si_unit in _PER_PRESSURE:
         return f"{shown_unit(_PER_PRESSURE[si_unit])}/{shown_unit('Pa_d').removesuffix('_d')}"
-    quantity = quantity_of_unit(si_unit)
-    return QUANTITIES[quantity].shown if quantity else "" if si_unit == "1" else si_unit
+    return usual_unit(si_unit)
 
 
 def unit_of(quantity: str) -> str:

@@ -17,7 +17,6 @@ from ppafo.processor.fixed_point import (
     FRACTION_BITS,
     LARGEST_FRACTION,
     SETTINGS,
-    WIDEST,
     ConverterCounts,
     ConverterLimits,
     beyond_band,
@@ -37,6 +36,8 @@ TORQUE_CONSTANT = 1.451e-5
 PERIOD = 1.0e-3
 BITS, RANGE = 12.0, 1.0e6
 CONVERTER = converter_of(BITS, RANGE, TORQUE_CONSTANT)
+WIDEST = 2**30
+"""Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
 
 
 PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12} | {

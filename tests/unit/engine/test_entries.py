@@ -1,12 +1,16 @@
 """Entries of generated modules: the same calls and bits by every compiler, and nothing that C would misread."""
 
+import ast
+import inspect
 import math
 import random
-from collections.abc import Callable
-from typing import Any
+import textwrap
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, TypeAlias, get_type_hints
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from ppafo.engine.entries import (
     ARRAY,
@@ -14,15 +18,35 @@ from ppafo.engine.entries import (
     FLOAT,
     HEADER,
     INT,
-    Table,
-    Vector,
-    array_module,
     entry_text,
     entry_types,
     with_arrays,
 )
 from ppafo.translation.native_entries import NativeEntry
 from tests.compilers_here import modules_of
+
+Vector: TypeAlias = Annotated[NDArray[np.float64], ARRAY]
+"""Numbers in a row, as a parameter of a function for ``array_module``."""
+Table: TypeAlias = Annotated[NDArray[np.float64], ARRAY_2D]
+"""Numbers in rows, the last index running quickest."""
+
+
+def array_module(functions: Iterable[Callable[..., None]]) -> str:
+    """Text of a module with these functions as its entries: each goes through its arrays and calls only ``math``.
+
+    Their parameters are annotated as ``Vector``, ``Table``, ``float`` or ``int``.
+    """
+    plain: dict[Any, str] = {float: FLOAT, int: INT}
+    entries = []
+    for function in functions:
+        hints = get_type_hints(function, include_extras=True)
+        types = {name: plain.get(hint) or hint.__metadata__[0] for name, hint in hints.items() if name != "return"}
+        (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
+        assert isinstance(tree, ast.FunctionDef)
+        body = tree.body[1:] if ast.get_docstring(tree) is not None else tree.body
+        lines = [line for item in body for line in ast.unparse(item).split("\n")]
+        entries.append(entry_text(function.__name__, types, lines))
+    return "\n\n".join([HEADER, *entries])
 
 
 def scaled(rows: Table, found: Vector, factor: float, first: int) -> None:

@@ -11,8 +11,6 @@ from ppafo.model.plant import (
     actuator_torque,
     chamber_1_volume,
     chamber_2_volume,
-    chamber_mass,
-    chamber_pressure,
     gravity_torque,
     holds_still,
     sliding_friction,
@@ -32,11 +30,6 @@ def test_printed_volumes_are_the_case_without_dead_volume_and_lower_stop() -> No
 def test_volumes_add_up_to_the_same_sum_at_every_angle(angle: float) -> None:
     total = chamber_1_volume(angle, 0.3, 51e-6, 2e-6) + chamber_2_volume(angle, 2.3, 51e-6, 2e-6)
     assert total == pytest.approx(2.0 * 51e-6 + 4e-6)
-
-
-@given(st.floats(1e4, 1e6), st.floats(1e-6, 1e-4))
-def test_mass_and_pressure_are_inverse(pressure: float, volume: float) -> None:
-    assert chamber_pressure(chamber_mass(pressure, volume, 5.6e4), volume, 5.6e4) == pytest.approx(pressure)
 
 
 def test_torque_is_positive_in_plantarflexion() -> None:

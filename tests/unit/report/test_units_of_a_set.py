@@ -52,6 +52,47 @@ def test_the_unit_in_which_a_number_is_given_goes_before_that_of_the_set(in_bar:
     assert "psi" not in text
 
 
+def test_numbers_of_a_scenario_say_in_which_units_its_runs_are_read(in_bar: str, tmp_path: Path) -> None:
+    text = str(ppafo.simulate(TASK, overrides=[SHORT, "reference.level=400 N cm", "initial.pressure_1=0 kPa_g"]))
+    assert re.search(r"peak_torque +[\d.]+ N cm", text)
+    assert re.search(r"largest_pressure +[\d.]+ kPa_g", text)
+    # The file of a scenario says it too; the package's own unit is no choice against a set's.
+    file = tmp_path / "task.toml"
+    shipped = resources.files("ppafo.scenarios").joinpath(f"{TASK}.toml").read_text(encoding="utf-8")
+    file.write_text(shipped.replace('level = "6 N m"', 'level = "4000 N mm"'), encoding="utf-8")
+    assert ppafo.load_scenario(file).device.shown["N m"] == "N mm"
+    assert ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}"]).device.shown["N m"] == "N cm"
+    assert ppafo.load_scenario(TASK, overrides=[f"device.set={in_bar}", "reference.level=4 N m"]).device.shown[
+        "N m"
+    ] == ("N m")
+
+
+def test_axes_and_tables_of_a_study_are_in_the_units_of_its_file(tmp_path: Path) -> None:
+    varied = [
+        {"path": "supply.pressure", "kind": "list", "values": ["3 bar_g", "4 bar_g"]},
+        {"path": "actuator.leak.area", "kind": "grid", "first": "0.001 cm^2", "last": "0.003 cm^2", "count": 2},
+    ]
+    study = {
+        "schema_version": 1,
+        "name": "in-bar",
+        "configurations": [{"name": "task", "scenario": TASK, "overrides": [SHORT]}],
+        "vary": varied,
+        "outputs": {"metrics": ["largest_pressure"]},
+    }
+    finding = ppafo.sweep(study, out=tmp_path / "out")
+    assert re.search(r"largest_pressure +bar_g ", str(finding))
+    labels = [text for axes in finding.plot().axes for text in (axes.get_xlabel(), axes.get_ylabel())]
+    assert {"Supply pressure (bar gauge)", "Leak area (cm$^2$)"} <= set(labels)
+    again = ppafo.load_study_results(tmp_path / "out")
+    assert again.found.document["varied"]["actuator.leak.area"]["given"] == "cm^2"
+
+
+def test_find_answers_in_the_units_of_its_range_and_condition() -> None:
+    found = ppafo.find(TASK, vary="reference.level=100..300 N cm", such_that="final_error <= 30 N cm", grid=3)
+    assert re.search(r"final_error is [\d.]+ N cm there", found.said[0])
+    assert "(N cm)" in found.plot().axes[0].get_ylabel()
+
+
 def test_a_refusal_is_in_the_unit_of_what_it_refuses_else_in_that_of_the_set(in_bar: str) -> None:
     def refusal(*overrides: str) -> str:
         with pytest.raises(ppafo.PpafoError) as caught:
@@ -122,8 +163,8 @@ def test_every_table_of_an_analysis_is_in_the_units_of_the_set(in_bar: str, tmp_
     compared = ppafo.compare([TASK, "torque-task-solenoid"], overrides=changes)
     assert "RMS error (N cm)" in str(compared)
     found = ppafo.find(TASK, vary="supply.pressure=40..60 psi_g", such_that="peak_torque >= 1 N m", overrides=changes)
-    assert re.search(r"supply.pressure = [\d.]+ psi_g is the lowest value.*: peak_torque is [\d.]+ N cm", found.said[0])
-    linear = str(ppafo.linearise(TASK, overrides=[*changes, "reference.level=3 N m"]))
+    assert re.search(r"supply.pressure = [\d.]+ psi_g is the lowest value.*: peak_torque is [\d.]+ N m", found.said[0])
+    linear = str(ppafo.linearise(TASK, overrides=[*changes, "reference.level=300 N cm"]))
     assert re.search(r"supply_pressure +Pa +3.447\d* bar_g", linear)
     assert re.search(r"torque +N m +[\d.]+ N cm", linear)
     recorded = ppafo.simulate("step-response", overrides=[f"device.set={in_bar}"]).save(tmp_path / "bench")

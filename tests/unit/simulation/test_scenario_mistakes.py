@@ -170,9 +170,16 @@ def test_a_value_that_does_not_fit_says_what_would(old: str, new: str, reason: s
         assert parse_scenario(TEXT.replace(old, new).encode(), "task.toml").sensors.seed == 1
 
 
-@pytest.mark.parametrize("angle", ["19.9 deg", "130.1 deg", "-1 rad"])
-def test_an_angle_outside_the_stops_is_refused_with_the_stops(angle: str) -> None:
-    assert "must be between the stops of ppafo2011, 20 deg to 130 deg" in problem_after('"75 deg"', f'"{angle}"')
+@pytest.mark.parametrize(
+    ("angle", "stops"),
+    [
+        ("19.9 deg", "20 deg to 130 deg"),
+        ("130.1 deg", "20 deg to 130 deg"),
+        ("-1 rad", "0.349066 rad to 2.26893 rad"),
+    ],
+)
+def test_an_angle_outside_the_stops_is_refused_with_the_stops_in_its_unit(angle: str, stops: str) -> None:
+    assert f"must be between the stops of ppafo2011, {stops}" in problem_after('"75 deg"', f'"{angle}"')
 
 
 @pytest.mark.parametrize("angle", ["20 deg", "130 deg"])

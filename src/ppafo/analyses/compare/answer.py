@@ -24,7 +24,6 @@ from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units import without_exponent
-from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -128,7 +127,6 @@ _PARETO = (
 )
 
 
-@in_units(lambda comparison: comparison.tasks[0].cases[0].scenario.device.shown)
 def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
     """Return a comparison in words, tables and panels."""
     names = comparison.configurations

@@ -21,9 +21,6 @@ Configured = Annotated[
 ]
 StudyLike = Annotated["Study | str | Path | Mapping[str, Any]", Word("STUDY", option="--study")]
 
-_DRAWS = 4096
-"""Draws of the uncertain values unless given."""
-
 
 @checked
 def compare(
@@ -84,21 +81,19 @@ def compare(
     from ppafo.analyses.compare.answer import finding_of
     from ppafo.analyses.compare.solve import Draws, baseline_of, compared, overrides_by_task
     from ppafo.arguments.words import taken_tasks
-    from ppafo.errors import StudyError
     from ppafo.studies.draws import study_of
     from ppafo.studies.study import choose_configurations
+    from ppafo.units.shown import shown_in
 
-    requested = Draws(_DRAWS if draws is None else draws, seed, confidence, maximum_failed, threads, progress)
+    requested = Draws(draws, seed, confidence, maximum_failed, threads, progress)
     requested.check()
     loaded = study_of(study) if study is not None else None
     chosen = choose_configurations(configurations or None, loaded, overrides)
     reference = baseline_of(chosen, baseline)
     comparison = compared(chosen, reference, overrides_by_task(taken_tasks(tasks)), loaded, requested)
-    if draws is not None and not comparison.draws:
-        raise StudyError(
-            f"draws = {draws}: nothing is drawn here; give a study, or sensors with noise, or leave it out"
-        )
-    finding = finding_of(comparison)
+    device = comparison.tasks[0].cases[0].scenario
+    with shown_in(device.device.shown if loaded is None else loaded.shown_for(device)):
+        finding = finding_of(comparison)
     if not check:
         return finding
     is_steady = all(case.follows for task in comparison.tasks for case in task.cases)

@@ -11,6 +11,7 @@ from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
+from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import (
     CONFIDENCE,
     FEWEST_DRAWS,
@@ -21,13 +22,13 @@ from ppafo.studies.draws import (
 )
 from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
-from ppafo.studies.varying import value_at
+from ppafo.studies.varying import value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
 
 AS_WRITTEN = "as written"
 """Name of a configuration's task where no other task is requested."""
-DEFAULT_SEED = 1
-"""Seed of the draws of a comparison without a study."""
+DEFAULT_DRAWS = 4096
+"""Draws of the uncertain values unless given."""
 _SAME = 1.0e-9
 """Values that differ by less than this fraction are one."""
 
@@ -56,15 +57,21 @@ def baseline_of(configurations: Sequence[Configuration], name: str | None) -> st
 class Draws:
     """Number of draws of the uncertain values, and acceptance rules for their runs.
 
-    ``seed`` None is the study's own. More than the fraction ``maximum_failed`` of failed runs is an error.
+    ``requested`` None is the default, ``seed`` None the study's own. More than the fraction ``maximum_failed`` of
+    failed runs is an error.
     """
 
-    count: int
+    requested: int | None
     seed: int | None
     confidence: float
     maximum_failed: float
     threads: int | None
     progress: Report | None
+
+    @property
+    def count(self) -> int:
+        """Number of draws."""
+        return DEFAULT_DRAWS if self.requested is None else self.requested
 
     def check(self) -> None:
         """Refuse numbers outside their ranges with a StudyError."""
@@ -135,8 +142,16 @@ def _drawn_runs(
     draws: Draws,
     seed: int,
 ) -> dict[tuple[str, str], DrawnRuns]:
-    """Return the runs of every case, all over the same draws; nothing where nothing is drawn."""
+    """Return the runs of every case, all over the same draws; nothing where nothing is drawn.
+
+    StudyError for draws that were requested where nothing is.
+    """
     if not uncertainty.drawn:
+        if draws.requested is not None:
+            raise StudyError(
+                f"draws = {draws.requested}: nothing in this comparison is random; give a study or sensors with "
+                f"noise, or omit draws"
+            )
         return {}
     if study is not None:
         # Where cases differ in a value that the study draws for all of them, the difference would not count.
@@ -146,9 +161,11 @@ def _drawn_runs(
             values = [value for value in own if value is not None]
             lowest, highest = min(values, default=0.0), max(values, default=0.0)
             if highest - lowest > _SAME * max(abs(lowest), abs(highest)):
+                place = varied_path(path, next(iter(scenarios.values())))
                 raise StudyError(
                     f"the study draws '{path}' for every configuration, so the different values of the configurations "
-                    f"({lowest:.6g} and {highest:.6g} in SI units) would be ignored; use a study that does not draw it"
+                    f"({place.quote(lowest)} and {place.quote(highest)}) would be ignored; use a study that does not "
+                    "draw it"
                 )
     columns = uncertainty.replicated_columns(0, draws.count, seed)
     renoised = with_new_noise(columns) if uncertainty.has_noise else {}

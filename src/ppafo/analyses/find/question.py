@@ -61,15 +61,18 @@ def find(
     >>> import ppafo
     >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"
     >>> print(ppafo.find(task, vary="supply.pressure=20..90 psi_g", such_that=metric).said[0])
-    supply.pressure = 57.1015 psi_g is the lowest value that meets rms_error <= 0.5 N m and follows its reference:
-    rms_error is 0.3452 N m there (bracketed to 3e-05 psi)
+    supply.pressure = 57.1437 psi_g is the lowest value that meets rms_error <= 0.5 N m and follows its reference:
+    rms_error is 0.3427 N m there (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
     from ppafo.analyses.find.answer import finding_of
     from ppafo.analyses.find.solve import outermost
     from ppafo.loading import scenario_or_load
+    from ppafo.parameters.parameter_set import units_of_texts
     from ppafo.studies.study import with_overrides
 
     base = with_overrides(scenario_or_load(scenario), overrides)
-    with shown_in(base.device.shown):
+    # As in 'supply.pressure=2..6 bar_g' and 'final_error <= 30 N cm'.
+    given = units_of_texts((vary.rpartition("..")[2], such_that.rpartition("=")[2]))
+    with shown_in({**base.device.shown, **given}):
         return finding_of(outermost(base, vary, such_that, highest, grid, threads, progress))

@@ -80,5 +80,5 @@ def sensitivity(
     settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
     runs = Runs(base.scenario, requested, tally, used.gauge, threads)
-    with shown_in(base.scenario.device.shown):
+    with shown_in(chosen.shown_for(base.scenario)):
         return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))

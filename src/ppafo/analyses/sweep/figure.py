@@ -141,7 +141,8 @@ def _panels(results: StudyResults, content: _Content) -> list[Panel]:
 
 def _kind(results: StudyResults, path: str) -> Kind:
     """Return what the number at a varied path is."""
-    return of_path(path, results.document["varied"][path]["unit"].removeprefix("-"))
+    varied = results.document["varied"][path]
+    return of_path(path, varied["unit"].removeprefix("-"), given=varied.get("given", ""))
 
 
 def _histogram(results: StudyResults, metric: str) -> Panel:

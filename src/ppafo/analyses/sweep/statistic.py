@@ -78,7 +78,7 @@ def estimate(
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
     runs = Runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
-    with shown_in(base.scenario.device.shown):
+    with shown_in(chosen.shown_for(base.scenario)):
         first = chosen.sample.seed if seed is None else seed
         return draw_until(runs, uncertainty, metric, what, rule, first, wanted[1:])
 

@@ -124,7 +124,9 @@ def begin_course(parts: Program, lane: Lane, interval: float, last: int) -> None
     """The last value of the reference, how far its ends are from its origin, and no hold yet."""
     value, origin = reference_at(parts, lane, last * interval * lane.timing.step), origin_of(parts, lane)
     largest = max(abs(reference_at(parts, lane, 0 * interval * lane.timing.step) - origin), abs(value - origin))
-    lane.course = ReferenceSummary(last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0)
+    lane.course = ReferenceSummary(
+        last=value, largest=largest, tolerance=SAME_LEVEL * largest, hold_start=0.0, samples=last + 1.0
+    )
 
 
 def raise_largest(parts: Program, lane: Lane, interval: float, index: int) -> None:

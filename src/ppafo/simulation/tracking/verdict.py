@@ -22,6 +22,7 @@ from ppafo.simulation.tracking.rule import (
     SettledPart,
     failure_of_task,
     failure_of_walk,
+    is_noisy,
     most_reversals,
     settled_task,
     settled_walk,
@@ -44,8 +45,9 @@ class Tracking:
     ``error`` and ``wanted`` are the RMS error of the settled part and the change wanted, ``missing`` the mean error,
     ``moved`` how far the value went, all in SI of what is ``controlled``. ``reversals`` are the command's ``per``
     stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``tried`` what
-    did; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one. The
-    settled part begins at ``since`` [s], 0 for a walk.
+    did; ``span`` is the range of the error of an angle that swings, where neither it nor its command turns often, else
+    0; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one. The settled part
+    begins at ``since`` [s], 0 for a walk.
     """
 
     kind: Failure
@@ -63,6 +65,7 @@ class Tracking:
     tried: str = ""
     at_rest: bool = True
     since: float = 0.0
+    span: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -89,6 +92,9 @@ class Tracking:
         if self.kind == "does not move":
             return f"the {words} loop does not move: {plain_moved} of {wanted} wanted"
         if self.kind == "oscillates":
+            if self.span:
+                swing = change_text(self.controlled, self.span)
+                return f"the {words} swings by {swing}, of {wanted} wanted{self.time_text}"
             often = f"{self.reversals:.3g} reversals a {self.per}"
             return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{self.time_text}"
         if self.kind == "overshoots":
@@ -138,12 +144,13 @@ def tracking_of(
     if settled is None:
         return None
     duration = float(np.ptp(recording.time[[0, -1]]))
-    is_restless = reversals > most_reversals(scenario, law, duration, stride_time)
+    counted = settled.reversals * max(duration, 1.0) if is_noisy(scenario) else reversals
+    turning = counted / most_reversals(scenario, law, duration, stride_time)
     limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
     if is_task:
-        failure = failure_of_task(settled, is_restless, law is not None and law.only_switches)
+        failure = failure_of_task(settled, turning, law is not None and law.only_switches)
     else:
-        failure = failure_of_walk(settled, is_restless, limit)
+        failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
     # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
     if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
@@ -159,7 +166,7 @@ def tracking_of(
         wanted=limit if failure == "overshoots" and not is_task else settled.wanted,
         missing=settled.missing,
         moved=settled.peak if failure == "overshoots" else settled.moved,
-        reversals=_rate(settled, is_restless, reversals / duration) * (stride_time if stride_time > 0.0 else 1.0),
+        reversals=_rate(settled, turning > 1.0, reversals / duration) * (stride_time if stride_time > 0.0 else 1.0),
         per="stride" if stride_time > 0.0 else "second",
         cause=cause.text,
         advice=cause.advice,
@@ -167,6 +174,7 @@ def tracking_of(
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,
+        span=settled.span if failure == "oscillates" and turning <= 1.0 and not settled.turns and settled.way else 0.0,
     )
 
 
