@@ -324,7 +324,7 @@ class _ForColumns(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> Any:
         """Write a node."""
         if isinstance(node, ast.If | ast.While | ast.Starred | ast.AugAssign) or not self.is_elementwise(node):
-            raise ProgramError(f"'{ast.unparse(node)}' has no form for columns")
+            raise ProgramError(f"'{ast.unparse(node)}' cannot be evaluated for columns")
         return super().visit(node)
 
     def is_elementwise(self, node: ast.AST) -> bool:

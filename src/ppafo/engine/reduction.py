@@ -604,7 +604,7 @@ class Reduction:
         """A call of a function that sets groups of its lane: these get what it returns."""
         called = self.outside(node.func)
         if not is_step_function(called):
-            raise self.refuse(node, f"'{ast.unparse(node)}' throws away what it returns")
+            raise self.refuse(node, f"'{ast.unparse(node)}' discards its return value")
         name, arguments = self.called(called, node)
         effects = self.collector.effects_of(name)
         if not effects.results:

@@ -35,13 +35,15 @@ class FromOutside:
 
     def update(self, time: float, reference: float, measurement: Measurement) -> float:  # noqa: ARG002 - a protocol
         """Refuse: an agent is asked through its environment."""
-        raise ScenarioError("the commands of an environment come from its agent; give the scenario a controller")
+        raise ScenarioError(
+            "in an environment the agent gives the commands; to simulate this scenario, give it a controller"
+        )
 
 
 def episode_program(batch: Batch) -> tuple[Program, Clock]:
     """Return program and clock of a run whose commands come from outside; ScenarioError for samples inside a step."""
     if batch.program.samples_inside:
-        raise ScenarioError("run.output_interval: an environment needs one that is a whole number of steps")
+        raise ScenarioError("run.output_interval: must be a whole number of steps in an environment")
     return replace(batch.program, controller=None, starts_apart=True), batch.clock
 
 

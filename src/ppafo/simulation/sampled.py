@@ -137,7 +137,9 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
     """
     program, actuator, rows = batch.program, batch.program.actuator, row_numbers(batch.program.state_rows())
     if program.late_readings or program.is_thermal:
-        raise ScenarioError("a walk with a late sensor or with gas that warms has no controller in Python")
+        raise ScenarioError(
+            "a Python controller cannot run a walk with delayed sensors or a thermal gas model; use a controller kind"
+        )
     plant, sensors, gait_sensors = (_group(batch, name) for name in ("plant", "sensors", "gait_sensors"))
     period, last = batch.clock.steps_per_sample * _group(batch, "timing").step, NOTHING_SEEN
 

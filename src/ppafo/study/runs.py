@@ -24,6 +24,7 @@ from ppafo.simulation.tracking.metered import needed_metrics, tracking_excess
 from ppafo.simulation.tracking.rule import REVERSALS, smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import check_metrics
+from ppafo.study.blocks import runs_at_once
 
 Rows = dict[str, NDArray[Any]]
 """Columns of one length: metrics by name [SI], nan where a run has none, and whether each run ``failed``."""
@@ -31,7 +32,7 @@ _Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 """Columns in; rows out, and why the first of them failed."""
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
-"""Runs between two reports: as a rule, and where a Python object controls."""
+"""Runs between two reports at most: as a rule, and where a Python object controls."""
 
 
 @final
@@ -85,7 +86,8 @@ class Runs:
             reason = result.reasons[min(result.reasons)] if result.reasons else ""
             return {**values, FAILED: result.status != 0}, reason
 
-        self._begin(metrics, rows, tally, _AT_ONCE if scenario.controller.custom is None else _SLOW_AT_ONCE)
+        is_slow = scenario.controller.custom is not None
+        self._begin(metrics, rows, tally, _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE))
 
     @classmethod
     def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":

@@ -254,7 +254,7 @@ def test_what_is_no_number_is_cut_off_at_the_lowest() -> None:
         (TORQUE, {"vary": {"valve.area": ("2 mm^2", "1 mm^2")}}, "the lowest value before the highest"),
         (TORQUE, {"vary": {"valve.area": (1.0, 2.0)}}, "without a unit"),
         (TORQUE, {"overrides": ["run.output_interval=1.5 ms"]}, "a whole number of steps"),
-        (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "draws wearers and gaits"),
+        (WALK, {"vary": {"valve.area": ("1 mm^2", "2 mm^2")}}, "varies its wearer and gait only"),
         (WALK, {"scenario": "off"}, "has no torque profile"),
         (TORQUE, {"observations": "scale"}, "'physical' or 'scaled', did you mean 'scaled'?"),
         (TORQUE, {"frame_skip": 0}, "frame_skip = 0: must be a whole number of samples, at least 1"),

@@ -197,7 +197,7 @@ def test_an_error_of_the_steps_beyond_what_is_promised_is_said_with_a_tolerance_
     coarse = ["run.duration=0.3 s", "motion.external_torque=20 N m", "run.tolerance=0.1"]
     told = simulate("cylinder-servo", coarse).error()
     assert told.over_promise > 1.0
-    assert f"`run.tolerance = {told.tolerance:.1g}` makes it less" in told.sentence
+    assert f"`run.tolerance = {told.tolerance:.1g}` reduces it" in told.sentence
     assert simulate("cylinder-servo", [*coarse[:2], f"run.tolerance={told.tolerance:.1g}"]).error().over_promise < 1.0
 
 

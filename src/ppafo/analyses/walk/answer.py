@@ -72,7 +72,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     if cut:
         shown = _TORQUE.text(limit)
         remarks.append(
-            f"{', '.join(cut)}: no more than controller.largest_torque = {shown} is requested; set that higher too"
+            f"{', '.join(cut)}: the request is limited by controller.largest_torque = {shown}; raise that too"
         )
     # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
     for channel, words, given in (

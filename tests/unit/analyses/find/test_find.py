@@ -214,7 +214,7 @@ def test_one_instant_of_a_loop_that_oscillates_is_not_met_however_small_its_erro
     assert found.value is None
     assert found.unsettled > 0
     assert f"in {found.unsettled} runs the loop oscillates on the hold" in " ".join(found.remarks)
-    assert "their condition is asked of rms_error_hold too" in " ".join(found.remarks)
+    assert "in these runs the condition must also hold for rms_error_hold" in " ".join(found.remarks)
     # What stands under the name of the metric is the metric, and what was asked of stands beside it.
     (tried,) = (each for each in found.tried if each.value == pytest.approx(101325.0 + 84.0 * 6894.757293168361))
     assert tried.metric == pytest.approx(alone["final_error"].value)
