@@ -58,7 +58,7 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
     if name not in ("", ANY_OF_C):
         allowed = (ANY_OF_C, *OFFERED, PYTHON)
         hint = nearest_name(name, allowed)
-        raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is none of {', '.join(allowed)}{hint}")
+        raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is not one of {', '.join(allowed)}{hint}")
     compilers: list[Compiler] = []
     for make in OFFERED.values():
         with contextlib.suppress(SimulationError):
