@@ -43,7 +43,7 @@ class _AnnotationNames(dict[str, Any]):
 
 
 def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters by name, each with what its annotation says; a class that is not loaded is a ``_NotLoaded``.
+    """Return the parameters by name, each with what its annotation says; a class not loaded is a ``_NotLoaded``.
 
     A parameter without an annotation has the empty one of ``inspect``, as a function of somebody else may.
     """
