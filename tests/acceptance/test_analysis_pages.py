@@ -15,7 +15,7 @@ NUMBER = r"[+-]?\d[\d,]*\.?\d*(?:e[+-]?\d+)?"
 PRINTED_BY_PYTHON = {
     "compare.md": "256 True\n",
     "uncertainty.md": "['supply.pressure', 'actuator.torque_constant']\nTrue 0.87 N m\n",
-    "optimise.md": "495000.0 1\nTrue True {}\n",
+    "optimise.md": "498700.0 1\nTrue True {}\n",
 }
 
 

@@ -333,7 +333,7 @@ def _plain(value: Any, path: str, level: int, copies: dict[int, tuple[Any, Any]]
         return copies[id(value)][1]
     given = _single(value)
     if given is None:
-        raise ArgumentError(f"{path} = {one_line(repr(value))}: is no value; leave out the key of what is not given")
+        raise ArgumentError(f"{path} = {one_line(repr(value))}: is not a value; omit the key")
     # What is nested deeper than any file is refused by whoever takes it as one.
     if isinstance(given, bytes) or level > _MAXIMUM_LEVELS:
         return given

@@ -96,7 +96,7 @@ def _bits() -> CommandOutput:
     found = dict(found_bits())
     others = [name for name, is_equal in found.items() if not is_equal]
     by = compilers_to_try()[0].name
-    text = f"bits: {len(found) - len(others)} of {len(found)} runs have the bits that they have elsewhere ({by})"
+    text = f"bits: {len(found) - len(others)} of {len(found)} runs have the recorded bits ({by})"
     lines = [
         text,
         *(f"  {name}: other bits; give its scenario, this computer and compiler in a report" for name in others),
@@ -144,9 +144,9 @@ def models_text(document: dict[str, Any], one_by_one: bool) -> str:
         # One day or several by the number as it is shown, which is rounded.
         ago = "today" if days < 1.0 else f"{days:.0f} day{'' if int(days + 0.5) == 1 else 's'} ago"
         lines.append(f"  {item['name']}  {_megabytes(item['size']):>8}  last used {ago}")
-    lines += [f"left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
+    lines += [f"compiler left out for a day: {name}: {why}" for name, why in document["left_out"].items()]
     limits = f"{document['kept_unused_days']:.0f} days unused, or above {_megabytes(document['most_bytes'])} in all"
-    return "\n".join([*lines, f"removed by themselves: after {limits}"])
+    return "\n".join([*lines, f"removed automatically: after {limits}"])
 
 
 def _megabytes(size: int) -> str:

@@ -41,7 +41,7 @@ def export_figure(folder: Folder, *, out: File | None = None) -> CommandOutput:
     if not drawn:
         said, document = what_is_there(folder, names)
         if out is not None:
-            raise DataError(f"--out {out}: nothing is drawn anew: {said}")
+            raise DataError(f"--out {out}: there is no figure to draw: {said}")
         return CommandOutput(said, document)
     if out is not None and len(drawn) > 1:
         raise DataError(

@@ -31,16 +31,13 @@ def add_json_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print one JSON document instead of text")
 
 
-def check_output(out: Path | None, command: str, kept: Mapping[str, bytes] | None = None) -> None:
-    """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result.
-
-    Files that will be ``kept`` as they are may have grown since it was written.
-    """
+def check_output(out: Path | None, command: str) -> None:
+    """Refuse, before anything runs, a folder of ``--out`` that is not absent, empty or this command's own result."""
     if out is not None:
         from ppafo.storage.result_folder import check_owned_folder, marked_folder
 
         with blame_out_option():
-            check_owned_folder(out, marked_folder(command), kept or {})
+            check_owned_folder(out, marked_folder(command))
 
 
 def check_new_file(path: Path) -> None:

@@ -119,7 +119,7 @@ def _float(text: str) -> float:
     """Return the number of a text; one so small that it would be 0 is refused, as in quantities."""
     value = float(text)
     if value == 0.0 and text.lower().partition("e")[0].strip("+-0_."):
-        raise tomllib.TOMLDecodeError(f"{one_line(text)} is too small for a number of 64 bits, and would be 0")
+        raise tomllib.TOMLDecodeError(f"{one_line(text)} is below the smallest 64-bit number and would become 0")
     return value
 
 

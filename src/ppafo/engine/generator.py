@@ -191,7 +191,7 @@ class StepText:
         if composed is None:
             composed = self.composed[function] = self._compose(function, known, is_phase)
         if composed.known != known or composed.is_phase != is_phase:
-            raise ProgramError(f"{function.__name__} stands in one step for two different functions")
+            raise ProgramError(f"{function.__name__} is composed in two different forms in one step")
         return composed
 
     def _compose(self, function: FunctionType, known: Mapping[str, Any], is_phase: bool) -> ComposedFunction:

@@ -64,7 +64,7 @@ def check_side(walk: MeanStride, usual: Gait) -> None:
     if apart > _OTHER_FOOT and in_place > _ALIKE_SHANK and best > _ALIKE and own < _UNLIKE:
         raise DataError(
             f"{walk.file['ankle_angle']}: ankle_angle is {100.0 * apart:.0f} % of the stride from where this shank has "
-            "it: it is of the other foot; give the ankle of the same side as the shank"
+            "it: it belongs to the other foot; give the ankle of the same side as the shank"
         )
 
 

@@ -274,15 +274,15 @@ _MAXIMUM_STRIDES = 100_000
 """Strides of such a recording at most."""
 
 
-def walk_recording(gait: Gait, strides: int, rate: float = _RATE) -> Recording:
-    """Return a number of equal strides, sampled at about ``rate`` [Hz], marked synthetic; SI units, package signs.
+def walk_recording(gait: Gait, strides: int) -> Recording:
+    """Return a number of equal strides, marked synthetic; SI units, package signs.
 
     DataError for a number that is not plausible.
     """
     if not 1 <= strides <= _MAXIMUM_STRIDES:
         raise DataError(f"the number of strides must be from 1 to {_MAXIMUM_STRIDES}, not {strides}")
     # A whole number of samples a stride: all strides are then equal to the last bit.
-    per_stride = max(10, round(rate * gait.stride_time))
+    per_stride = max(10, round(_RATE * gait.stride_time))
     phase = np.arange(strides * per_stride + 1) / per_stride
     # One stride is evaluated and repeated, so that all are equal to the last bit.
     one = np.arange(per_stride) / per_stride

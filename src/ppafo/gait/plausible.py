@@ -284,7 +284,8 @@ def check_force_scale(file: str, force: Floats, signs_from: SignSource) -> None:
     low, high = FORCE_PEAK
     if -lowest > _CLEARLY_BETTER * highest:
         raise DataError(
-            f"{file}: vertical_force is {lowest:.3g} body weights at its largest, downwards: its sign is reversed; "
+            f"{file}: vertical_force is {lowest:.3g} body weights at its largest and points downwards: its sign is "
+            f"reversed; "
             f"{other_sign(signs_from, 'vertical_force.positive')}"
         )
     if not low <= highest <= high:

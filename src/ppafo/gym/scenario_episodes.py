@@ -76,7 +76,9 @@ class ScenarioEpisodes:
             left, reason = self._plan(columns, values, left)
             if not left.size:
                 return columns, values
-        raise ScenarioError(f"{self.base.name}: {MOST_DRAWS} draws of an episode do not fit it: {reason}; vary less")
+        raise ScenarioError(
+            f"{self.base.name}: {MOST_DRAWS} random episodes in a row are invalid: {reason}; narrow the ranges in vary"
+        )
 
     def shown(self, drawn: Floats) -> Scenario:
         """Return the scenario of what was drawn of one episode (numbers,) in SI."""

@@ -200,7 +200,7 @@ def _walk_episodes(
     file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
 ) -> WalkEpisodes:
     if varied:
-        raise ScenarioError(f"vary: {', '.join(varied)}: a walk draws wearers and gaits, and no numbers")
+        raise ScenarioError(f"vary: {', '.join(varied)}: a walk varies its wearer and gait only; omit vary")
     walk, duration = load_walk(file, words), settings.duration
     seconds = lasting(walk, (WALKING_TIME if duration is None else duration) / 60.0).run.duration
     return walk_episodes(walk, settings.randomise, seconds)

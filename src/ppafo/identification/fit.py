@@ -136,7 +136,7 @@ def fit(
         return found
     # Where the law is wrong other starts end where the first does: only one that explains more at once is followed.
     for start in _other_starts(work, found):
-        report(Progress("fit: another start, which explains more than where the first ended"))
+        report(Progress("fit: another start, which fits better than the first result"))
         other = _whitened(work, _search(work, start), confidence)
         # By more than what the search itself leaves open, so that equal optima do not change the answer.
         if _likelihood(work, other) > _likelihood(work, found) + 1.0:

@@ -147,7 +147,7 @@ class FreeDecayProblem(StrictTable):
             if low is not None and high is not None and turned > _MOST_OF_STOPS * (high - low) > 0.0:
                 raise IdentificationError(
                     f"{source.name}: free-decay: 'angle' goes over {turned:.4g} rad, {turned / math.tau:.3g} turns, "
-                    f"and the stops of the set are {math.degrees(high - low):.4g} deg apart: is it in deg?"
+                    f"and the stops of the set are {math.degrees(high - low):.4g} deg apart: is its unit deg?"
                 )
         paths = ("friction.static_torque", "friction.dynamic_torque")
         static, dynamic = (number_in_si(setting.parameter_set, path) for path in paths)

@@ -60,7 +60,7 @@ def conflict_in_words(fitted: Fit, remedy: str) -> str:
     if conflict.group == STATED:
         return f"{conflict.number} is {errors:.1f} standard errors beyond its stated limit; {remedy}"
     if conflict.number == SMOOTH:
-        return f"what is left of {conflict.group} is {errors:.0f} times its noise, too smooth for noise; {remedy}"
+        return f"the residual of {conflict.group} is {errors:.0f} times its noise and too smooth to be noise; {remedy}"
     give = "give" if _SEVERAL & set(conflict.group.split()) else "gives"
     return (
         f"fitted alone, {conflict.group} {give} different values, {conflict.number} by {errors:.1f} standard "

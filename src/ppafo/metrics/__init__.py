@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 from ppafo.kinds import Kinds
 from ppafo.metrics import command, gas, motion, strides, switching, tracking
 from ppafo.metrics.metric import Metric, MetricKind
+from ppafo.metrics.settled import SETTLED_METRICS
 from ppafo.signals import Recording
 
 if TYPE_CHECKING:
     from ppafo.engine.program import Program
 
-__all__ = ["METRICS", "Metric", "MetricKind", "evaluate", "has_channels", "missing_channels"]
+__all__ = ["METRICS", "Metric", "MetricKind", "evaluate", "has_channels", "metric_kind", "missing_channels"]
 
 
 METRICS: Kinds[MetricKind] = Kinds(
@@ -32,6 +33,11 @@ METRICS: Kinds[MetricKind] = Kinds(
         )
     },
 )
+
+
+def metric_kind(name: str) -> MetricKind | None:
+    """Return a metric that a metered run may have, those of verdicts included; None for an unknown name."""
+    return METRICS.get(name) or SETTLED_METRICS.get(name)
 
 
 def evaluate(recording: Recording) -> dict[str, Metric]:

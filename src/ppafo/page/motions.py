@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Collection, Mapping
-from typing import Any, ClassVar, Protocol, final
+from typing import Any, ClassVar, final
 
 from ppafo.report.style import PAGE_LOOKS
 from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent
@@ -14,59 +14,45 @@ _WALKED = 6
 """Length [s] of a walk in a page, unless somebody wants more: five strides."""
 
 
-class ShownMotion(Protocol):
-    """Presentation of the scenarios whose files have one layout: protocol."""
+@final
+class _VaneAlone:
+    """Presentation of scenarios of a vane."""
 
-    claims: ClassVar[str]
+    claims: ClassVar[str] = "claims"
     """Section of ``words.toml`` with the claims of a page about it."""
 
     def declared(self) -> DeclaredContent:
         """Return what its file can hold."""
-
-    def look(self, scenario: Scenario, /) -> int:
-        """Return the number of its colour."""
-
-    def tab(self, scenario: Scenario, /) -> str:
-        """Return the title of the tab that it shares."""
-
-    def usual_changes(self, scenario: Scenario, /) -> dict[str, str]:
-        """Return the changes with which it begins, texts by key."""
-
-    def with_limits(self, entry: Mapping[str, Any], scenario: Scenario, /) -> dict[str, Any]:
-        """Return a setting with the limits that its file has and its program has not."""
-
-    def relations(self, keys: Collection[str], /) -> list[dict[str, Any]]:
-        """Return contradictions of settings that its file refuses and its program does not."""
-
-
-@final
-class _VaneAlone:
-    claims: ClassVar[str] = "claims"
-
-    def declared(self) -> DeclaredContent:
         return OF_A_VANE
 
     def look(self, scenario: Scenario) -> int:
+        """Return the number of its colour."""
         return PAGE_LOOKS.get(scenario.device.valve.kind, 0)
 
     def tab(self, scenario: Scenario) -> str:
+        """Return the title of the tab that it shares."""
         motion = vane_motion(scenario)
         if motion.profile is None:
             return "Step response" if scenario.controller.is_open_loop else "Unconstrained vane"
         return "Moving ankle" if motion.locked_angle is None else "Torque task"
 
     def usual_changes(self, _scenario: Scenario) -> dict[str, str]:
+        """Return the changes with which it begins, texts by key."""
         return {}
 
     def with_limits(self, entry: Mapping[str, Any], _scenario: Scenario) -> dict[str, Any]:
+        """Return a setting with the limits that its file has and its program has not."""
         return dict(entry)
 
     def relations(self, _keys: Collection[str]) -> list[dict[str, Any]]:
+        """Return contradictions of settings that its file refuses and its program does not."""
         return []
 
 
 @final
 class _Walk:
+    """Presentation of walks, with the same attributes."""
+
     claims: ClassVar[str] = "claims_of_walks"
 
     def declared(self) -> DeclaredContent:
@@ -115,9 +101,9 @@ class _Walk:
         ]
 
 
-_MOTIONS: Mapping[str, ShownMotion] = {VANE: _VaneAlone(), WALK: _Walk()}
+_MOTIONS: Mapping[str, _VaneAlone | _Walk] = {VANE: _VaneAlone(), WALK: _Walk()}
 
 
-def shown_motion(scenario: Scenario) -> ShownMotion:
+def shown_motion(scenario: Scenario) -> _VaneAlone | _Walk:
     """Return what a page shows and asks of a scenario."""
     return _MOTIONS[scenario.motion.motion_kind.layout]

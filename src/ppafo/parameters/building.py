@@ -45,7 +45,7 @@ _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""
 _COVERED = 1.01
 """A supply this much beyond the pressures of a table is still covered by it."""
-_BESIDE_ANOTHER = "; the other supply is above it, and both must be on one side"
+_BESIDE_ANOTHER = "; the other supply is above it, and both must be on the same side of the atmosphere"
 SUPPLIES = PRESSURE_PATH, SECOND_PRESSURE_PATH
 Reader = Callable[[str, Iterable[Quantity]], dict[str, float]]
 """Function that reads a section by its declared quantities: numbers in SI, by name."""
@@ -64,7 +64,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     if missing:
         completed = parameter_set.completed_by
         remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
-        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
+        raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     species = _species(parameter_set)

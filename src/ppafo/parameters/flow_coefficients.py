@@ -25,9 +25,9 @@ _NFPA, _PSI_PER_BAR, _RANKINE, _LITRES_PER_CUBIC_FOOT = 22.48, 14.5038, 527.67, 
 _LITRE_PER_SECOND_BAR = 1.0e-8
 
 
-def conductance_of_nominal_flow(flow: float, critical_ratio: float = USUAL_CRITICAL_RATIO) -> float:
+def conductance_of_nominal_flow(flow: float) -> float:
     """Sonic conductance C [m^3/(s Pa)] of a valve with a nominal flow [L/min at ANR] from 7 to 6 bar absolute."""
-    share = math.sqrt(1.0 - ((_BEHIND / _BEFORE - critical_ratio) / (1.0 - critical_ratio)) ** 2)
+    share = math.sqrt(1.0 - ((_BEHIND / _BEFORE - USUAL_CRITICAL_RATIO) / (1.0 - USUAL_CRITICAL_RATIO)) ** 2)
     return flow / 60.0 / (_BEFORE * share) * _LITRE_PER_SECOND_BAR
 
 

@@ -17,6 +17,7 @@ from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts, converter_with
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.simulation.nominal import converter_range
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
@@ -56,7 +57,7 @@ def proof(law: FixedLaw, numbers: Sequence[Quantity] | None = None) -> Narrowed:
     allowed: Range = (IntegerRange(-COMMAND_STEPS, COMMAND_STEPS), ranges["state"])
     # Within it where the hull of both is no wider.
     if hull(proved.returned, allowed) != allowed:
-        raise ProgramError(f"{law.kind.name}: command and state may leave their ranges: {proved.returned}")
+        raise ProgramError(f"{law.kind.name}: the command or the state can leave its range: {proved.returned}")
     return proved
 
 
@@ -181,7 +182,8 @@ def integer_form(scenario: Scenario) -> Scenario:
     kind = scenario.controller.kind
     if scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': a fixed-point controller follows a torque alone"
+            f"{scenario.name}: reference.of = '{scenario.controlled}': a fixed-point controller follows a torque "
+            f"only; give a scenario with reference.of = 'torque'"
         )
     if kind in FIXED_LAWS:
         return scenario
@@ -191,7 +193,9 @@ def integer_form(scenario: Scenario) -> Scenario:
             f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
     scenario.device.check_torque_constant("a fixed-point controller")
-    settings = {**scenario.controller.settings, **{quantity.name: quantity.default or 0.0 for quantity in SETTINGS}}
+    supply, (bits, pressure_range) = scenario.device.supply, SETTINGS
+    shown = converter_range(float(supply.pressure), float(supply.dorsiflexion_pressure))
+    settings = {**scenario.controller.settings, bits.name: bits.default or 0.0, pressure_range.name: shown}
     return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))
 
 
@@ -203,8 +207,8 @@ def fixed_point_controller(scenario: Scenario) -> FixedPointController:
     # Half of the range: the watchdog waits for two sample periods.
     if not 1 <= ticks <= MOST_TICKS // 2 or abs(ticks * TICK - period) > 1.0e-9 * period:
         raise ScenarioError(
-            f"{scenario.name}: controller.period = {period:.9g} s: on the processor a multiple of 0.125 ms, "
-            f"up to {MOST_TICKS // 2 * TICK:.3g} s"
+            f"{scenario.name}: controller.period = {period:.9g} s: must be a multiple of 0.125 ms on the processor, "
+            f"at most {MOST_TICKS // 2 * TICK:.3g} s"
         )
     law = FIXED_LAWS[scenario.controller.kind]
     row = plan_run(scenario).controller

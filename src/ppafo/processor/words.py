@@ -42,7 +42,7 @@ def tried(names: Sequence[str], target: str, samples: int | None, overrides: Seq
     """Scenarios on one target."""
     scenarios = [load_scenario(name, overrides) for name in names]
     if len(scenarios) > 1 and samples is not None:
-        raise ScenarioError("several SCENARIOs: are run in turn and drawn in one figure; give one for --samples")
+        raise ScenarioError("--samples takes one SCENARIO; several are run in turn and drawn in one figure")
     if samples is None:
         return _runs(scenarios, target)
     # Drawn samples on the processor and in Python.

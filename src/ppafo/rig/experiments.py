@@ -290,8 +290,8 @@ def rig_run(scenario: Scenario, request: ExperimentRequest, highest_rate: float 
     """
     if scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': the controllers of the simulated test bench "
-            "follow a torque"
+            f"{scenario.name}: reference.of = '{scenario.controlled}': controllers on the simulated test bench "
+            f"follow a torque only; give a scenario with reference.of = 'torque'"
         )
     preset = request.preset
     rate = min(highest_rate, preset.values["sampling.rate"])
@@ -469,7 +469,7 @@ def record(
     kind = load_parameter_set(device).actuator_kind
     if kind != VANE:
         raise ParameterError(
-            f"the simulated test bench is made for a vane, and '{one_line(device)}' has an actuator '{kind}'"
+            f"the simulated test bench supports vane actuators only, and '{one_line(device)}' has an actuator '{kind}'"
         )
     outcome = chosen.record(ExperimentRequest(preset, seed, device, valve, others))
     truth = {

@@ -302,8 +302,8 @@ def with_line(device: Device, plant: PlantParameters, preset: Preset) -> tuple[P
     volume, smallest = line["volume"], min(plant.dead_volume_1, plant.dead_volume_2)
     if volume >= smallest:
         raise ParameterError(
-            f"preset '{preset.name}': line.volume = {volume:g} m^3 must be below the dead volumes of the device, "
-            f"of which it is a part; the smaller one is {smallest:g} m^3"
+            f"preset '{preset.name}': line.volume = {volume:g} m^3 is part of each dead volume, so it must be below "
+            f"the smaller one, {smallest:g} m^3"
         )
     if volume > 0.0 and line["area"] * line["discharge_coefficient"] <= 0.0:
         raise ParameterError(

@@ -96,13 +96,14 @@ class ReferenceSummary(NamedTuple):
 
     Its last value; the farthest that it goes over all samples, from 0 or, where it is no torque, from what is
     controlled as the run begins; ``tolerance`` is the difference from the last value up to which it counts as resting;
-    ``hold_start`` is the number of the sample after the last one that did not rest.
+    ``hold_start`` is the number of the sample after the last one that did not rest, ``samples`` how many the run has.
     """
 
     last: float
     largest: float
     tolerance: float
     hold_start: float
+    samples: float
 
 
 SAME_LEVEL = 1.0e-9
@@ -123,6 +124,7 @@ def advance_course(course: ReferenceSummary, sample: Sample) -> ReferenceSummary
         largest=course.largest,
         tolerance=course.tolerance,
         hold_start=sample.number + 1.0 if away else course.hold_start,
+        samples=course.samples,
     )
 
 

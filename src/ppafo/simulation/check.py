@@ -90,7 +90,7 @@ class ErrorEstimate:
         of_metrics = f"; of a metric at most {self.share:.1e} of it ({self.largest})" if self.largest else ""
         beyond = ""
         if self.over_promise > 1.0:
-            remedy = f": `run.tolerance = {self.tolerance:.1g}` makes it less" if self.tolerance else ""
+            remedy = f": `run.tolerance = {self.tolerance:.1g}` reduces it" if self.tolerance else ""
             beyond = f" That is {self.over_promise:.2g} times what a run promises{remedy}."
         return f"Estimated error of the steps: at most {over_time} over time{of_metrics}.{beyond}"
 
@@ -162,18 +162,18 @@ class Check:
         causes = [
             (
                 by_move,
-                f"a {what} moved by {MOVE:.0e} of its range, far less than anybody can measure, changes them. One run "
-                f"says nothing about them; give the spread over many (ppafo sweep --statistic).",
+                f"a {what} moved by {MOVE:.0e} of its range, far below what can be measured, changes them. One run "
+                f"is no evidence of their values; give the spread over many (ppafo sweep --statistic).",
             ),
             (
                 by_error,
-                "finer steps with a sixteenth of the error change them. Take a smaller run.tolerance and check again; "
-                "what still changes cannot be repeated.",
+                "finer steps with a sixteenth of the error change them. Take a smaller run.tolerance and check "
+                "again; metrics that still change are not repeatable.",
             ),
             (("how it ends",) if self.failed else (), f"the run with {' and that with '.join(self.failed)} diverged."),
         ]
         sentences = [f"{', '.join(names)}: {cause}" for names, cause in causes if names]
-        parting = [] if self.parts_at is None else [f"The runs part at t = {self.parts_at:.4g} s."]
+        parting = [] if self.parts_at is None else [f"The runs separate at t = {self.parts_at:.4g} s."]
         return " ".join([f"Numerically sensitive: {' Also: '.join(sentences)}", self.error.sentence, *parting])
 
     @in_units(_units_of)

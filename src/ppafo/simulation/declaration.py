@@ -277,8 +277,8 @@ def check_motion_kind(kind: object, place: str) -> None:
         walks = isinstance(kind, str) and is_walk(kind)
     if walks:
         raise ScenarioError(
-            f"{place}: a walk has a gait and a wearer, and here the motion of a vane alone is needed; 'ppafo new walk' "
-            "writes the file of a walk"
+            f"{place}: this motion is a walk, but a scenario file has the motion of the vane alone; 'ppafo new "
+            f"walk' writes a walk file"
         )
 
 

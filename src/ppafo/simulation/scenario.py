@@ -410,9 +410,7 @@ class Scenario:
         # A class has both methods too, and would fail only when it runs.
         if isinstance(controller, type):
             name = controller.__name__
-            raise ScenarioError(
-                f"{self.name}: {name} is a class; give an instance of it, as in controlled_by({name}())"
-            )
+            raise ScenarioError(f"{self.name}: {name} is a class; give an instance, as in controlled_by({name}())")
         for method in ("reset", "update"):
             if not callable(getattr(controller, method, None)):
                 kind = type(controller).__name__
@@ -429,7 +427,7 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
     """The motion of a scenario of a vane alone; ScenarioError for a leg that wears the device."""
     if isinstance(scenario.motion, FreeMotion | PrescribedMotion):
         return scenario.motion
-    raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, and here a scenario without a wearer is needed")
+    raise ScenarioError(f"{scenario.name}: is {scenario.motion.label}, but a scenario of the vane alone is needed here")
 
 
 def scenario_document(scenario: Scenario) -> dict[str, Any]:

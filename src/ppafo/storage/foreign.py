@@ -228,7 +228,7 @@ def _rows_of_trials(time: Floats, wanted: str | int | tuple[int, ...]) -> dict[s
     numbers = range(1, last + 1) if isinstance(wanted, str) else (wanted,) if isinstance(wanted, int) else wanted
     for trial in numbers:
         if trial > last:
-            raise DataError(f"trial = {trial}: the clock begins again {last - 1} times: there is 1 to {last}")
+            raise DataError(f"trial = {trial}: the clock restarts {last - 1} times, so the file has trials 1 to {last}")
     if isinstance(wanted, int):
         return {"": slice(starts[wanted - 1], starts[wanted])}
     return {f" trial {number}": slice(starts[number - 1], starts[number]) for number in numbers}

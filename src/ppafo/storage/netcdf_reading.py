@@ -100,7 +100,7 @@ def _own_variables(file: Any) -> dict[str, Any]:
     variables = {name: file[name] for name in names}
     for name, variable in variables.items():
         if len(getattr(variable, "shape", None) or ()) != 1 or variable.dtype.kind not in _KINDS_OF_NUMBERS:
-            raise DataError(f"'{name}' must be numbers over '{TIME}' alone")
+            raise DataError(f"'{name}' must be numeric and one-dimensional over '{TIME}'")
         if variable.is_virtual or variable.external:
             raise DataError(f"the numbers of '{name}' are in another file; a recording must contain its numbers itself")
     return variables
@@ -135,7 +135,7 @@ def _check_is_whole(name: str, variable: Any) -> None:
         chunk = variable.id.get_chunk_info(number)
         compressed = b"" if variable.compression is None else variable.id.read_direct_chunk(chunk.chunk_offset)[1]
         if _unpacks_beyond(compressed, allowed_bytes) or chunk.size > 2 * allowed_bytes:
-            raise DataError(f"'{name}' expands to more than it states")
+            raise DataError(f"'{name}' decompresses to more than its stated size")
 
 
 def _unpacks_beyond(compressed: bytes, allowed_bytes: int) -> bool:

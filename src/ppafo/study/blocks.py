@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.sampling import correlate, uniform_numbers
 from ppafo.studies.study import Configuration, Study, with_followers
@@ -17,6 +18,8 @@ MAXIMUM_RUNS_OF_CHUNK = 65_536
 """Runs of a chunk at most, unless the study says another number."""
 _FEWEST_RUNS_OF_CHUNK = 512
 """Runs of a chunk at least, however much memory their channels over time take."""
+_MAXIMUM_STEPS = 2**25
+"""Steps of all runs between two reports: some seconds of a processor."""
 _SLOW_RUNS_OF_CHUNK = 64
 """Runs of a chunk with a Python controller: a few seconds between reports, so that little is lost."""
 _MAXIMUM_BYTES_OF_TRACES = 48_000_000
@@ -42,10 +45,18 @@ def chunk_size(study: Study) -> int:
     bytes_of_run = (
         8 * len(study.outputs.traces) * max(samples_of(study, configuration) for configuration in study.configurations)
     )
-    size = MAXIMUM_RUNS_OF_CHUNK
+    size = min(runs_at_once(configuration.scenario, MAXIMUM_RUNS_OF_CHUNK) for configuration in study.configurations)
     while size > _FEWEST_RUNS_OF_CHUNK and size * bytes_of_run > _MAXIMUM_BYTES_OF_TRACES:
         size //= 2
     return size
+
+
+def runs_at_once(scenario: Scenario, most: int) -> int:
+    """Return how many runs of a scenario are made between two reports: ``most``, or fewer where they are long."""
+    steps = scenario.run.duration / scenario.run.step
+    while most > _FEWEST_RUNS_OF_CHUNK and most * steps > _MAXIMUM_STEPS:
+        most //= 2
+    return most
 
 
 def samples_of(study: Study, configuration: Configuration) -> int:

@@ -184,8 +184,8 @@ def read_manifest(location: Place) -> dict[str, Any]:
         raise DataError(f"{location.address}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, "
-            f"this version of ppafo reads {SCHEMA_VERSION}"
+            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo "
+            f"reads {SCHEMA_VERSION}; make the result again with this version"
         )
     validate(_Stored, document, f"{location.address}: {MANIFEST}", DataError)
     return document

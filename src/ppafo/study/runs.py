@@ -8,20 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, refused_as
-from ppafo.metrics import METRICS
+from ppafo.metrics import metric_kind
+from ppafo.metrics.settled import SETTLED_METRICS
 from ppafo.metrics.tracking import ONE_INSTANT, settled_error
 from ppafo.progress import Progress, Report
 from ppafo.running import most_reversals
 from ppafo.simulation.clock import TIMES
+from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.ensemble.running import lacking
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.metered import following, needed_metrics
+from ppafo.simulation.tracking.metered import needed_metrics, tracking_excess
 from ppafo.simulation.tracking.rule import REVERSALS, smallest_change
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import check_metrics
+from ppafo.study.blocks import runs_at_once
 
 Rows = dict[str, NDArray[Any]]
 """Columns of one length: metrics by name [SI], nan where a run has none, and whether each run ``failed``."""
@@ -29,7 +32,7 @@ _Made = Callable[[Mapping[str, Floats]], tuple[Rows, str]]
 """Columns in; rows out, and why the first of them failed."""
 FAILED = "failed"
 _AT_ONCE, _SLOW_AT_ONCE = 16_384, 32
-"""Runs between two reports: as a rule, and where a Python object controls."""
+"""Runs between two reports at most: as a rule, and where a Python object controls."""
 
 
 @final
@@ -73,7 +76,7 @@ class Runs:
 
         Columns of the paths in ``gauge`` count from the atmosphere of their run.
         """
-        check_metrics(metrics, scenario)
+        check_metrics([name for name in metrics if name not in SETTLED_METRICS], scenario)
 
         def rows(columns: Mapping[str, Floats]) -> tuple[Rows, str]:
             with refused_as(StudyError, f"scenario '{scenario.name}'", ScenarioError):
@@ -83,7 +86,8 @@ class Runs:
             reason = result.reasons[min(result.reasons)] if result.reasons else ""
             return {**values, FAILED: result.status != 0}, reason
 
-        self._begin(metrics, rows, tally, _AT_ONCE if scenario.controller.custom is None else _SLOW_AT_ONCE)
+        is_slow = scenario.controller.custom is not None
+        self._begin(metrics, rows, tally, _SLOW_AT_ONCE if is_slow else runs_at_once(scenario, _AT_ONCE))
 
     @classmethod
     def of_model(cls, model: Callable[[Mapping[str, Floats]], Mapping[str, Any]], metrics: Sequence[str]) -> "Runs":
@@ -161,14 +165,18 @@ def with_companions(metrics: Sequence[str], scenario: Scenario) -> tuple[str, ..
     A metric at one instant needs oscillations of what is controlled, and the verdict on tracking its own metrics.
     """
     companions = [name for metric in metrics for name in ONE_INSTANT.get(metric, ())]
-    offered = (name for name in (*companions, *needed_metrics(scenario)) if not lacking(scenario, METRICS[name]))
+    offered = (
+        name
+        for name in (*companions, *needed_metrics(scenario))
+        if (kind := metric_kind(name)) and not lacking(scenario, kind)
+    )
     return tuple(dict.fromkeys((*metrics, *offered)))
 
 
-def follows(
+def excess(
     rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
 ) -> Floats:
-    """Return whether metered runs follow their reference (runs,): 1, 0, or nan where that is not known.
+    """Return the largest tracking number of metered runs over its limit (runs,); nan where that is not known.
 
     ``columns`` are the values of the runs by path, of which those in ``gauge`` count from the atmosphere.
     """
@@ -176,7 +184,27 @@ def follows(
         return np.full(next(iter(rows.values())).size, np.nan)
     varied = {path: column for path, column in absolute(scenario, columns, gauge).items() if path not in TIMES}
     least = smallest_change(scenario) if scenario.follows_reference else 0.0
-    return following(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
+    return tracking_excess(with_numbers(scenario, varied), rows, most_reversals(scenario), least)
+
+
+def follows(
+    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
+) -> Floats:
+    """Return whether metered runs follow their reference (runs,): 1, 0, or nan where that is not known."""
+    share = excess(rows, scenario, columns, gauge)
+    return np.where(np.isfinite(share), np.where(share > 1.0, 0.0, 1.0), share)
+
+
+def tracking_violation(
+    rows: Mapping[str, Floats], scenario: Scenario, columns: Mapping[str, Floats], gauge: Collection[str] = ()
+) -> Floats:
+    """Return by which share metered runs exceed the limits of tracking (runs,); 0 where they follow or it is unknown.
+
+    A reference that its scenario announces to lie beyond reach is followed by no run, and counts as followed.
+    """
+    if scenario.beyond_reach and not changes_reach(columns):
+        return np.zeros(next(iter(rows.values())).size)
+    return np.fmax(excess(rows, scenario, columns, gauge) - 1.0, 0.0)
 
 
 def oscillating(rows: Mapping[str, Floats], scenario: Scenario) -> NDArray[np.bool_]:

@@ -99,14 +99,14 @@ class Expressions:
     def part(self, node: ast.expr) -> slice:
         """A part of a tuple, whose bounds are literal."""
         if not isinstance(node, ast.Slice) or node.step is not None:
-            raise self.refused(node, f"'{ast.unparse(node)}' is no part of a tuple")
+            raise self.refused(node, f"'{ast.unparse(node)}' is not a part of a tuple")
         return slice(*(None if bound is None else self.literal(bound) for bound in (node.lower, node.upper)))
 
     def literal(self, node: ast.expr) -> int:
         """A whole number that is written out."""
         number = _literal(self.whole(node))
         if number is None:
-            raise self.refused(node, f"'{ast.unparse(node)}' must be a number that is written out")
+            raise self.refused(node, f"'{ast.unparse(node)}' must be a literal number")
         return number
 
     def _of_constant(self, node: ast.Constant) -> Term:
@@ -137,7 +137,7 @@ class Expressions:
         if isinstance(node.value, ast.Attribute) and node.value.attr == "shape":
             array, at = self.term(node.value.value), self.literal(node.slice)
             if array.kind != "name" or not isinstance(array.type, Array) or at not in range(array.type.dimensions):
-                raise self.refused(node, f"'{ast.unparse(node)}' is no extent of an array")
+                raise self.refused(node, f"'{ast.unparse(node)}' is not an extent of an array")
             return (
                 Term("number", INT, (), array.type.shape[at]) if array.type.shape else Term("extent", INT, (array,), at)
             )
@@ -157,17 +157,17 @@ class Expressions:
                 raise self.refused(node, f"'{ast.unparse(node)}' is beyond the {count} items")
             return typed.item_of(owner, range(count)[number])
         if not isinstance(owner.type, Items) or not owner.type.is_uniform:
-            raise self.refused(node, f"'{ast.unparse(node)}' takes an item of a tuple of several types by a variable")
+            raise self.refused(node, f"'{ast.unparse(node)}' indexes a tuple of several types by a variable")
         return Term("item", owner.type.types[0], (owner, self.from_start(index, Term("number", INT, (), count))))
 
     def element(self, owner: Term, kind: Array, node: ast.Subscript) -> Term:
         """An element of an array, which has all its places, or a part of it from one first place up to another."""
         if owner.kind != "name":
-            raise self.refused(node, f"'{ast.unparse(node)}' is taken of an array without a name")
+            raise self.refused(node, f"'{ast.unparse(node)}' indexes an array that has no name")
         if isinstance(node.slice, ast.Slice):
             begin, end = node.slice.lower, node.slice.upper
             if begin is None or end is None or node.slice.step is not None or kind.shape:
-                problem = f"'{ast.unparse(node.slice)}' is not from one place of an array up to another"
+                problem = f"'{ast.unparse(node.slice)}' is not a slice with start and stop"
                 raise self.refused(node.slice, problem)
             # Both bounds lie in it: what is beyond is not looked for.
             count = Term("extent", INT, (owner,), 0)
@@ -230,7 +230,7 @@ class Expressions:
             parts = tuple(self.scalar(side, FLOAT) for side in (node.left, node.right))
             # Compilers replace powers of literals by products or roots, whose last bits differ from the library's.
             if any((part.parts[0] if part.kind == "negative" else part).kind == "number" for part in parts):
-                problem = "a power of a number or by a number that is written out"
+                problem = "a power with a literal base or exponent"
                 raise self.refused(node, f"'{ast.unparse(node)}', {problem}")
             return Term("pow", FLOAT, parts)
         sign = SIGN_OF.get(type(node.op), "")
@@ -241,7 +241,7 @@ class Expressions:
             raise self.refused(node, f"'{ast.unparse(node)}' needs a library function")
         # A shift by 64 or more, or by less than 0, is undefined in C.
         if sign == ">>" and _literal(right) not in range(64):
-            raise self.refused(node, f"'{ast.unparse(node)}' shifts by what is not written out as 0 to 63")
+            raise self.refused(node, f"'{ast.unparse(node)}' shifts by other than a literal from 0 to 63")
         kind = INT if is_whole and sign != "/" else FLOAT
         return Term(sign, kind, (converted(left, kind), converted(right, kind)))
 
@@ -289,7 +289,7 @@ class Expressions:
         test, yes, no = self.condition(node.test), self.term(node.body), self.term(node.orelse)
         kind = joined(yes.type, no.type)
         if kind is None:
-            raise self.refused(node, "a choice between values of different forms")
+            raise self.refused(node, "a choice between values of different types")
         # In C both sides get one type: an int that becomes a float loses digits, and -0 differs from 0.
         if mixes(yes.type, no.type):
             raise self.refused(node, f"'{ast.unparse(node)}', a choice between a whole number and a float")
@@ -299,7 +299,7 @@ class Expressions:
         """The name of what is called; the function's own where it was handed over."""
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
         if any(isinstance(argument, ast.Starred) for argument in node.args):
-            raise self.refused(node, f"'{ast.unparse(node)}' hands over a tuple as arguments")
+            raise self.refused(node, f"'{ast.unparse(node)}' passes a tuple as arguments")
         handed = self.types.get(name)
         return handed.name if isinstance(handed, FunctionArgument) else name
 
@@ -343,7 +343,7 @@ class Expressions:
         types = tuple(stated[name].type for name in names)
         # An array of known shape is a local one, which C hands over as a pointer of another type.
         if any(isinstance(kind, Array) and kind.shape for kind in types):
-            raise self.refused(node, f"'{ast.unparse(node)}' hands over an array of its own")
+            raise self.refused(node, f"'{ast.unparse(node)}' passes an array expression")
         return self.made(name, types), tuple(stated[name] for name in names if not is_empty(stated[name].type))
 
     def built_in(self, name: str, node: ast.Call) -> Term:
@@ -591,7 +591,7 @@ class _FunctionWalk:
             raise self.refused(node, f"'{ast.unparse(node)}' is not supported in compiled functions")
         function, arguments = self.values.called(name, node.value)
         if function.returns is not None:
-            raise self.refused(node, f"'{ast.unparse(node)}' throws away what it returns")
+            raise self.refused(node, f"'{ast.unparse(node)}' discards its return value")
         self.writes = node
         return [typed.ProcedureCall(function.name, arguments)]
 
@@ -602,7 +602,7 @@ class _FunctionWalk:
         kind = value.type if self.returns is None else joined(self.returns, value.type)
         if kind is None:
             kinds = sorted({kind_of(kind) for kind in (self.returns, value.type) if kind is not None})
-            problem = f"the ways through the function return different things: {' or '.join(kinds)}"
+            problem = f"the paths through the function return different types: {' or '.join(kinds)}"
             raise self.module.mistaken(self.first_return or node, problem)
         if self.returns is not None and mixes(self.returns, value.type):
             raise self.refused(node, "a function that returns a whole number in one place and a float in another")
@@ -622,7 +622,7 @@ class _FunctionWalk:
         start, stop = (Term("number", INT, (), 0), bounds[0]) if len(bounds) == 1 else bounds[:2]
         step = self.values.literal(call.args[2]) if len(bounds) == 3 else 1
         if step == 0:
-            raise self.refused(node, f"'{ast.unparse(call)}' goes nowhere")
+            raise self.refused(node, f"'{ast.unparse(call)}' discards its result")
         self.note_type(name, INT, node)
         before: list[Statement] = []
         if stop.reads & {name, *changed(node.body)}:
@@ -674,7 +674,7 @@ class _FunctionWalk:
 
     def do_assign(self, node: ast.Assign) -> list[Statement]:
         if len(node.targets) != 1:
-            raise self.refused(node, "one value for several names")
+            raise self.refused(node, "one value assigned to several names")
         target, right = node.targets[0], node.value
         called = right.func if isinstance(right, ast.Call) else None
         if isinstance(target, ast.Name) and isinstance(called, ast.Name) and called.id == "empty_rows":
@@ -712,7 +712,7 @@ class _FunctionWalk:
         if owner.kind != "name" or element is owner or (owner.detail in self.given and not is_shared):
             raise self.refused(target, f"'{ast.unparse(target)}' on the left")
         if joined(element.type, value.type) != element.type:
-            raise self.refused(target, f"'{ast.unparse(target)}' gets a value of another form")
+            raise self.refused(target, f"'{ast.unparse(target)}' gets a value of another type")
         if is_shared:
             self.writes = target
         return typed.Store(element, converted(value, element.type))
@@ -734,7 +734,7 @@ class _FunctionWalk:
         before = self.types.get(name, kind)
         joint = joined(before, kind)
         if joint is None:
-            raise self.refused(node, f"'{name}' holds values of different forms")
+            raise self.refused(node, f"'{name}' holds values of different types")
         if mixes(before, kind):
             raise self.refused(node, f"'{name}' holds a whole number in one place and a float in another")
         self.has_widened |= joint != before

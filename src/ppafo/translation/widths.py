@@ -136,7 +136,7 @@ class _Ranges:
         assert isinstance(start, IntegerRange)
         assert isinstance(stop, IntegerRange)
         if start.low != start.high or stop.high - start.low > MOST_TURNS:
-            raise _refused(function, f"a loop of more than {MOST_TURNS} turns, or whose beginning is not written out")
+            raise _refused(function, f"a loop of more than {MOST_TURNS} turns, or without a literal start")
         # A loop without a turn leaves the counter as it was; it has a width all the same.
         self.keep(function, dict(names), loop.name, INT, IntegerRange(start.low, max(start.low, stop.high)))
         after = dict(names) if stop.low <= start.low else None
@@ -193,7 +193,7 @@ def _calculated(function: Function, term: Term, parts: list[IntegerRange]) -> In
     if term.kind == "&" and parts[1].low == parts[1].high and parts[1].low >= 0:
         return IntegerRange(0, parts[1].high)
     if term.kind == "*" and not any(part.low == part.high and part.low.bit_count() == 1 for part in parts):
-        raise _refused(function, "a product that is not with a power of two, for which there may be no multiplier")
+        raise _refused(function, "a product by a number that is not a power of two, which needs a multiplier")
     if term.kind not in _SIGNS:
         raise _refused(function, f"'{term.kind}'")
     # Sums, products, shifts, min and max have their extremes at the ends of both ranges.

@@ -121,7 +121,9 @@ def split_number(text: str) -> tuple[float, str]:
     value = _finite(float(match.group()), text)
     # float() rounds 1e-400 to 0 without a word, and 0 often means "none" in a file.
     if value == 0.0 and _NOT_ZERO.match(match.group()):
-        raise UnitError(f"{quote(text)} is too small for a number of 64 bits, and would be 0; write 0 or a larger one")
+        raise UnitError(
+            f"{quote(text)} is below the smallest 64-bit number and would become 0; write 0 or a larger one"
+        )
     return value, unit
 
 

@@ -162,8 +162,8 @@ def _check_motion(kind: object, place: str) -> None:
     """Raise ScenarioError for a motion that is not known, or of a vane alone; ``place`` begins the message."""
     if kind in VANE_MOTIONS:
         raise ScenarioError(
-            f"{place}: this is the file of a walk, and its motion is '{WALK}'; 'ppafo new scenario' writes the "
-            "file of a vane alone"
+            f"{place}: a walk file needs the motion '{WALK}'; 'ppafo new scenario' writes a scenario file of the "
+            f"vane alone"
         )
     with refused_as(ScenarioError, place, KindError):
         is_known = not kind or is_walk(str(kind))

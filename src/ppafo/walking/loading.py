@@ -158,8 +158,8 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     as_given = replace(request_again(scenario.origin), file=scenario.name)
     if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
-            f"{scenario.name}: this walk is not what its file says (a number was changed after it was loaded, or the "
-            "file or the package has changed since): give the bottle where the walk is loaded, with --bottle"
+            f"{scenario.name}: this walk differs from its file (changed after it was loaded, or file or package "
+            f"changed since): give the bottle where the walk is loaded, with --bottle"
         )
     content, before = as_given.content, as_given.overrides
     if bottle is not None:

@@ -299,8 +299,8 @@ def plan_task_sequence(
         planner.go(NEVER, planner.ratio, planner.stride, slope=planner.slope)
     if len(planner.parts) > PARTS:
         raise ScenarioError(
-            f"{sequence.file}: takes {len(planner.parts)} parts, a change of speed counted apart, and {PARTS} is the "
-            "most: leave segments out, or make it two task sequences"
+            f"{sequence.file}: has {len(planner.parts)} parts, changes of speed included, but at most {PARTS} are "
+            f"allowed: omit segments, or split it into two task sequences"
         )
     # The engine has a fixed number of parts, and a part that never begins changes nothing.
     unused = planner.parts[0]._replace(start=NEVER)

@@ -360,9 +360,13 @@ def walk_population(
         raise ScenarioError(f"the number of wearers must be from 1 to {MAXIMUM_WEARERS}, not {wearers}")
     configuration = scenario if isinstance(scenario, Scenario) else load_walk(scenario)
     if walk_of(configuration).bottle is not None:
-        raise ScenarioError("many wearers walk at a constant supply: leave out the bottle, or the number of wearers")
+        raise ScenarioError(
+            "several wearers walk at a constant supply pressure: omit the bottle, or the number of wearers"
+        )
     if walk_of(configuration).person:
-        raise ScenarioError("many wearers are drawn about the wearer: leave out wearer.person, or their number")
+        raise ScenarioError(
+            "several wearers are drawn at random around one: omit wearer.person, or the number of wearers"
+        )
     # One generator, in this order, so that a seed gives the same people every time.
     generator = np.random.default_rng(seed)
     build = draw_builds(wearers, generator)

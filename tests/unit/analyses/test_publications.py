@@ -113,14 +113,14 @@ def test_the_ankle_moment_that_the_torque_is_a_share_of_is_that_of_the_gait() ->
         (('{ pressure = "90 psi_g" }', "{}"), "'pressure' is missing; held_torque takes pressure"),
         (("90 psi_g", "90 kg"), "claims.held.arguments.pressure: unit 'kg' does not fit"),
         (('unit = "N m"', 'unit = "kg"'), "claims.held.unit: unit 'kg' does not fit"),
-        (("at_least = 8.5\nat_most = 9.5", ""), "give at_least or at_most, or both"),
+        (("at_least = 8.5\nat_most = 9.5", ""), "give at_least, at_most or both"),
         (("published = 9.0\n", ""), "give what is published: a number with its unit, words, or own arithmetic"),
         (("at_most = 9.5", 'direction = "less"'), "direction = 'less' needs a size: give at_most"),
         (("at_least = 8.5", 'not_testable = "no"'), "give either computation or not_testable"),
         (("where = ", "were = "), "did you mean 'where'?"),
-        (("at_least = 8.5", "at_least = 9.8"), "at_least = 9.8 lies above at_most = 9.5: no number agrees"),
-        (("published = 9.0", "published = 12.0"), "published = 12 does not agree with itself, at_most = 9.5"),
-        (("published = 9.0", "published = 8.0"), "published = 8 does not agree with itself, at_least = 8.5"),
+        (("at_least = 8.5", "at_least = 9.8"), "at_least = 9.8 lies above at_most = 9.5, so that no number can agree"),
+        (("published = 9.0", "published = 12.0"), "published = 12 is outside its own range, at_most = 9.5"),
+        (("published = 9.0", "published = 8.0"), "published = 8 is outside its own range, at_least = 8.5"),
         (("90 psi_g", "-1 bar_a"), "claims.held.arguments.pressure = '-1 bar_a': must be at least 0 Pa_a"),
         (("90 psi_g", "inf Pa_a"), "claims.held.arguments.pressure"),
         (("at_most = 9.5", "at_most = nan"), "at_most = nan: must be a finite number"),
@@ -136,7 +136,7 @@ def test_a_mistake_in_a_file_is_one_line_with_what_is_allowed(
 
 
 def test_a_claim_that_is_there_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="'held' is there twice"):
+    with pytest.raises(ScenarioError, match="'held' appears twice"):
         load_publication(written(tmp_path, TEXT + TEXT[TEXT.index("[[claims]]") :]))
 
 

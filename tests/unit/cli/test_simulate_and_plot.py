@@ -226,7 +226,7 @@ def test_a_folder_that_has_its_figures_or_none_says_so_and_what_to_open(
     )
     assert json.loads(second)["open"] == str(tmp_path / "b" / "sets.txt")
     assert main(["export", "figure", str(tmp_path / "a"), "--out", str(tmp_path / "new.png")]) == 2
-    assert "nothing is drawn anew" in capsys.readouterr().err
+    assert "there is no figure to draw" in capsys.readouterr().err
     assert names(tmp_path / "a") == before
     assert names(tmp_path) == ["a", "b"]
 

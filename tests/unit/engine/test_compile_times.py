@@ -1,22 +1,29 @@
 """The messages while models are compiled, and several at once."""
 
+import subprocess
+import sys
 import threading
 import time
 from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 
 from ppafo.engine import loading
 from ppafo.engine.cache import announcing
-from ppafo.engine.cache.announcing import SECONDS_FILE, announce, compile_side_by_side, estimate_seconds
+from ppafo.engine.cache.announcing import (
+    SECONDS_FILE,
+    announce,
+    compile_side_by_side,
+    estimate_seconds,
+    processor_seconds,
+)
 from ppafo.engine.cache.making import load_all
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import Effort
-from ppafo.engine.lanes import effort_for
+from ppafo.engine.lanes import Batch, effort_for
 from ppafo.errors import ProgramError
 from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
@@ -112,15 +119,33 @@ def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(
     assert made() == ["full", "quick"]
 
 
-def test_a_run_of_seconds_is_compiled_quickly_and_many_runs_are_not() -> None:
+def test_some_runs_of_seconds_are_compiled_quickly_and_many_runs_are_not() -> None:
     batch = plain_batch("torque-task-proportional")
-    twice = replace(batch, parameters=np.repeat(batch.parameters, 2, 1), states=np.repeat(batch.states, 2, 1))
+
+    def repeated(runs: int) -> Batch:
+        return replace(batch, parameters=batch.parameters.repeat(runs, 1), states=batch.states.repeat(runs, 1))
+
     hours = replace(batch, clock=replace(batch.clock, step_count=10_000_000))
-    assert [effort_for(each) for each in (batch, twice, hours)] == [Effort.QUICK, Effort.FULL, Effort.FULL]
+    efforts = [effort_for(each) for each in (batch, repeated(12), repeated(1000), hours)]
+    assert efforts == [Effort.QUICK, Effort.QUICK, Effort.FULL, Effort.FULL]
 
 
-def test_an_empty_program_in_the_cache_does_not_stop_an_estimate(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("seconds", "program"),
+    [(b"1.0", ""), (b"", "x"), (b"nan", "x"), (b"inf", "x"), (b"-3", "x"), (b"0.00", "x"), (b"\xff\x00", "x")],
+)
+def test_a_damaged_file_in_the_cache_does_not_stop_an_estimate(seconds: bytes, program: str, tmp_path: Path) -> None:
     (tmp_path / "one").mkdir()
-    (tmp_path / "one" / SECONDS_FILE).write_text("1.0")
-    (tmp_path / "one" / "program.py").write_text("")
+    (tmp_path / "one" / SECONDS_FILE).write_bytes(seconds)
+    (tmp_path / "one" / "program.py").write_text(program)
     assert estimate_seconds("y" * 1000, [tmp_path / "one"], 1.0e-3) == pytest.approx(1.0)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="processes have no children's time here")
+def test_time_in_which_others_use_the_processor_is_none_of_a_compilation() -> None:
+    before = processor_seconds()
+    time.sleep(0.3)
+    assert processor_seconds() - before < 0.1
+    compiler = [sys.executable, "-c", "while __import__('time').process_time() < 0.2: pass"]
+    subprocess.run(compiler, check=True)
+    assert processor_seconds() - before > 0.15

@@ -72,7 +72,7 @@ def misspells(parts: Program, lane: Lane) -> None:
     [
         ({"begin_step": makes_a_list}, r"test_one_dialect\.py:\d+: a list cannot be compiled"),
         ({"begin_step": squares}, r"test_one_dialect\.py:\d+: 'before \*\* 2' cannot .*; write 'before \* before'"),
-        ({"begin_step": prints}, r"test_one_dialect\.py:\d+: 'print\(lane.before\)' throws away"),
+        ({"begin_step": prints}, r"test_one_dialect\.py:\d+: 'print\(lane.before\)' discards its return"),
         (
             {"begin_step": sets_on_one_side},
             r"test_one_dialect\.py:\d+: 'lane.before' may have no value here: .*; set it before, on every path",

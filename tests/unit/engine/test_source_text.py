@@ -452,7 +452,7 @@ MEASUREMENT = (
         ),
         (
             "def law(measurement, x):\n    if x > 0.0:\n        return x, x\n    return x\n",
-            "my_law.py:14: the ways through the function return different things: a number or a tuple",
+            "my_law.py:14: the paths through the function return different types: a number or a tuple",
         ),
         (
             "def law(measurement, x):\n    return {0: x}[0]\n",

@@ -79,7 +79,7 @@ def metrics_of(result: Result) -> dict[str, float]:
     recording = result.recording
     last = float(recording["reference"][-1])
     largest = max(abs(float(recording["reference"][0])), abs(last))
-    course = ReferenceSummary(last, largest, SAME_LEVEL * largest, 0.0)
+    course = ReferenceSummary(last, largest, SAME_LEVEL * largest, 0.0, float(len(recording)))
     kinds = [
         kind
         for kind in METRICS.values()

@@ -42,7 +42,7 @@ def test_a_unit_with_other_numbers_than_python_is_not_written(
 
 def test_a_library_that_cannot_be_loaded_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("ppafo.exports.fmu.unit.build", lambda *_: b"no library")
-    with pytest.raises(ProgramError, match="the unit was built and cannot be loaded here"):
+    with pytest.raises(ProgramError, match="the FMU was built but cannot be loaded here"):
         functional_unit(closed_loop(load_scenario("torque-task-slow-valve", SHORT)), 2, ["linux64"])
 
 

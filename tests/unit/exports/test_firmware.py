@@ -82,7 +82,7 @@ def test_a_state_with_a_wider_range_is_not_proved(name: str, low: int, high: int
 
 def test_a_state_that_may_leave_a_narrower_range_is_not_proved() -> None:
     law = FIXED_LAWS["pid_fixed_point"]
-    with pytest.raises(ProgramError, match="may leave their ranges"):
+    with pytest.raises(ProgramError, match="can leave its range"):
         proof(replace(law, state_ranges={**law.state_ranges, "error": (-1000, 1000)}))
 
 
@@ -233,7 +233,11 @@ def test_gains_that_nobody_gives_are_the_devices_in_firmware_too(tmp_path: Path)
     ("name", "overrides", "said"),
     [
         ("step-response", (), "'constant' has no fixed-point form; controllers that have one: pid, on_off"),
-        ("torque-task-solenoid", ("controller.rate=900 Hz",), r"a multiple of 0.125 ms, up to 2.05 s"),
+        (
+            "torque-task-solenoid",
+            ("controller.rate=900 Hz",),
+            r"must be a multiple of 0.125 ms on the processor, at most 2.05 s",
+        ),
     ],
 )
 def test_what_has_no_firmware_is_refused(name: str, overrides: tuple[str, ...], said: str) -> None:

@@ -363,7 +363,7 @@ def test_log_document_and_figure_say_what_happened() -> None:
 
 
 def test_a_walk_is_refused_whose_controller_reads_forces_that_the_wire_does_not_carry() -> None:
-    with pytest.raises(ScenarioError, match="'proportional' is a walk, and the wire carries no forces under the foot"):
+    with pytest.raises(ScenarioError, match="'proportional' is a walk; the link transmits no ground reaction forces"):
         plant_of(load_scenario("proportional"))
 
 

@@ -114,7 +114,7 @@ def test_the_ankle_of_the_other_foot_is_refused_as_such_and_not_as_a_wrong_zero(
     columns: dict[str, Floats], remarks_of: Callable[..., tuple[str, ...]]
 ) -> None:
     other = later(columns, (ANKLE,), HALF_A_STRIDE / PER_SECOND)
-    with pytest.raises(DataError, match=r"ankle_angle is 50 % of the stride from where this shank has it: it is of"):
+    with pytest.raises(DataError, match=r"ankle_angle is 50 % of the stride from where this shank has it: it belongs"):
         remarks_of(other)
 
 
@@ -147,5 +147,5 @@ def test_real_angles_half_a_stride_or_50_ms_away_from_their_plates_are_said(
     own, other = (names.index(f"ankle_angle_{foot}") for foot in ("rl" if side == "right" else "lr"))
     swapped = ["\t".join([*row[:own], row[other], *row[own + 1 :]]) for row in rows]
     late.write_text("\n".join([*lines[:first], *swapped]) + "\n")
-    with pytest.raises(DataError, match="it is of the other foot"):
+    with pytest.raises(DataError, match="it belongs to the other foot"):
         import_gait([late, plates], ImportSettings(72.6, side))

@@ -262,7 +262,7 @@ def test_what_is_wrong_at_several_stages_is_said_in_one_go(
         import_gait([csv_of(wrong)], ImportSettings())
     said = (
         "does not state the body mass",
-        "vertical_force is -0.999 body weights at its largest, downwards: its sign is reversed",
+        "vertical_force is -0.999 body weights at its largest and points downwards: its sign is reversed",
         "shank_angle covers a range of .* look like radians",
         "knee_up is 9.81 m/s\\^2 on average",
         "ankle_angle covers a range of .* look like radians",

@@ -242,7 +242,7 @@ def test_start_and_end_leave_out_the_rest(tmp_path: Path) -> None:
     part = import_gait([path], ImportSettings(MASS, start=1.2, end=4.5))
     assert (len(whole.strides), len(part.strides)) == (3, 2)
     assert all(item.start >= 1.2 and item.end <= 4.5 for item in part.strides)
-    with pytest.raises(DataError, match=r"nothing is left of it from 7 to 5.19 s; it goes from 0 to 5.19 s: choose"):
+    with pytest.raises(DataError, match=r"has no samples from 7 to 5.19 s; the recording covers 0 to 5.19 s: choose"):
         import_gait([path], ImportSettings(MASS, start=7.0))
     with pytest.raises(DataError, match=r"the start, 3 s, must be before the end, 2 s"):
         import_gait([path], ImportSettings(MASS, start=3.0, end=2.0))
@@ -341,7 +341,7 @@ def test_a_plain_table_with_opensims_names_is_read(
     ("text", "message"),
     [
         ("frame,shank\n1,2\n", "the first column must be 'time', it is 'frame'"),
-        ("percent [%],a [deg]\n0,1\n", "it is 'percent'; a mean stride over 0 to 100 % is written out as time, at le"),
+        ("percent [%],a [deg]\n0,1\n", "it is 'percent'; write a mean stride over 0 to 100 % against time"),
         ("time,a,\n0,1,2\n", "a column has no name"),
         ("time,a\n0,1,2\n", "line 2 has 3 values for 2 columns"),
         ("time,a\n0,one\n", "line 2"),

@@ -200,7 +200,7 @@ def standing(path: Path, sway: float) -> Path:
 @pytest.mark.parametrize("sway", [0.0, 2.0])
 def test_of_a_standing_trial_it_is_said_alone_that_nobody_walks(sway: float, tmp_path: Path) -> None:
     path = standing(tmp_path / "standing.trc", sway)
-    with pytest.raises(DataError, match="deg in the whole record, a walk 25 or more: nobody walks in it;") as refused:
+    with pytest.raises(DataError, match="deg in the whole record, a walk 25 or more: this is not walking;") as refused:
         import_gait([path], ImportSettings())
     assert not refused.value.parts
     assert "sign" not in str(refused.value)

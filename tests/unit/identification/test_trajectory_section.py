@@ -318,11 +318,11 @@ def test_the_published_schema_has_the_section() -> None:
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
         (
             FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
-            "problem.toml: trajectory: profiles: intervals are the table's; omit it",
+            "problem.toml: trajectory: profiles: the table of the result has the intervals; omit it",
         ),
-        (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is robust by itself; omit"),
-        (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: the search scales numbers by itself; omit it"),
-        (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: is now locked; write locked = '75 deg'"),
+        (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is always robust; omit"),
+        (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: numbers are scaled automatically; omit it"),
+        (f"{FIT}{REPLAYED}held = '75 deg'\n", "trajectory: held: is renamed to locked; write locked = '75 deg'"),
         (f"{FIT}[bench.can]\nsupply_pressure = ['20 psi_g', '90 psi_g']\n", "write [[trajectory.candidates]]"),
     ],
 )

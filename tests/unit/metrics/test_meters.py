@@ -68,7 +68,7 @@ def read(recording: Recording) -> dict[str, float]:
     samples = samples_of(recording)
     reference = recording["reference"]
     largest = float(np.abs(reference).max())
-    course = ReferenceSummary(float(reference[-1]), largest, SAME_LEVEL * largest, 0.0)
+    course = ReferenceSummary(float(reference[-1]), largest, SAME_LEVEL * largest, 0.0, float(len(samples)))
     of_torque = {name: kind for name, kind in METRICS.items() if kind.of_reference in ("", "torque")}
     of_recordings = {name: kind for name, kind in of_torque.items() if kind.compute is not None}
     meters = {meter.name: metered(meter, samples, course) for kind in of_recordings.values() for meter in kind.meters}

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ppafo.analyses.tune.solve import shortfall
 from ppafo.cli.main import main
 from ppafo.engine.rows import leaves
 from ppafo.errors import ParameterError, PpafoError
@@ -19,6 +18,7 @@ from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_vol
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.tracking.metered import shortfall
 
 EXAMPLE = Path(__file__).parents[2] / "actuators"
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"

@@ -191,7 +191,7 @@ def test_the_truth_names_the_preset_with_overrides_and_the_device() -> None:
         ({"overrides": ["rig.friction.scater=0"]}, "did you mean 'rig.friction.scatter'"),
         ({"overrides": ["rig.friction.scatter=2"]}, "from 0 to 0.5"),
         ({"overrides": ["rig.line.volume=3 s"]}, "override 'rig.line.volume=3 s'"),
-        ({"overrides": ["rig.line.volume=40 cm^3"]}, "must be below the dead volumes"),
+        ({"overrides": ["rig.line.volume=40 cm^3"]}, "is part of each dead volume"),
         ({"overrides": ["rig.line.area=0 m^2"]}, "must be above 0 with a line"),
         ({"overrides": ["friction.statik_torque=1 N m"]}, "did you mean"),
         ({"valve": "solenoyd"}, "did you mean 'solenoid'"),

@@ -138,7 +138,7 @@ def test_what_only_the_error_changes_is_told_from_what_nobody_could_measure() ->
     diverged = Check("loop", (firm,), (), NO_ERROR, 0.1, (MOVED_START,))
     assert not diverged.is_determined
     assert "how it ends: the run with start moved diverged." in diverged.sentence
-    assert diverged.sentence.endswith(" The runs part at t = 0.1 s.")
+    assert diverged.sentence.endswith(" The runs separate at t = 0.1 s.")
 
 
 def test_a_check_prints_each_metric_with_what_changed_and_marks_what_is_open(chaotic: Check) -> None:

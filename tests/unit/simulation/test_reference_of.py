@@ -238,11 +238,14 @@ def test_the_pressure_loop_that_ships_settles_on_its_level() -> None:
 
 def test_what_knows_a_torque_alone_says_so() -> None:
     pressure = load_scenario("pressure-loop", ["run.duration=0.1 s"])
-    with pytest.raises(ScenarioError, match="an equilibrium is found for a torque; take --at"):
+    with pytest.raises(ScenarioError, match="an equilibrium is found for a torque; give --at"):
         equilibrium(pressure)
-    with pytest.raises(ScenarioError, match="a controller at the wire is sent a torque"):
+    with pytest.raises(ScenarioError, match="the link transmits torque references only"):
         plant_of(pressure)
-    with pytest.raises(ScenarioError, match="a fixed-point controller follows a torque alone"):
+    with pytest.raises(
+        ScenarioError,
+        match="a fixed-point controller follows a torque only; give a scenario",
+    ):
         firmware(pressure)
 
 

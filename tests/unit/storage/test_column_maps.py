@@ -376,7 +376,9 @@ def test_one_of_many_trials_with_a_clock_from_0_each_is_a_recording(tmp_path: Pa
         recording = read_foreign(path, mapped(channels=channels, trial=trial))
         assert recording["torque"].tolist() == [100.0 * trial + n for n in range(5 - trial)]
         assert recording.time[0] == 0.0
-    with pytest.raises(DataError, match=r"raw.csv: trial = 4: the clock begins again 2 times: there is 1 to 3"):
+    with pytest.raises(
+        DataError, match=r"raw.csv: trial = 4: the clock restarts 2 times, so the file has trials 1 to 3"
+    ):
         read_foreign(path, mapped(channels=channels, trial=4))
     with pytest.raises(
         DataError, match=r"line 5, column 'time'.*, or take one of 3 trials with trial = 1, or 'all', in a"
@@ -394,7 +396,9 @@ def test_some_trials_or_all_are_a_recording_each(tmp_path: Path) -> None:
     assert [one["torque"][0] for one in some] == [300.0, 100.0]
     with pytest.raises(DataError, match=r"raw.csv: trial: 3 recordings, where one is needed: name one"):
         read_foreign(path, mapped(channels=channels, trial="all"))
-    with pytest.raises(DataError, match=r"raw.csv: trial = 7: the clock begins again 2 times: there is 1 to 3"):
+    with pytest.raises(
+        DataError, match=r"raw.csv: trial = 7: the clock restarts 2 times, so the file has trials 1 to 3"
+    ):
         read_trials(path, mapped(channels=channels, trial=[1, 7]))
 
 

@@ -120,7 +120,7 @@ def test_a_channel_of_two_dimensions_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "two.nc"
     made = xarray.Dataset({"angle": (("time", "y"), np.zeros((2, 3)))}, {"time": ("time", [0.0, 1.0], {"units": "s"})})
     made.to_netcdf(path, engine="h5netcdf")
-    with pytest.raises(DataError, match="'angle' must be numbers over 'time' alone"):
+    with pytest.raises(DataError, match="'angle' must be numeric and one-dimensional over 'time'"):
         read_netcdf(path)
 
 

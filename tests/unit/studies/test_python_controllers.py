@@ -128,5 +128,5 @@ def test_a_command_that_is_no_number_names_the_object_and_a_valve_that_nothing_c
     columns = {"supply.pressure": np.array([4e5])}
     with pytest.raises(SimulationError, match=r"Proportional.update returned nan at t = 0 s"):
         run_ensemble(base.controlled_by(Proportional(float("nan"))), columns, METRIC)
-    with pytest.raises(ScenarioError, match="nothing controls the valve"):
+    with pytest.raises(ScenarioError, match="has no controller; give one"):
         run_ensemble(replace(base, controller=Control(PYTHON_CONTROLLER, {}, base.controller.period)), columns, METRIC)

@@ -10,6 +10,7 @@ from ppafo.progress import Progress
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
 from ppafo.studies.distributions import Floats
+from ppafo.study.blocks import runs_at_once
 from ppafo.study.runs import FAILED, RunCounter, Runs, settled
 
 SHORT = ("run.duration=0.2 s",)
@@ -86,3 +87,10 @@ def test_only_a_loop_that_oscillates_on_the_hold_has_its_last_error_replaced() -
     }
     assert settled(rows, "final_error").tolist() == [0.4, 0.1, 0.5]
     assert settled(rows, "rms_error_hold") is rows["rms_error_hold"]
+
+
+def test_runs_of_an_hour_are_reported_long_before_many_thousands_are_made() -> None:
+    short, hour = (load_scenario("torque-task-solenoid", [f"run.duration={text}"]) for text in ("0.1 s", "1 h"))
+    assert runs_at_once(short, 65_536) == 65_536
+    assert runs_at_once(hour, 65_536) == 512
+    assert runs_at_once(hour, 100) == 100

@@ -80,7 +80,7 @@ def test_a_name_is_as_wide_as_what_it_holds() -> None:
 
 
 def test_a_product_that_is_no_power_of_two_is_refused() -> None:
-    with pytest.raises(ProgramError, match="a product that is not with a power of two"):
+    with pytest.raises(ProgramError, match="a product by a number that is not a power of two"):
         narrowed(module_of(product), given(0, 3, 3))
 
 

@@ -147,9 +147,9 @@ def test_a_gait_or_task_sequence_that_is_not_there_names_the_file_and_the_key(
 
 
 def test_where_only_a_vane_will_do_a_walk_is_refused_by_its_motion(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="a walk has a gait and a wearer, and here the motion of a vane alone"):
+    with pytest.raises(ScenarioError, match="this motion is a walk, but a scenario file has"):
         load_vane(written(tmp_path, text_of(NAME) + MOTION))
-    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=walk': a walk has a gait"):
+    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=walk': this motion is a walk"):
         load_scenario("torque-task-proportional", ["motion.kind=walk"])
 
 

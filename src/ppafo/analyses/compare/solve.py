@@ -11,6 +11,7 @@ from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
+from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import (
     CONFIDENCE,
     FEWEST_DRAWS,
@@ -26,8 +27,6 @@ from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
 
 AS_WRITTEN = "as written"
 """Name of a configuration's task where no other task is requested."""
-DEFAULT_SEED = 1
-"""Seed of the draws of a comparison without a study."""
 DEFAULT_DRAWS = 4096
 """Draws of the uncertain values unless given."""
 _SAME = 1.0e-9
@@ -150,8 +149,8 @@ def _drawn_runs(
     if not uncertainty.drawn:
         if draws.requested is not None:
             raise StudyError(
-                f"draws = {draws.requested}: nothing is drawn here; give a study, or sensors with noise, or leave it "
-                "out"
+                f"draws = {draws.requested}: nothing in this comparison is random; give a study or sensors with "
+                f"noise, or omit draws"
             )
         return {}
     if study is not None:

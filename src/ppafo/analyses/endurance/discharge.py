@@ -169,7 +169,7 @@ def check_schedule(schedule: Schedule) -> None:
     if schedule.rest > 0.0 and 2.0 * schedule.longest / (schedule.walk + schedule.rest) > MAXIMUM_STRETCHES:
         raise ParameterError(
             f"walking {schedule.walk:g} s and resting {schedule.rest:g} s over {schedule.longest:g} s are more "
-            f"than {MAXIMUM_STRETCHES} periods: choose longer periods, or a smaller longest time"
+            f"than {MAXIMUM_STRETCHES} periods: lengthen walking or resting, or shorten the longest time"
         )
 
 

@@ -78,7 +78,9 @@ def bottle(
     if bool(given) == (gas_per_stride is not None):
         raise ParameterError("give either a recording or --gas-per-stride, for example --gas-per-stride '0.3 g'")
     if walk is not None and rest is None:
-        raise ParameterError("--walk: is the time between two rests: give --rest too, or --longest for the whole time")
+        raise ParameterError(
+            "--walk is the walking time between two rests: give --rest too, or --longest for the total time"
+        )
     schedule = Schedule(BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
     named, changed = PAPER_BOTTLE if bottle is None else bottle, tuple(overrides)
     if gas_per_stride is not None:

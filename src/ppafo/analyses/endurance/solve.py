@@ -50,7 +50,9 @@ def endurance_of_walk_gas(
     """Return how long a bottle lasts when a walk continues; DataError where it took no gas, or is not known."""
     at_set_pressure = demand_of_walk(gas)
     if gas.scenario is None:
-        raise DataError(f"{gas.name}: its folder does not say what was walked; write the walk again")
+        raise DataError(
+            f"{gas.name}: the folder does not state the scenario of the walk; repeat the walk with 'ppafo walk'"
+        )
     own = walk_of(gas.scenario).bottle
     carried = on_bottle(gas.scenario, PAPER_BOTTLE if bottle is None and own is None else bottle, overrides)
     supply = walk_of(carried).bottle

@@ -80,7 +80,7 @@ def read_walk_gas(folder: Path) -> WalkGas:
     stride_time = file.number(time, above=0.0)
     recording = read_recording(folder)
     if "supplied_mass" not in recording:
-        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; write the walk again")
+        raise DataError(f"{recording.label}: has no channel 'supplied_mass'; repeat the walk with 'ppafo walk'")
     return WalkGas(
         str(configuration.get("name", folder.name)),
         recording,
@@ -104,7 +104,9 @@ class _WalkFile:
         for part in name.split("."):
             node = node.get(part, {})
             if not isinstance(node, Mapping):
-                raise DataError(f"{self.path}: '{part}' is not a table of names and values; write the walk again")
+                raise DataError(
+                    f"{self.path}: '{part}' is not a table of names and values; repeat the walk with 'ppafo walk'"
+                )
         return node
 
     def number(self, name: str, above: float) -> float:
@@ -113,9 +115,11 @@ class _WalkFile:
         for part in name.split("."):
             node = node.get(part) if isinstance(node, Mapping) else None
         if isinstance(node, bool) or not isinstance(node, int | float) or not abs(node) <= sys.float_info.max:
-            raise DataError(f"{self.path}: has no number at '{name}'; write the walk again")
+            raise DataError(f"{self.path}: has no number at '{name}'; repeat the walk with 'ppafo walk'")
         if node <= above:
-            raise DataError(f"{self.path}: '{name}' is {node:g}, which is impossible for a walk; write the walk again")
+            raise DataError(
+                f"{self.path}: '{name}' is {node:g}, which is impossible for a walk; repeat the walk with 'ppafo walk'"
+            )
         return float(node)
 
 
@@ -139,7 +143,7 @@ def _walked(configuration: Mapping[str, Any], file: Path) -> Scenario | None:
     source, name = configuration.get("file"), str(configuration.get("name", "walk"))
     with refused_as(DataError, f"{file}: its walk cannot be repeated", PpafoError):
         if not (isinstance(content, dict) and isinstance(overrides, list) and isinstance(source, str | None)):
-            raise DataError("'configuration' says no walk")
+            raise DataError("'configuration' does not state a walk")
         folder = Path() if source is None else Path(source).parent
         changes = read_overrides(map(str, overrides), ScenarioError)
         return scenario_of(ScenarioRequest(name, source, folder, content, changes), WALKING)

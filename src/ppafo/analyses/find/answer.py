@@ -179,8 +179,8 @@ def _remarks(outcome: FindResult) -> Iterator[str]:
         yield noise
     if outcome.unsettled:
         yield (
-            f"in {outcome.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one instant of "
-            f"that: their condition is asked of {ONE_INSTANT[condition.metric][0]} too"
+            f"in {outcome.unsettled} runs the loop oscillates on the hold, and {condition.metric} is one sample of "
+            f"it: in these runs the condition must also hold for {ONE_INSTANT[condition.metric][0]}"
         )
     if outcome.oscillating:
         yield f"in {outcome.oscillating} of {outcome.runs} runs the loop oscillates: they count as not met"

@@ -61,8 +61,8 @@ def find(
     >>> import ppafo
     >>> task, metric = "torque-task-proportional", "rms_error <= 0.5 N m"
     >>> print(ppafo.find(task, vary="supply.pressure=20..90 psi_g", such_that=metric).said[0])
-    supply.pressure = 57.1015 psi_g is the lowest value that meets rms_error <= 0.5 N m and follows its reference:
-    rms_error is 0.3452 N m there (bracketed to 3e-05 psi)
+    supply.pressure = 57.1437 psi_g is the lowest value that meets rms_error <= 0.5 N m and follows its reference:
+    rms_error is 0.3427 N m there (bracketed to 3e-05 psi)
     """
     name_plugins(plugins)
     from ppafo.analyses.find.answer import finding_of

@@ -9,13 +9,12 @@ from numpy.typing import NDArray
 
 from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
 from ppafo.progress import Report
-from ppafo.simulation.declaration import changes_reach
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import MetricLimit, atmosphere_of, check_metrics, level_of, seeds_of_noise
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
-from ppafo.study.runs import RunCounter, Runs, follows, oscillating, settled, with_companions
+from ppafo.study.runs import RunCounter, Runs, oscillating, settled, tracking_violation, with_companions
 from ppafo.units import split_quantity
 
 FEWEST, MOST = 3, 100_000
@@ -66,9 +65,7 @@ class FindProgress:
         self.metrics = np.concatenate([self.metrics, by_stream.mean(axis=0)])
         self.judged = np.concatenate([self.judged, judged_by_stream.mean(axis=0)])
         self.spread = np.concatenate([self.spread, by_stream.std(axis=0, ddof=min(1, streams - 1))])
-        # A reference that lies beyond reach on purpose is followed by no run.
-        on_purpose = self._base.beyond_reach and not changes_reach([self._path])
-        fails = (follows(rows, self._base, columns) == 0.0) & (not on_purpose)
+        fails = tracking_violation(rows, self._base, columns) > 0.0
         self.follows = np.concatenate([self.follows, ~fails.reshape(streams, values.size).any(axis=0)])
 
     @property

@@ -188,8 +188,8 @@ def _edges(model: LinearModel) -> list[str]:
         side, other = ("above", "below") if edge.is_above else ("below", "above")
         value = _value_at_point(model, edge.name)
         remarks.append(
-            f"the plant has a kink at this point: the column of `{edge.name}` holds {side} {value:.5g}, and another "
-            f"one {other} it"
+            f"the plant has a kink at this point: the column of `{edge.name}` is valid {side} {value:.5g} only; its "
+            f"slope differs {other} it"
         )
     return remarks
 

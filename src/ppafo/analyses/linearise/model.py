@@ -96,8 +96,8 @@ class LinearModel:
                 scaled = scaled / np.where(largest > 0.0, largest, 1.0)
             if np.linalg.cond(scaled) > _SINGULAR:
                 raise ScenarioError(
-                    f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response has no "
-                    "end; give another frequency"
+                    f"{self.scenario.name}: the linear model has a pole at {frequency:g} Hz, where its response is "
+                    f"infinite; give another frequency"
                 )
             responses.append(self.c[row] @ np.linalg.solve(matrix, self.b[:, column]) + self.d[row, column])
         return np.array(responses, dtype=np.complex128)

@@ -112,12 +112,12 @@ def equilibrium(scenario: Scenario) -> Point:
     """
     whole = plan_run(scenario)
     if whole.leg is not None and whole.program.shank is not CONSTANT:
-        raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; take --at with a time")
+        raise ScenarioError(f"{scenario.name}: no equilibrium while the shank of the leg moves; give --at a time")
     values, _ = _after(scenario, whole, whole.step_count)
     values["angular_velocity"] = 0.0
     is_open_loop = scenario.controller.is_open_loop
     if scenario.controlled != TORQUE and not is_open_loop:
-        line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; take --at with a time"
+        line = f"reference.of = '{scenario.controlled}': an equilibrium is found for a torque; give --at a time"
         raise ScenarioError(f"{scenario.name}: {line}")
     end = np.array([scenario.run.duration])
     wanted = None if is_open_loop else float(profile_values(scenario.reference, end)[0][0])
@@ -127,7 +127,7 @@ def equilibrium(scenario: Scenario) -> Point:
     if steady is None:
         if wanted is None:
             line = f"no equilibrium found for the command {values['command']:g}"
-            raise ScenarioError(f"{scenario.name}: {line}; take --at with a time")
+            raise ScenarioError(f"{scenario.name}: {line}; give --at a time")
         line = f"no equilibrium at {wanted:.4g} N m, the last value of the reference"
         open_way = 1.0 if (wanted > 0.0) != scenario.device.supply.is_vacuum else -1.0
         full = dict.fromkeys(("command", *opening_names(values)), open_way)
@@ -137,12 +137,12 @@ def equilibrium(scenario: Scenario) -> Point:
             torque = run.program.actuator.torque(*at)
             line += f": with the valve fully open the actuator comes to {torque:.4g} N m"
         other = " or hold the ankle" if held is not None else ""
-        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or take --at with a time")
+        raise ScenarioError(f"{scenario.name}: {line}; set another reference{other}, or give --at a time")
     way = _way(run, steady, scenario.run.duration)
     if way:
         raise ScenarioError(
-            f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque moves the vane; "
-            "take --at with a time, or another torque"
+            f"{scenario.name}: no equilibrium: at {np.degrees(values['angle']):.4g} deg the torque accelerates the "
+            f"vane; give --at a time, or another reference torque"
         )
     # A valve that is closed but for rounding is closed.
     steady |= {name: 0.0 for name in ("command", *opening_names(steady)) if abs(steady[name]) < STEADY}

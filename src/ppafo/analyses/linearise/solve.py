@@ -79,7 +79,9 @@ def _regime(curve: FlowCurve, pressure_a: float, pressure_b: float, opening: flo
 
 
 EQUILIBRIUM = "equilibrium"
-DEAF = "no small change of the command changes it (dead band, slew limit, beyond full): the command's column is 0"
+DEAF = (
+    "a small change of the command has no effect on it (dead band, slew limit, saturation): the command's column is 0"
+)
 
 
 def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
@@ -89,11 +91,11 @@ def linear_model(scenario: Scenario, at: float | str) -> LinearModel:
     """
     run = plan_run(scenario)
     if scenario.supply_lines is not None:
-        raise ScenarioError(f"{scenario.name}: linear models are for constant supplies; omit [supply_line]")
+        raise ScenarioError(f"{scenario.name}: a linear model assumes a constant supply pressure; omit [supply_line]")
     if not opens_in_proportion(run):
         raise ScenarioError(
-            f"{scenario.name}: valve '{scenario.device.valve_name}' is on or off, or moves at one speed: its flow "
-            "has no derivative by the command; set device.valve to one that opens in proportion"
+            f"{scenario.name}: valve '{scenario.device.valve_name}' opens fully or at a constant speed: its flow "
+            f"has no derivative with respect to the command; set device.valve to a proportional valve"
         )
     if at == EQUILIBRIUM:
         return model_at(scenario, run, equilibrium(scenario))

@@ -165,17 +165,17 @@ def _checked(entry: ClaimEntry, citation: str, file: str) -> PublishedClaim:
         known = ", ".join(COMPUTATIONS)
         raise ScenarioError(f"{where}.computation: there is no '{entry.computation}'{hint}; available: {known}")
     if entry.at_least is None and entry.at_most is None:
-        raise ScenarioError(f"{where}: give at_least or at_most, or both: what agrees with the claim")
+        raise ScenarioError(f"{where}: give at_least, at_most or both: the range that agrees with the claim")
     # A side that the file leaves open.
     low = -math.inf if entry.at_least is None else entry.at_least
     high = math.inf if entry.at_most is None else entry.at_most
     if low > high:
-        raise ScenarioError(f"{where}: at_least = {low:g} lies above at_most = {high:g}: no number agrees")
+        raise ScenarioError(f"{where}: at_least = {low:g} lies above at_most = {high:g}, so that no number can agree")
     # What is published has to agree with itself: else the range was typed wrongly.
     if entry.published is not None and not low <= entry.published <= high:
         name, limit = ("at_least", low) if entry.published < low else ("at_most", high)
         raise ScenarioError(
-            f"{where}: published = {entry.published:g} does not agree with itself, {name} = {limit:g}; widen the range"
+            f"{where}: published = {entry.published:g} is outside its own range, {name} = {limit:g}; widen the range"
         )
     computation = COMPUTATIONS[entry.computation]
     with refused_as(ScenarioError, f"{where}.unit", UnitError):

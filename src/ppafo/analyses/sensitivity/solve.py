@@ -104,7 +104,7 @@ def analyse(
     """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures."""
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
-            f"sensitivity: the indices of {method.name} need values that are independent, and the study has "
+            f"sensitivity: the indices of {method.name} need independent values, but the study has "
             "[[correlations]]; use '--method shapley', or treat the values as independent (--independent)"
         )
     if len(uncertainty.drawn) < 2:

@@ -46,7 +46,7 @@ class _Described(_OpenTable):
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if self.count and not {"mean", "quantiles"} <= self.model_fields_set:
-            raise ValueError("has values, and no mean or no quantiles")
+            raise ValueError("has a count, but no mean or no quantiles")
         return self
 
 

@@ -89,9 +89,9 @@ def sweep_into_folder(
         folder = out or Path("out") / chosen.name
         return _rows_into_folder(chosen, folder, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
     if metric is None:
-        raise StudyError(f"statistic '{statistic}': needs the metric that it is of, for example --metric rms_error")
+        raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
     if scheduler is not None:
-        raise StudyError(f"--scheduler {scheduler}: a statistic is computed here; omit it")
+        raise StudyError(f"--scheduler {scheduler}: a statistic is computed on this machine; omit --scheduler")
     chosen = study_of(study, overrides)
     if draws is not None:
         of_statistic["draws"] = draws

@@ -36,7 +36,7 @@ def remarks_on(
     known = last.draws - last.missing
     if not last.is_carried and are_equal:
         said.append(
-            f"do not trust this interval: all {known:,} values are equal, which do not show how far a rare one lies; "
+            f"do not trust this interval: all {known:,} values are equal, so the distance of a rare one is unknown; "
             f"draw at least {FEWEST_SEEN:,}"
         )
     elif not last.is_carried:
@@ -48,13 +48,13 @@ def remarks_on(
     if statistic.is_of_replicates and known:
         share, furthest = _RULE_OF_THREE / known, FURTHEST_UNSEEN * float(np.std(values))
         moved = (
-            f"up to {FURTHEST_UNSEEN:g} standard deviations, {kind.change(furthest)}, from the mean it would move it "
-            f"by up to {kind.change(last.unseen)}, which the target width allows for; further off by more"
+            f"up to {FURTHEST_UNSEEN:g} standard deviations, {kind.change(furthest)}, from the mean it would shift "
+            f"it by up to {kind.change(last.unseen)}, which the target width allows for; farther off by more"
         )
         if are_equal:
-            moved = f"it would move the mean by up to {share:.2g} times its distance"
+            moved = f"it would shift the mean by up to {share:.2g} times its distance from it"
         said.append(
-            f"what happens in fewer than {100.0 * share:.2g} % of the runs may be missing among these draws (95 %): "
+            f"an outcome of fewer than {100.0 * share:.2g} % of the runs may be missing from these draws (95 %): "
             f"{moved}"
         )
     if noise is not None:
@@ -70,7 +70,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
     if not rule.is_narrow(looks[-1]):
         ending = f"; the target width was not reached with the maximum of {rule.maximum:,} draws"
     elif statistic.is_of_replicates and estimated.draws < FEWEST_SEEN:
-        ending = f"; a mean is believed from {FEWEST_SEEN:,} draws on, and the maximum is {rule.maximum:,}"
+        ending = f"; a mean needs at least {FEWEST_SEEN:,} draws, and the maximum is {rule.maximum:,}"
     verdict = (
         f"{estimated.statistic} of {estimated.metric}: {kind.interval(estimated.interval)} {unit}".rstrip()
         + f" after {estimated.draws:,} draws, {100.0 * rule.confidence:g} % confidence{ending}"

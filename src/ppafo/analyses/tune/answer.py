@@ -1,5 +1,6 @@
 """A tuning as a finding: gains and metrics before and after, how the search went, and lines to paste."""
 
+import json
 import math
 import shlex
 from collections.abc import Mapping, Sequence
@@ -12,8 +13,10 @@ from ppafo.analyses.tune.problem import Problem
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, agreement
 from ppafo.errors import count_of
 from ppafo.metrics.metric import controlled_in
+from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters.overrides import over
+from ppafo.report.display_units import metric_words
 from ppafo.report.finding import Column, Finding, Section, columns_of
 from ppafo.report.kind import TIME, Kind, of_metric
 from ppafo.report.panels import Mark, Panel
@@ -206,7 +209,7 @@ def _tuned(
 
 
 def _options(tuned: Tuned) -> str:
-    return " ".join(f'--set "{line}"' for line in tuned.overrides)
+    return " ".join(f"--set {shlex.quote(line)}" for line in tuned.overrides)
 
 
 def _command(tuned: Tuned) -> str:
@@ -222,7 +225,8 @@ def _named(scenario: Scenario) -> str:
 
 def _pasted(tuned: Tuned) -> str:
     """Return the gains found to paste on a command line, into a study file and into Python."""
-    listed = ", ".join(f'"{line}"' for line in tuned.overrides)
+    # Texts of TOML and of Python alike.
+    listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     call = tuned.problem.scenario.motion.motion_kind.python_call(_named(tuned.problem.scenario), listed)
     return (
         f"# {tuned.verdict}\n\n# on the command line\n{_options(tuned)}\n\n# in a study file\n"
@@ -238,6 +242,10 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
         return (
             f"{name}: with the best gains found, {failing} of the runs fail, oscillate, or lack a goal or a constraint"
         )
+    if after.off:
+        beyond = f"the limits of tracking are exceeded by {percentage(after.off, 3)}"
+        why = f"{after.useless or beyond}{_by_ceiling(problem, after)}"
+        return f"{name}: no gains within the bounds let the loop follow its reference; with the best found, {why}"
     if not after.is_feasible_in_search:
         broken = f"the best found exceed the limits by {percentage(after.violation, 3)}"
         return f"{name}: no gains within the bounds satisfy all constraints; {broken}{_by_ceiling(problem, after)}"
@@ -253,6 +261,8 @@ def verdict(problem: Problem, before: GainResult, after: GainResult) -> str:
 
 def _change(before: GainResult, after: GainResult) -> str:
     """Return by how much gains that satisfy all constraints are better than the ones before."""
+    if before.off:
+        return f"the loop follows its reference, with the previous gains it did not; objective {after.objective:.4g}"
     if not before.is_feasible:
         return (
             "the gains found satisfy all constraints, which the previous gains did not; objective "
@@ -341,9 +351,16 @@ def _remarks(
     if fractions:
         said.append(f"fraction of the variance over the fresh draws that is due to sensor noise: {fractions}")
     broken = [
-        f"{constraint.metric} {constraint.words}, it is {_number(constraint.metric, after.fresh[constraint.metric])}"
+        f"{constraint.metric} {constraint.words}, it is {_number(constraint.metric, after.judged[constraint.metric])}"
         for constraint in problem.constraints
-        if constraint.metric in after.fresh and not constraint.is_kept(after.fresh[constraint.metric])
+        if after.fresh and not constraint.is_kept(after.judged[constraint.metric])
+    ]
+    printed = after.fresh or after.values
+    said += [
+        f"the loop oscillates on the hold, and {name} is one instant of that: what counts is "
+        f"{_number(name, judged)}, {metric_words(ONE_INSTANT[name][0])}"
+        for name, judged in after.judged.items()
+        if judged > printed[name]
     ]
     if after.fresh and after.fresh_share_without_value:
         broken.append(f"{percentage(after.fresh_share_without_value, 2)} of the runs fail, oscillate or lack a metric")

@@ -63,8 +63,10 @@ class UnreachableDraws:
 class GainResult:
     """Gains [SI] and what they give.
 
-    ``values`` are the metrics by which the search judges them [SI]: as the device is said to be, or at their bad end
-    over the draws of the search; ``fresh`` the same over draws that the search did not use (empty without draws).
+    ``values`` are the metrics of the search [SI]: as the device is said to be, or at their bad end over the draws of
+    the search; ``fresh`` the same over draws that the search did not use (empty without draws). ``judged`` are those
+    by which constraints are judged there: of a loop that oscillates on the hold no single instant counts as its error.
+    ``off`` is the share by which the runs exceed the limits of tracking, 0 where they follow their reference.
     ``objective`` belongs to the search; what is called fresh, to the fresh draws (the same again without draws).
     ``share_of_noise`` is the fraction of the variance over the fresh draws that is due to sensor noise, by metric.
     ``metrics`` belong to ``result``, one run of the nominal device.
@@ -73,8 +75,10 @@ class GainResult:
     gains: Gains
     values: Mapping[str, float]
     fresh: Mapping[str, float]
+    judged: Mapping[str, float]
     objective: float
     violation: float
+    off: float
     share_without_value: float
     fresh_violation: float
     fresh_share_without_value: float
@@ -96,8 +100,9 @@ class GainResult:
 
     @property
     def is_feasible(self) -> bool:
-        """True where all constraints are kept and no run fails, over fresh draws too."""
-        return self.is_feasible_in_search and self.fresh_violation == 0.0 and self.fresh_share_without_value == 0.0
+        """True where all constraints are kept, no run fails and the reference is followed, over fresh draws too."""
+        in_fresh = self.fresh_violation == 0.0 and self.fresh_share_without_value == 0.0
+        return self.is_feasible_in_search and in_fresh and self.off == 0.0
 
 
 @dataclass(frozen=True, slots=True)

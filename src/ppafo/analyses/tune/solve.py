@@ -13,82 +13,61 @@ from numpy.typing import NDArray
 
 from ppafo.analyses.tune.problem import Gains, Problem, SearchEffort, Spread
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, UnreachableDraws
-from ppafo.engine.scheme.actuators import torque_of
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.metrics import METRICS
-from ppafo.model.catalog import ACTUATORS
-from ppafo.model.controlled import TORQUE
-from ppafo.parameters.plant import plant_parameters
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import absolute
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate
+from ppafo.simulation.tracking.metered import shortfall
 from ppafo.studies.distributions import Floats, noise_interval
 from ppafo.studies.sampling import with_new_noise
 from ppafo.studies.study import with_overrides
-from ppafo.study.runs import FAILED, Runs, oscillating, settled
+from ppafo.study.runs import FAILED, Runs, oscillating, settled, tracking_violation
 
-_ANGLES = 9
-"""Angles between the stops at which the torque of a joint that moves is looked for."""
 UNUSABLE = 1.0e12
 """Lowest cost of a candidate with a failed run; the fraction of failed runs is added."""
 
 
 @dataclass(frozen=True, slots=True)
 class CandidateMetrics:
-    """Metrics by name and failures of candidates, each (candidates, draws); one draw without uncertainty."""
+    """Runs of candidates, each field (candidates, draws); one draw without uncertainty.
+
+    ``metrics`` are by name, and ``judged`` those by which candidates are ranked: where a loop oscillates on the hold no
+    single instant counts as its error. ``off`` is the share by which runs exceed the limits of tracking.
+    """
 
     metrics: Mapping[str, Floats]
+    judged: Mapping[str, Floats]
     failed: NDArray[np.bool_]
+    off: Floats
 
     @property
     def without_value(self) -> Floats:
         """Fraction of the runs of each candidate that failed or lack a metric (candidates,)."""
-        lacking = self.failed | np.any([~np.isfinite(values) for values in self.metrics.values()], axis=0)
+        lacking = self.failed | np.any([~np.isfinite(values) for values in self.judged.values()], axis=0)
         return np.asarray(np.mean(lacking, axis=1))
 
 
 @dataclass(frozen=True, slots=True)
 class CandidateScores:
-    """Objective, violation and what both are made of, each (candidates,): metric at its bad end by name [SI]."""
+    """Objective, violation of the constraints, share by which tracking exceeds its limits, failures: (candidates,)."""
 
     objective: Floats
     violation: Floats
+    off: Floats
     without_value: Floats
 
     @property
     def cost(self) -> Floats:
         """Cost by which candidates are ranked."""
         # Deb's rules in one number, since SciPy compares nothing else.
-        usual = np.where(self.violation > 0.0, INFEASIBLE + self.violation, self.objective)
+        broken = self.violation + self.off
+        usual = np.where(broken > 0.0, INFEASIBLE + broken, self.objective)
         return np.where(self.without_value > 0.0, UNUSABLE * (1.0 + self.without_value), usual)
-
-
-def shortfall(scenario: Scenario) -> Floats:
-    """Torque [N m] that the supply lacks of the largest reference in each run (runs,); 0 where it lacks nothing.
-
-    With one chamber at its supply and the other vented the actuator gives the most, whatever the controller does. A
-    joint that moves counts at the angles where it gives most.
-    """
-    if scenario.controlled != TORQUE:
-        return np.zeros(1)
-    device = scenario.device
-    actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
-    fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
-    first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
-    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), supply.atmospheric_pressure
-    angles = [first + fraction * travel for fraction in fractions]
-    highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
-    lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
-    if supply.is_vacuum:
-        highest, lowest = lowest, highest
-    least, most = profile_bounds(scenario.reference)
-    above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
-    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
 
 
 def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
@@ -100,7 +79,7 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
     """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
-    known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.metrics.items()}
+    known = {name: np.where(failing[:, None] > 0.0, 0.0, values) for name, values in runs.judged.items()}
     objective, violation, spread = np.zeros(failing.size), np.zeros(failing.size), problem.spread
     for goal in problem.goals:
         objective += goal.weight * bad_ends(known[goal.metric], spread, goal.weight > 0.0) / scales[goal.metric]
@@ -109,7 +88,8 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
         beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
         violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
-    return CandidateScores(objective, violation, failing)
+    # A loop that does not follow its reference breaks a constraint that nobody has to write.
+    return CandidateScores(objective, violation, np.maximum(0.0, bad_ends(runs.off, spread, True)), failing)
 
 
 Costs = Callable[[Floats], Floats]
@@ -225,10 +205,15 @@ def crossed(
     columns = {path: np.repeat(column, count) for path, column in values.items()}
     columns |= {path: np.tile(column, candidates) for path, column in draws.items()}
     rows = runs.run(columns)
-    metrics = {name: settled(rows, name).reshape(candidates, count) for name in problem.metrics}
+    shape = (candidates, count)
     # Gains with which the loop oscillates are no better than ones with which the run fails.
     unusable = rows[FAILED] | oscillating(rows, problem.scenario)
-    return CandidateMetrics(metrics, unusable.reshape(candidates, count))
+    return CandidateMetrics(
+        metrics={name: rows[name].reshape(shape) for name in problem.metrics},
+        judged={name: settled(rows, name).reshape(shape) for name in problem.metrics},
+        failed=unusable.reshape(shape),
+        off=tracking_violation(rows, problem.scenario, columns, problem.gauge).reshape(shape),
+    )
 
 
 def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
@@ -238,7 +223,7 @@ def scales_of(problem: Problem, before: CandidateMetrics) -> dict[str, float]:
     for goal in problem.goals:
         scale = goal.scale
         if scale is None:
-            scale = abs(float(bad_ends(before.metrics[goal.metric], problem.spread, goal.weight > 0.0)[0]))
+            scale = abs(float(bad_ends(before.judged[goal.metric], problem.spread, goal.weight > 0.0)[0]))
         if not np.isfinite(scale) or scale == 0.0:
             raise StudyError(
                 f"tuning '{problem.name}': objective '{goal.metric}' is {scale:g} before tuning, which cannot be "
@@ -268,10 +253,12 @@ def setting_of(
     result = simulate(scenario_with(problem, gains))
     return GainResult(
         gains=gains,
-        values=_values(seen, problem),
-        fresh={} if spread is None else _values(again, problem),
+        values=_values(seen.metrics, problem),
+        fresh={} if spread is None else _values(again.metrics, problem),
+        judged=_values(again.judged, problem),
         objective=float(judged.objective[0]),
         violation=float(judged.violation[0]),
+        off=float(max(judged.off[0], rejudged.off[0])),
         share_without_value=float(judged.without_value[0]),
         fresh_violation=float(rejudged.violation[0]),
         fresh_share_without_value=float(rejudged.without_value[0]),
@@ -292,7 +279,7 @@ def _ceiling(problem: Problem, gains: Gains, draws: Mapping[str, Floats], runs: 
     lacking = np.broadcast_to(shortfall(scenario), runs.failed[:1].shape)
     spread, explained = problem.spread, []
     for constraint in problem.constraints:
-        values, is_most = runs.metrics[constraint.metric], constraint.is_most
+        values, is_most = runs.judged[constraint.metric], constraint.is_most
         follows = bool(METRICS[constraint.metric].of_reference)
         if not follows or constraint.is_kept(float(bad_ends(values, spread, is_most)[0])):
             continue
@@ -315,10 +302,10 @@ def scenario_with(problem: Problem, gains: Gains) -> Scenario:
     return with_overrides(problem.scenario, problem.lines(gains))
 
 
-def _values(runs: CandidateMetrics, problem: Problem) -> dict[str, float]:
-    """Return every metric of the problem as the first candidate is judged by it; nan where a run has none."""
+def _values(metrics: Mapping[str, Floats], problem: Problem) -> dict[str, float]:
+    """Return every metric of the problem of the first candidate, at its bad end; nan where a run has none."""
     less = {goal.metric: goal.weight > 0.0 for goal in problem.goals}
     less |= {
         constraint.metric: constraint.is_most for constraint in problem.constraints if constraint.metric not in less
     }
-    return {name: float(bad_ends(runs.metrics[name], problem.spread, less[name])[0]) for name in problem.metrics}
+    return {name: float(bad_ends(metrics[name], problem.spread, less[name])[0]) for name in problem.metrics}

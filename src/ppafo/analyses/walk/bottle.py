@@ -19,10 +19,10 @@ _CAPTION = (
     "Gas at the device is what comes out of the hose."
 )
 _EXPLAINED = (
-    "The vapour of liquid CO2 lacks heat: from 20 degC it wants 95 kJ/kg to be gas of 25 degC behind the regulator. It "
-    "takes it from the regulator's body and from the hose, which take it from the room. Below the triple point dry ice "
+    "The vapour of liquid CO2 at 20 degC needs 95 kJ/kg to become gas of 25 degC behind the regulator. It draws "
+    "this heat from the regulator's body and the hose, and these from the room. Below the triple point dry ice "
     "stays in the seat and narrows it. The gas in lines and chambers keeps the temperature with which it leaves the "
-    "hose; in truth their walls warm it, so its effect here is the largest that it can have.",
+    "hose; in reality their walls warm it, so its effect is overestimated here.",
     "A walk ends where the line behind the regulator no longer comes within the given share of the set pressure in two "
     "strides, or where the fluid in the bottle freezes.",
 )

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar, copy_context
 from pathlib import Path
 
+from ppafo.documents.regular_file import read_regular_file
 from ppafo.progress import time_text
 
 logger = logging.getLogger("ppafo")
@@ -17,6 +18,8 @@ QUIET = 2.0
 """Seconds of compiling that nobody has to hear of."""
 SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
+_LONGEST = 3600.0
+"""Seconds above which no program was ever compiled: the file is damaged."""
 # Programs whose times are read for an estimate: a median of more says no more, and each costs two files.
 _MAXIMUM_ASKED = 20
 _models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
@@ -66,17 +69,28 @@ def announce(expected: float, where: str, models: int = 1) -> Iterator[None]:
         logger.warning("ppafo: compiled in %.1f s and %s", seconds, where)
 
 
+def processor_seconds() -> float:
+    """Processor time of this thread and of the compilers that this process has run so far [s]."""
+    # Windows does not count the time of other processes: there the clock on the wall has to do.
+    if os.name != "posix":
+        return time.perf_counter()
+    times = os.times()
+    return time.thread_time() + times.children_user + times.children_system
+
+
 def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
     """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took."""
     import statistics
 
     rates = []
     for folder in kept:
-        # A file that another process has removed or emptied says nothing.
-        with contextlib.suppress(OSError, ValueError, StopIteration, ZeroDivisionError):
-            seconds = float((folder / SECONDS_FILE).read_text(encoding="ascii"))
+        # A file that another process has removed, emptied or damaged says nothing.
+        with contextlib.suppress(OSError, ValueError, StopIteration):
+            seconds = float(read_regular_file(folder / SECONDS_FILE))
+            size = next(folder.glob("*.py")).stat().st_size
             # Seconds per byte of text: programs of one kind differ in length more than in difficulty.
-            rates.append(seconds / next(folder.glob("*.py")).stat().st_size)
+            if 0.0 < seconds < _LONGEST and size > 0:
+                rates.append(seconds / size)
         if len(rates) == _MAXIMUM_ASKED:
             break
     return len(source) * (statistics.median(rates) if rates else usual)

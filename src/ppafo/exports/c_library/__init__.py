@@ -131,8 +131,8 @@ def library_of(scenario: Scenario) -> Library:
     """The library of a scenario or a walk; ProgramError where an object of Python controls it."""
     if scenario.controller.is_outside:
         raise ProgramError(
-            f"{scenario.name}: a controller that is an object of Python cannot be exported; export the plant alone, or "
-            "write the law as a kind of controller"
+            f"{scenario.name}: a Python object cannot be exported as a controller; export the plant alone, or write "
+            f"the law as a controller kind"
         )
     return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from contextlib import closing
 from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
 from pathlib import Path
-from typing import Any, Protocol, final
+from typing import Any, final
 
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.expected import expected_csv
@@ -19,25 +19,9 @@ _CO_SIMULATION = 1
 """fmi2CoSimulation, the kind of an instance of FMI 2."""
 
 
-class _Instance(Protocol):
-    """Calls of a loaded unit by version of FMI; each returns the status, 0 for good."""
-
-    def begin(self, numbers: Any, values: Any) -> int:
-        """Set inputs and come to the first sample."""
-
-    def advance(self, time: float, length: float) -> int:
-        """Do one communication step from a time, both in [s]."""
-
-    def read(self, numbers: Any, values: Any) -> int:
-        """Read outputs into ``values``."""
-
-    def close(self) -> None:
-        """Free the instance."""
-
-
 @final
 class _Fmi2:
-    """Instance of FMI 2."""
+    """Instance of FMI 2, whose calls return the status, 0 for good."""
 
     def __init__(self, library: ctypes.CDLL, token: str) -> None:
         self.library = library
@@ -70,7 +54,7 @@ class _Fmi2:
 
 @final
 class _Fmi3:
-    """Instance of FMI 3, without event mode."""
+    """Instance of FMI 3, without event mode, with the same calls."""
 
     def __init__(self, library: ctypes.CDLL, token: str) -> None:
         self.library = library
@@ -119,9 +103,9 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
         try:
             loaded = ctypes.CDLL(str(Path(folder, "unit")))
         except OSError as error:
-            raise ProgramError(f"{interface.name}: the unit was built and cannot be loaded here: {error}") from error
-        instance: _Instance
-        with closing(_Fmi2(loaded, token) if fmi == 2 else _Fmi3(loaded, token)) as instance:
+            raise ProgramError(f"{interface.name}: the FMU was built but cannot be loaded here: {error}") from error
+        instance: _Fmi2 | _Fmi3 = _Fmi2(loaded, token) if fmi == 2 else _Fmi3(loaded, token)
+        with closing(instance):
             given = _array(c_uint, [numbers[name] for name in inputs]), _array(c_double, list(inputs.values()))
             shown, found = _array(c_uint, [numbers[name] for name in outputs]), (c_double * len(outputs))()
             status, before = instance.begin(*given), 0.0
@@ -132,8 +116,8 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
                     if status or value != wanted:
                         problem = f"{name} is {value!r}, Python has {wanted!r}" if not status else "a call fails"
                         raise ProgramError(
-                            f"{interface.name}: the unit is not what Python computes: at {time:g} s {problem}; nothing "
-                            "is written"
+                            f"{interface.name}: the FMU differs from the Python run at {time:g} s: {problem}; "
+                            f"nothing is written"
                         )
 
 

@@ -85,7 +85,7 @@ def _platform(name: str, fmi: int) -> Platform:
         hint = nearest_name(name, PLATFORMS)
         raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
     if fmi == 2 and platform.folder_2 is None:
-        raise ScenarioError(f"platform {name} has no name in FMI 2: take --fmi 3")
+        raise ScenarioError(f"platform {name} is not defined in FMI 2: give --fmi 3")
     return platform
 
 

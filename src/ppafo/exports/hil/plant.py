@@ -33,8 +33,8 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
     check_forces(scenario)
     if scenario.controlled != TORQUE:
         raise ScenarioError(
-            f"{scenario.name}: reference.of = '{scenario.controlled}': a controller at the wire is sent a torque; "
-            "take a scenario whose reference is one"
+            f"{scenario.name}: reference.of = '{scenario.controlled}': the link transmits torque references only; "
+            f"give a scenario with reference.of = 'torque'"
         )
     period = 1.0 / rate
     chosen = replace(
@@ -54,7 +54,8 @@ def check_forces(scenario: Scenario) -> None:
     """Refuse a scenario whose controller reads what the wire does not carry."""
     if scenario.motion.motion_kind.reads_forces:
         raise ScenarioError(
-            f"'{scenario.name}' is a walk, and the wire carries no forces under the foot: give a scenario"
+            f"'{scenario.name}' is a walk; the link transmits no ground reaction forces, so give a scenario without "
+            f"a walk"
         )
 
 
@@ -63,6 +64,6 @@ def check_baud(baud: int, rate: int) -> None:
     needed = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE * rate
     if baud < needed:
         raise ScenarioError(
-            f"--baud {baud}: {rate} samples per second need {needed} baud; take a faster line or a lower --rate, "
-            f"here at most {baud // (wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE)}"
+            f"--baud {baud}: {rate} samples per second need {needed} baud; use a faster line, or a --rate of at "
+            f"most {baud // (wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE)}"
         )

@@ -1,8 +1,8 @@
 """A form of gait recordings: how its files are known and read, and what their columns mean without a gait map."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from ppafo.gait.recorded.mapping import GaitMap, Side
 from ppafo.gait.recorded.table import MotionTable
@@ -21,34 +21,6 @@ class Convention:
     remarks: tuple[str, ...] = ()
 
 
-class FileReader(Protocol):
-    """Reader of a file of a form."""
-
-    def __call__(self, path: str | Path, /) -> MotionTable:
-        """Return time [s], columns and units of a file, its ``form`` left empty; DataError where it cannot be read."""
-
-
-class ConventionOf(Protocol):
-    """Meaning of the columns of a file of a form, where no gait map of the user gives it."""
-
-    def __call__(self, table: MotionTable, side: Side, body_mass: float, /) -> Convention:
-        """Return the convention for a foot, and for forces over a body mass [kg]."""
-
-
-class FileTest(Protocol):
-    """Content check for a gait form whose file suffix is shared with other forms."""
-
-    def __call__(self, path: str | Path, /) -> bool:
-        """Return whether a file is of the form, by its content."""
-
-
-class TableChange(Protocol):
-    """Conversion of a table before its columns are interpreted, where no gait map of the user does it."""
-
-    def __call__(self, table: MotionTable, /) -> MotionTable:
-        """Return the table with the columns that the convention of its form is about."""
-
-
 def any_file(_path: str | Path) -> bool:
     """Recognise every file with a suffix of the form."""
     return True
@@ -63,14 +35,18 @@ def as_it_is(table: MotionTable) -> MotionTable:
 class GaitForm:
     """A form of gait recordings: its name, a summary in a phrase, and suffixes in lower case, with their dot.
 
-    ``is_whole`` is true where a file has all curves of a foot, so that no file of another form can add one.
+    ``read`` gives time [s], columns and units of a file, the ``form`` of the table left empty, or a DataError;
+    ``convention`` the meaning of its columns for a foot and a body mass [kg], where no gait map of the user does;
+    ``recognises`` tells by its content whether a file is of the form, where others have the same suffix; ``arrange``
+    changes a table before its columns are interpreted. ``is_whole`` is true where a file has all curves of a foot, so
+    that no file of another form can add one.
     """
 
     name: str
     summary: str
     suffixes: tuple[str, ...]
-    read: FileReader
-    convention: ConventionOf
-    recognises: FileTest = any_file
-    arrange: TableChange = as_it_is
+    read: Callable[[str | Path], MotionTable]
+    convention: Callable[[MotionTable, Side, float], Convention]
+    recognises: Callable[[str | Path], bool] = any_file
+    arrange: Callable[[MotionTable], MotionTable] = as_it_is
     is_whole: bool = False

@@ -99,8 +99,9 @@ def without_drop_outs(
                 with noted_in(wrong):
                     strides = strides.without(
                         [stride for stride in strides.taken if stride.start < end and start < stride.end],
-                        f"{what}: a drop-out was filled with it",
-                        f"{table.file}: {what} while the wearer walks: a drop-out was filled with it; cut the file "
+                        f"{what}: a sensor drop-out filled with a constant",
+                        f"{table.file}: {what} while the wearer walks: a sensor drop-out filled with a constant; "
+                        f"cut the file "
                         "there and give the longer part",
                     )
     return strides

@@ -87,8 +87,8 @@ def cut_table(
     inside = (table.time >= low) & (table.time <= high)
     if not inside.any():
         raise DataError(
-            f"{table.file}: nothing is left of it from {low:g} to {high:g} s; it goes from {table.time[0]:g} to "
-            f"{table.time[-1]:g} s: choose --start and --end within"
+            f"{table.file}: has no samples from {low:g} to {high:g} s; the recording covers {table.time[0]:g} to "
+            f"{table.time[-1]:g} s: choose --start and --end within that"
         )
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)

@@ -200,7 +200,7 @@ def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable])
         files = ", ".join(table.file for table in tables)
         either = " or ".join(repr(_whole(name)) for name in twins if name[-2:] not in (".y", ".z"))
         raise DataError(
-            f"{curve}: {files} has {_whole(missing)!r} more than once, and they differ: name the one that is meant, "
+            f"{curve}: {files} has {_whole(missing)!r} more than once, and they differ: choose one, "
             f"{either}, in a gait map (--map)"
         )
     hint = nearest_column(missing, known)
@@ -469,7 +469,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
     if mapped.terms is not None:
         # Radians that are called degrees have no event either, but a unit as a remedy.
         if travel < low and not low <= np.degrees(travel) <= high:
-            raise DataError(f"{said}: nobody walks in it, or its columns are not of the shank")
+            raise DataError(f"{said}: this is not walking, or the columns are not those of the shank")
         return
     ends = {
         axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"
@@ -494,7 +494,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
             f"{said}, and {leans:.2g} deg along {across}: shank_angle.forward is {mapped.forward!r}; give {across!r} "
             f"or '-{across}', where the walk goes, in a gait map, for the ankle too"
         )
-    raise DataError(f"{said}: nobody walks in it; give a recording of walking")
+    raise DataError(f"{said}: this is not walking; give a recording of walking")
 
 
 _UNITS = {

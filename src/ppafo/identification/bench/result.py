@@ -100,7 +100,7 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
         verdict = "identified" if fitted.conflict is None else "holds for this model only"
     elif bound is not None:
         verdict = "at its bound"
-        sentence = f"{sentence} The readings want a value at or beyond {value:.4g}; the interval ends there."
+        sentence = f"{sentence} The readings favour a value at or beyond {value:.4g}; the interval ends there."
     # Then zero, or twice the value, is inside the interval as well.
     elif half_width >= size:
         verdict, sentence = "not identifiable", f"{sentence} The interval is as wide as the value."

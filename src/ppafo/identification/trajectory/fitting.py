@@ -134,7 +134,7 @@ def fit(problem: TrajectoryProblem, report: Report = report_nothing) -> Trajecto
         report,
         is_motion=True,
     )
-    conflict = conflict_in_words(fitted, "the model lacks something") or _wandering(fitted, numbers)
+    conflict = conflict_in_words(fitted, "the model is incomplete") or _wandering(fitted, numbers)
     sought = {row: number for row, number in enumerate(numbers) if not number.is_tolerance}
     tolerated = {row: number for row, number in enumerate(numbers) if number.is_tolerance}
     estimates = tuple(_estimate(problem, fitted, number, row, conflict) for row, number in sought.items())
@@ -221,7 +221,7 @@ def _at_edge(edge: Mapping[str, int], estimates: Sequence[Estimate]) -> str:
         inside = estimate.value - side * _INSIDE * abs(estimate.value)
         bounds.append(f'{"high" if side > 0 else "low"} = "{_in_unit(inside, estimate)}" of {estimate.path}')
     return (
-        f"the recordings want {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, or "
+        f"the recordings favour {' and '.join(wanted)}, where no run succeeds; check recordings, scenario and set, or "
         f"give {' and '.join(bounds)}, and the fit ends there as at a bound"
     )
 
@@ -292,8 +292,8 @@ def _wandering(fitted: Fit, numbers: tuple[FitNumber, ...]) -> str:
             shown, unit = in_shown_unit(wander, number.unit.removesuffix("_d"))
             most, _ = in_shown_unit(limit, number.unit.removesuffix("_d"))
             return (
-                f"what is left of {channel} wanders by {shown:.2g} {unit}, and its zero by "
-                f"{most:.2g} {unit} at most; the model lacks something"
+                f"the residual of {channel} drifts by {shown:.2g} {unit}, but its zero by {most:.2g} {unit} at "
+                f"most; the model is incomplete"
             )
     return ""
 
@@ -323,7 +323,7 @@ def _estimate(problem: TrajectoryProblem, fitted: Fit, number: FitNumber, row: i
             text = conflict or f"the recordings are hardly sensitive to it; {remedy}"
     elif bound is not None:
         end, unit = in_shown_unit(bound, number.unit)
-        verdict, text = "at its bound", f"the recordings want a value at or beyond {end:.6g} {unit}".rstrip(" -")
+        verdict, text = "at its bound", f"the recordings favour a value at or beyond {end:.6g} {unit}".rstrip(" -")
     elif conflict:
         # Said of every number: which of them the missing physics moves is not known.
         verdict, text = "holds for this model only", conflict

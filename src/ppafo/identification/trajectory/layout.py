@@ -90,13 +90,13 @@ class TrajectorySection(StrictTable):
 
 
 _REMOVED = {
-    "loss": "the first pass is robust by itself; omit it",
+    "loss": "the first pass is always robust; omit it",
     "other_starts": "other starts are tried where the first does not explain the recordings; omit it",
-    "seed": "nothing is drawn; omit it",
-    "directions": "recordings that want other numbers are found by themselves; omit it",
-    "profiles": "intervals are the table's; omit it",
-    "scale": "the search scales numbers by itself; omit it",
-    "held": "is now locked; write locked = '75 deg'",
+    "seed": "the fit uses no random numbers; omit it",
+    "directions": "recordings that disagree are found automatically; omit it",
+    "profiles": "the table of the result has the intervals; omit it",
+    "scale": "numbers are scaled automatically; omit it",
+    "held": "is renamed to locked; write locked = '75 deg'",
 }
 
 

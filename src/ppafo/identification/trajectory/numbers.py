@@ -165,7 +165,8 @@ def number_of(parameter: FreeParameter, experiments: Sequence[FittedExperiment])
     paths = {full_path(parameter.path, scenario) for scenario in scenarios}
     if len(paths) > 1:
         raise IdentificationError(
-            f"{parameter.path} means {' and '.join(sorted(paths))} in these experiments; name one, and its recordings"
+            f"{parameter.path} means {' and '.join(sorted(paths))} in these experiments; give one of these paths, "
+            f"with its recordings"
         )
     path = paths.pop()
     quantity = [declaration_of(path, scenario) for scenario in scenarios][-1]

@@ -89,7 +89,9 @@ def trajectory_problem(section: TrajectorySection, setting: SectionContext) -> T
     # Samples that a bench procedure used are in its interval, which is a prior here.
     twice = double_use(setting.used, map(use_of, experiments))
     if twice:
-        raise IdentificationError(f"{setting.file}: {twice}; bench values are where the fit starts and what it holds")
+        raise IdentificationError(
+            f"{setting.file}: {twice}; omit the recording from the procedure or from the trajectory"
+        )
     parameters = [_parameter(entry, scenarios, setting) for entry in section.parameters]
     for entry in section.experiments:
         limit = positive_in(entry, "time_offset", "s", f"{setting.file}: experiment '{entry.label}'")

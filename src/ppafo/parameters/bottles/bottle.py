@@ -422,5 +422,5 @@ def _check_content(bottle: Bottle, file: str) -> None:
         has, needs = (shown_text(each, "Pa_a", ".4g", unit=unit) for each in (content.pressure, needed))
         raise ParameterError(
             f"{file}: the full bottle has {has} at {temperature:g} K, but its regulator "
-            f"needs {needs}: regulator.set_pressure and regulator.pressure_margin"
+            f"needs {needs}, the sum of regulator.set_pressure and regulator.pressure_margin; lower one of them"
         )

@@ -10,7 +10,7 @@ from ppafo.engine.channels import TRACED
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
 from ppafo.errors import ScenarioError, nearest_name
-from ppafo.metrics import METRICS
+from ppafo.metrics import MetricKind, metric_kind
 from ppafo.model.controlled import CONTROLLED
 from ppafo.simulation.check import MARGIN, finer
 from ppafo.simulation.ensemble.columns import check_columns
@@ -72,10 +72,12 @@ def run_ensemble(
     What follows a number that varies moves with it, as it does in a file: a gauge pressure with the atmosphere, a
     pressure at the start with the supply which it names, the second regulator with the first.
     """
-    unknown = next((name for name in meters if name not in METRICS), None)
-    if unknown is not None:
-        raise ScenarioError(f"{base.name}: there is no metric '{unknown}'{_hint(unknown, offered(base))}")
-    metrics = {name: METRICS[name] for name in meters}
+    metrics: dict[str, MetricKind] = {}
+    for name in meters:
+        kind = metric_kind(name)
+        if kind is None:
+            raise ScenarioError(f"{base.name}: there is no metric '{name}'{_hint(name, offered(base))}")
+        metrics[name] = kind
     for name in bands:
         _check_channel(base, name)
     interval = every or base.run.output_interval

@@ -53,7 +53,7 @@ def check_columns(base: Scenario, columns: Mapping[str, Any], gauge: Collection[
     Those of the paths in ``gauge`` count from the atmosphere of their run.
     """
     if base.controller.is_outside and base.controller.custom is None:
-        raise ScenarioError(f"{base.name}: nothing controls the valve; give a controller (controlled_by)")
+        raise ScenarioError(f"{base.name}: has no controller; give one with controlled_by")
     # Effects of other packages are known by their paths once they are loaded.
     find_effects(columns)
     # valve.area and valves.NAME.area are one number of the chosen valve.

@@ -1,25 +1,34 @@
 """Tracking rule for runs of which only metrics are kept: the rule of a recording, as far as its meters tell it."""
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
+from ppafo.control.catalog import PROFILES
+from ppafo.engine.scheme.actuators import torque_of
 from ppafo.metrics.metric import Floats
+from ppafo.metrics.settled import SETTLED_METRICS, SHORTEST_HOLD
 from ppafo.metrics.tracking import SUSTAINED
+from ppafo.model.catalog import ACTUATORS
+from ppafo.model.columns import first
 from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.parameters.plant import plant_parameters
 from ppafo.simulation.profiles import profile_bounds
-from ppafo.simulation.scenario import FreeMotion, Scenario
+from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.tracking.rule import (
-    LARGEST_PEAK_WALK,
     LARGEST_SHARE,
-    LARGEST_SHARE_MOVING,
-    LARGEST_SHARE_SWITCHED,
-    LARGEST_SHARE_WALK,
+    MOVED_JOINT,
     REVERSALS,
+    SettledPart,
+    excess_of_task,
+    excess_of_walk,
+    is_noisy,
     torque_limit,
 )
 
+_ANGLES = 9
+"""Angles between the stops at which the torque of a joint that moves is looked for."""
 _OF_WALK = ("torque_error", "requested_torque", "peak_torque")
 """Metrics by which a walk is judged, beside the reversals of its command."""
 
@@ -28,60 +37,88 @@ def needed_metrics(scenario: Scenario) -> tuple[str, ...]:
     """Names of the metrics by which metered runs of a scenario are judged; none without a reference."""
     if scenario.controller.is_open_loop:
         return ()
-    return (*(_names(scenario.controlled) if scenario.follows_reference else _OF_WALK), REVERSALS)
+    return (*(SETTLED_METRICS if scenario.follows_reference else _OF_WALK), REVERSALS)
 
 
-def _names(controlled: str) -> tuple[str, str, str, str]:
-    """Metrics of a task: RMS error of the run and of the hold, error at the end, reversals of the value on the hold."""
-    of = "" if controlled == TORQUE else f"{controlled}_"
-    return f"rms_{of}error", f"rms_{of}error_hold", f"final_{of}error", f"{of}oscillations_hold"
-
-
-def following(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float) -> Floats:
-    """Verdict on metered runs (runs,): 1 where they follow, 0 where they do not, nan where that is not known.
+def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reversals: float, least: float) -> Floats:
+    """Largest number of metered runs over its limit (runs,): a run follows up to 1; nan where that is not known.
 
     Numbers of the scenario may be arrays (runs,); ``metrics`` are its ``needed_metrics`` as far as it offers them, and
     ``most_reversals`` those of the command above which its loop oscillates; ``least`` is the ``smallest_change``.
     """
     runs = next(iter(metrics.values())).size
     none = np.full(runs, np.nan)
-    restless = np.nan_to_num(metrics.get(REVERSALS, none)) > most_reversals
-    if not scenario.follows_reference:
-        error, requested, peak = (metrics.get(name, none) for name in _OF_WALK)
-        limit = torque_limit(scenario.controller.settings) or np.inf
-        fails = restless | (error > LARGEST_SHARE_WALK * requested) | (peak > LARGEST_PEAK_WALK * limit)
-        return np.where(np.isfinite(error) & (requested > 0.0), np.where(fails, 0.0, 1.0), np.nan)
-    of_run, on_hold, final, turns = (metrics.get(name, none) for name in _names(scenario.controlled))
-    law = scenario.law
-    only_switches = law is not None and law.only_switches
-    wanted = np.maximum(_wanted(scenario), least)
-    is_moved = scenario.controlled != ANGLE and scenario.motion.locked_angle is None
-    swings = np.nan_to_num(turns) >= SUSTAINED
-    # A hold begins with what is left of the ramp, and its end is one instant: a loop that rests is off in both.
-    resting = np.fmin(final, on_hold)
-    if only_switches:
-        share, most = np.where(swings, on_hold, resting), np.where(swings, LARGEST_SHARE_SWITCHED, LARGEST_SHARE)
-        moving = LARGEST_SHARE_SWITCHED
-    else:
-        share, most = resting, np.full(runs, LARGEST_SHARE_MOVING if is_moved else LARGEST_SHARE)
-        moving = LARGEST_SHARE_MOVING
-        # The settled part is half of the hold, in which a swing that lasts turns half as often.
-        restless = restless | ((np.nan_to_num(turns) >= 2 * SUSTAINED) & (not is_moved))
-    has_hold = np.isfinite(on_hold)
-    fails = restless | np.where(has_hold, share > most * wanted, of_run > moving * wanted)
-    return np.where(np.isfinite(of_run), np.where(fails, 0.0, 1.0), np.nan)
+    turning = np.nan_to_num(metrics.get(REVERSALS, none)) / most_reversals
+    if is_noisy(scenario):
+        often = most_reversals / max(float(first(scenario.run.duration)), 1.0)
+        turning = np.nan_to_num(metrics.get("settled_reversals", none)) / often
+    numbers = {name: metrics.get(name, none) for name in needed_metrics(scenario)}
+    with np.errstate(divide="ignore", invalid="ignore"):
+        if not scenario.follows_reference:
+            error, requested, peak = (numbers[name] for name in _OF_WALK)
+            settled = _settled(wanted=requested, error=error, peak=peak)
+            excess = excess_of_walk(settled, turning, torque_limit(scenario.controller.settings))
+            return np.where(np.isfinite(error) & (requested > 0.0), excess, np.nan)
+        settled = _settled_task(scenario, {name.removeprefix("settled_"): row for name, row in numbers.items()}, least)
+        law = scenario.law
+        found = excess_of_task(settled, law is not None and law.only_switches)
+        # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
+        missing = np.where(shortfall(scenario) > 0.0, np.abs(settled.missing) / (LARGEST_SHARE * settled.wanted), 0.0)
+    known = np.isfinite(numbers["settled_error"])
+    return np.where(known, np.max([turning, *found, missing], axis=0), np.nan)
 
 
-def _wanted(scenario: Scenario) -> Any:
-    """Largest change of the reference from where what is controlled starts, an array (runs,) where that varies."""
+def shortfall(scenario: Scenario) -> Floats:
+    """Torque [N m] that the supply lacks of the largest reference in each run (runs,); 0 where it lacks nothing.
+
+    With one chamber at its supply and the other vented the actuator gives the most, whatever the controller does. A
+    joint that moves counts at the angles where it gives most.
+    """
+    if scenario.controlled != TORQUE:
+        return np.zeros(1)
+    device = scenario.device
+    actuator, supply, locked = device.actuator, device.supply, scenario.motion.locked_angle
+    fractions = (0.0,) if locked is not None else np.linspace(0.0, 1.0, _ANGLES).tolist()
+    first, travel = (actuator.angle_min, actuator.angle_max - actuator.angle_min) if locked is None else (locked, 0.0)
+    model, plant, vented = ACTUATORS[actuator.kind].model, plant_parameters(device), supply.atmospheric_pressure
+    angles = [first + fraction * travel for fraction in fractions]
+    highest = [torque_of(model, plant, angle, supply.pressure, vented) for angle in angles]
+    lowest = [torque_of(model, plant, angle, vented, supply.dorsiflexion_pressure) for angle in angles]
+    if supply.is_vacuum:
+        highest, lowest = lowest, highest
+    least, most = profile_bounds(scenario.reference)
+    above, below = most - np.max(highest, axis=0), np.min(lowest, axis=0) - least
+    return np.atleast_1d(np.maximum(0.0, np.maximum(above, below)))
+
+
+def _settled_task(scenario: Scenario, numbers: Mapping[str, Floats], least: float) -> SettledPart:
+    """Settled part of metered tasks, from its numbers (runs,) by name."""
     lowest, highest = profile_bounds(scenario.reference)
-    initial = scenario.initial
-    if scenario.controlled == TORQUE:
-        start: Any = 0.0
-    elif scenario.controlled == ANGLE:
-        start = cast(FreeMotion, scenario.motion).angle
-    elif scenario.controlled == "pressure_difference":
-        start = initial.pressure_1 - initial.pressure_2
-    else:
-        start = getattr(initial, scenario.controlled)
-    return np.maximum(np.abs(highest - start), np.abs(lowest - start))
+    begun: Any = 0.0 if scenario.controlled == TORQUE else numbers["begun"]
+    asked = numbers["extent"]
+    wanted = np.maximum(asked, least)
+    is_upwards = np.abs(highest - begun) >= np.abs(lowest - begun)
+    peak = np.where(is_upwards, numbers["top"] - begun, begun - numbers["bottom"])
+    share = numbers["share_of_hold"]
+    is_held = scenario.controlled == ANGLE or (numbers["angle_range"] <= MOVED_JOINT)
+    turns = numbers["turns"]
+    return _settled(
+        wanted=wanted,
+        error=numbers["error"],
+        missing=numbers["missing"],
+        swing=np.sqrt(np.maximum(numbers["error"] ** 2 - numbers["missing"] ** 2, 0.0)),
+        turns=np.where(turns >= SUSTAINED, turns, 0.0),
+        moved=numbers["highest"] - numbers["lowest"],
+        peak=np.where(asked >= wanted, peak, 0.0),
+        rests=(share >= SHORTEST_HOLD) & is_held,
+        worst=numbers["worst"],
+        span=numbers["span"],
+        way=np.maximum(asked, highest - lowest) if scenario.controlled == ANGLE else 0.0,
+        ends_on_ramp=(share <= 0.0) & PROFILES[scenario.reference.kind].is_monotone,
+    )
+
+
+def _settled(**numbers: Any) -> SettledPart:
+    """Settled part whose numbers are arrays (runs,)."""
+    none: dict[str, Any] = dict.fromkeys(("duration", "missing", "swing", "turns", "moved", "peak"), 0.0)
+    return SettledPart(**{"samples": slice(None), "rests": False, **none, **numbers})

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.command import asked_samples
+from ppafo.metrics.command import asked_samples, command_reversals
 from ppafo.metrics.metric import Floats, extent, followed, hold_start
+from ppafo.metrics.settled import is_long_enough
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.metrics.tracking import SUSTAINED
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
@@ -31,6 +32,10 @@ LARGEST_MEAN_SWITCHED = 0.15
 """Share of mean error in the wanted change above which such a law does not follow [-]."""
 LARGEST_SHARE_MOVING = 0.2
 """The same where the reference never rests or the joint is moved: every loop follows late [-]."""
+LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE = math.radians(2.0), 0.05
+"""Largest error of a joint angle behind a reference that moves [rad], or over the range of that [-] if this is more."""
+LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE = math.radians(1.0), 0.03
+"""Largest range of the error of an angle beside a reference at rest, in the same two ways: an eye sees 1 deg swing."""
 LARGEST_SHARE_WALK = 0.5
 """RMS error of a walk over the RMS of the torque its controller requests [-]."""
 LARGEST_PEAK = 1.5
@@ -52,9 +57,7 @@ SMALLEST_SIZE = 5.0e-4
 
 REVERSALS = "command_reversals"
 """Metric that counts reversals of the command."""
-_SHORTEST_HOLD = 0.1
-"""Share of a run that a hold must last to be judged as one [-]."""
-_MOVED_JOINT = 0.01
+MOVED_JOINT = 0.01
 """Travel of a joint in the settled part that disturbs the loop of a torque or a pressure [rad]."""
 
 Failure = Literal["does not move", "oscillates", "overshoots", "does not follow"]
@@ -69,7 +72,8 @@ class SettledPart(NamedTuple):
     deviation; ``turns`` counts reversals of the error, 0 below ``SUSTAINED``. ``moved`` is the range of the value over
     the run, ``peak`` its largest change in the wanted direction, 0 where that says nothing. ``rests`` where reference
     and joint stand still; ``ends_on_ramp`` where the run ends before a monotone reference rests. ``start`` [s] is when
-    it begins, 0 for a walk.
+    it begins, 0 for a walk. ``worst`` is the largest error and ``span`` its range, and ``way`` of an angle the range of
+    start and reference, 0 for other quantities. ``reversals`` [1/s] are those of the command.
     """
 
     samples: slice | NDArray[np.bool_]
@@ -78,12 +82,16 @@ class SettledPart(NamedTuple):
     error: float
     missing: float
     swing: float
-    turns: int
+    turns: float
     moved: float
     peak: float
     rests: bool
     ends_on_ramp: bool = False
     start: float = 0.0
+    worst: float = 0.0
+    span: float = 0.0
+    way: float = 0.0
+    reversals: float = 0.0
 
     @property
     def share(self) -> float:
@@ -103,6 +111,12 @@ def most_reversals(scenario: Scenario, law: ControllerKind | None, duration: flo
         return duration * MOST_PER_STRIDE / stride_time
     # A run of tenths of a second is a transient: a few reversals are its rate, and no oscillation.
     return max(duration, 1.0) * MOST_PER_SECOND + PER_TURN * _turns_of_reference(scenario, duration)
+
+
+def is_noisy(scenario: Scenario) -> bool:
+    """True where noise of the sensors turns the command of a task, whose reversals count in the settled part alone."""
+    sensors = scenario.sensors
+    return scenario.follows_reference and bool(sensors.angle_noise or sensors.pressure_noise)
 
 
 def _turns_of_reference(scenario: Scenario, duration: float) -> float:
@@ -143,14 +157,17 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     reference, value = followed(recording)
     time, count = recording.time, len(recording)
     first = hold_start(recording)
-    rests = first is not None and time[-1] - time[first] >= _SHORTEST_HOLD * (time[-1] - time[0])
+    rests = first is not None and is_long_enough(first, count)
     samples = slice((first + count) // 2 if rests and first is not None else count // 2, None)
     error = (value - reference)[samples]
     asked = extent(recording)
     wanted = max(asked, smallest_change(scenario))
     # A joint that is moved disturbs the loop of a torque or a pressure all the time, as a moving reference does.
-    rests = rests and (scenario.controlled == ANGLE or float(np.ptp(recording["angle"][samples])) <= _MOVED_JOINT)
-    turns = reversals(np.asarray(error, dtype=np.float64), OSCILLATION_THRESHOLD * wanted)
+    is_angle = scenario.controlled == ANGLE
+    rests = rests and (is_angle or float(np.ptp(recording["angle"][samples])) <= MOVED_JOINT)
+    # An error behind a reference that turns turns with it.
+    turns = reversals(error, OSCILLATION_THRESHOLD * wanted)
+    turns -= 0 if rests else reversals(np.asarray(reference[samples]), OSCILLATION_THRESHOLD * wanted)
     return SettledPart(
         samples=samples,
         duration=float(time[-1] - time[samples][0]),
@@ -164,6 +181,10 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
         rests=rests,
         ends_on_ramp=not rests and first is None and _is_monotone(reference),
         start=float(time[samples][0]),
+        worst=float(np.max(np.abs(error))),
+        span=float(np.ptp(error)),
+        way=max(asked, float(np.ptp(reference))) if is_angle else 0.0,
+        reversals=command_reversals(recording, samples) / max(float(time[-1] - time[samples][0]), 1.0),
     )
 
 
@@ -195,37 +216,77 @@ def smallest_change(scenario: Scenario) -> float:
     return max(SMALLEST_CHANGE * one_way * abs(highest - lowest), SMALLEST_SIZE * kind.size)
 
 
-def failure_of_walk(settled: SettledPart, is_restless: bool, torque_limit: float) -> Failure | None:
-    """Kind of failure of a walk, whose controller requests no more than a limit [N m]; None where it follows.
+def excess_of_walk(settled: SettledPart, turning: Floats | float, limit: float) -> Floats | float:
+    """Largest number of a walk over its limit: it follows up to 1.
 
-    ``is_restless`` says that its command reverses too often; a limit of 0 is none.
+    ``turning`` is the number of command reversals over the largest one; the controller requests no more than ``limit``
+    [N m], 0 for none. The numbers of ``settled`` may be arrays (runs,).
     """
-    if is_restless:
+    peak = settled.peak / (LARGEST_PEAK_WALK * limit) if limit > 0.0 else 0.0
+    return np.maximum(np.maximum(turning, peak), settled.share / LARGEST_SHARE_WALK)
+
+
+def failure_of_walk(settled: SettledPart, turning: float, limit: float) -> Failure | None:
+    """Kind of failure of a walk, with the arguments of ``excess_of_walk``; None where it follows."""
+    if excess_of_walk(settled, turning, limit) <= 1.0:
+        return None
+    if turning > 1.0:
         return "oscillates"
-    if torque_limit > 0.0 and settled.peak > LARGEST_PEAK_WALK * torque_limit:
-        return "overshoots"
-    return "does not follow" if settled.share > LARGEST_SHARE_WALK else None
+    return "overshoots" if limit > 0.0 and settled.peak > LARGEST_PEAK_WALK * limit else "does not follow"
 
 
-def failure_of_task(settled: SettledPart, is_restless: bool, only_switches: bool) -> Failure | None:
-    """Kind of failure of a task; None where the controlled quantity follows its reference.
+class TaskExcess(NamedTuple):
+    """Numbers of a task, each over its limit: left error, swings of the value, peak, and a value that does not move."""
 
-    ``is_restless`` says that the command reverses too often, ``only_switches`` that the law knows no gradual opening.
+    off: Floats
+    swings: Floats
+    peak: Floats
+    still: Floats
+
+
+def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
+    """Numbers of a task over their limits, beside its command reversals: it follows where none is above 1.
+
+    ``only_switches`` says that the law knows no gradual opening. The numbers of ``settled`` may be arrays (runs,).
     """
-    most = LARGEST_SHARE_SWITCHED if only_switches else LARGEST_SHARE if settled.rests else LARGEST_SHARE_MOVING
-    if settled.share > LARGEST_SHARE and settled.moved <= SMALLEST_MOVE * settled.wanted:
-        return "does not move"
-    # A run that ends on its ramp has no settled part: every loop is behind there.
-    is_beside = only_switches and settled.rests and abs(settled.missing) > LARGEST_MEAN_SWITCHED * settled.wanted
-    is_off = (settled.share > most or is_beside) and not settled.ends_on_ramp
+    rests, share, way = np.asarray(settled.rests), np.asarray(settled.share), np.asarray(settled.way)
+    # Degrees count for an angle, however far it goes.
+    worst = settled.worst / np.maximum(LARGEST_ANGLE_ERROR, LARGEST_ANGLE_SHARE * way)
+    span = np.where(way > 0.0, settled.span / np.maximum(LARGEST_ANGLE_SWING, LARGEST_SWING_SHARE * way), 0.0)
+    most = np.where(rests, LARGEST_SHARE, LARGEST_SHARE_MOVING)
+    off = share / (LARGEST_SHARE_SWITCHED if only_switches else most)
     if only_switches:
-        swings = is_off and settled.swing > abs(settled.missing)
+        # It swings about its reference by design: its mean error is to be less.
+        beside = np.abs(settled.missing) / (LARGEST_MEAN_SWITCHED * settled.wanted)
+        off = np.where(rests, np.maximum(off, beside), off)
     else:
-        swings = settled.turns > 0 and (settled.rests or is_off)
-    if is_restless or swings:
+        off = np.maximum(off, np.where(rests, span, np.where(way > 0.0, worst, 0.0)))
+    # A run that ends on its ramp has no settled part: every loop is behind there.
+    off = np.where(settled.ends_on_ramp, 0.0, off)
+    if only_switches:
+        swings = np.where(settled.swing > np.abs(settled.missing), off, 0.0)
+    else:
+        swings = np.where(rests | (off > 1.0), np.asarray(settled.turns) / (SUSTAINED - 1), 0.0)
+        # A joint that creeps has a range of its error, too, and is no loop that swings.
+        is_swing = rests & (settled.swing > np.abs(settled.missing))
+        swings = np.where(is_swing, np.maximum(swings, span), swings)
+    is_counted = rests & (not only_switches)
+    peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
+    is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)
+    return TaskExcess(off, swings, peak, np.where(is_still, share / LARGEST_SHARE, 0.0))
+
+
+def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:
+    """Kind of failure of a task, whose command reversals over the largest number are ``turning``; None if it follows.
+
+    ``only_switches`` says that the law knows no gradual opening.
+    """
+    off, swings, peak, still = (float(number) for number in excess_of_task(settled, only_switches))
+    if still > 1.0:
+        return "does not move"
+    if turning > 1.0 or swings > 1.0:
         return "oscillates"
-    overshoots = settled.peak > LARGEST_PEAK * settled.wanted and settled.rests and not only_switches
-    return "does not follow" if is_off else "overshoots" if overshoots else None
+    return "does not follow" if off > 1.0 else "overshoots" if peak > 1.0 else None
 
 
 def torque_limit(settings: Mapping[str, float]) -> float:

@@ -11,8 +11,8 @@ from ppafo.metrics.metric import has_reference
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.case import Case
-from ppafo.simulation.tracking.causes import cause_of_task
+from ppafo.simulation.tracking.case import Case, TrackingCause
+from ppafo.simulation.tracking.causes import causes_of_task
 from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
@@ -22,12 +22,13 @@ from ppafo.simulation.tracking.rule import (
     SettledPart,
     failure_of_task,
     failure_of_walk,
+    is_noisy,
     most_reversals,
     settled_task,
     settled_walk,
     torque_limit,
 )
-from ppafo.simulation.tracking.walk_causes import cause_of_walk
+from ppafo.simulation.tracking.walk_causes import causes_of_walk
 from ppafo.units.shown import in_units, units_in_force
 
 if TYPE_CHECKING:
@@ -43,9 +44,10 @@ class Tracking:
 
     ``error`` and ``wanted`` are the RMS error of the settled part and the change wanted, ``missing`` the mean error,
     ``moved`` how far the value went, all in SI of what is ``controlled``. ``reversals`` are the command's ``per``
-    stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``tried`` what
-    did; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one. The
-    settled part begins at ``since`` [s], 0 for a walk.
+    stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``others`` what
+    else applies, less surely, ``tried`` what did help; ``span`` is the range of the error of an angle that swings where
+    neither it nor its command turns often, else 0; ``accepted`` is the reason that the scenario gives for a reference
+    beyond reach, "" without one. The settled part begins at ``since`` [s], 0 for a walk.
     """
 
     kind: Failure
@@ -59,10 +61,12 @@ class Tracking:
     cause: str
     advice: str
     remedies: tuple[Remedy, ...] = ()
+    others: tuple[TrackingCause, ...] = ()
     accepted: str = ""
     tried: str = ""
     at_rest: bool = True
     since: float = 0.0
+    span: float = 0.0
     units: Mapping[str, str] = field(default_factory=units_in_force, compare=False, repr=False)
 
     @property
@@ -89,6 +93,9 @@ class Tracking:
         if self.kind == "does not move":
             return f"the {words} loop does not move: {plain_moved} of {wanted} wanted"
         if self.kind == "oscillates":
+            if self.span:
+                swing = change_text(self.controlled, self.span)
+                return f"the {words} swings by {swing}, of {wanted} wanted{self.time_text}"
             often = f"{self.reversals:.3g} reversals a {self.per}"
             return f"the {words} loop oscillates: {often}, RMS {plain_error} of {wanted} wanted{self.time_text}"
         if self.kind == "overshoots":
@@ -138,12 +145,13 @@ def tracking_of(
     if settled is None:
         return None
     duration = float(np.ptp(recording.time[[0, -1]]))
-    is_restless = reversals > most_reversals(scenario, law, duration, stride_time)
+    counted = settled.reversals * max(duration, 1.0) if is_noisy(scenario) else reversals
+    turning = counted / most_reversals(scenario, law, duration, stride_time)
     limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
     if is_task:
-        failure = failure_of_task(settled, is_restless, law is not None and law.only_switches)
+        failure = failure_of_task(settled, turning, law is not None and law.only_switches)
     else:
-        failure = failure_of_walk(settled, is_restless, limit)
+        failure = failure_of_walk(settled, turning, limit)
     case = Case(scenario=scenario, law=law, recording=recording, settled=settled, failure=failure)
     # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
     if failure is None and is_task and abs(settled.missing) > LARGEST_SHARE * settled.wanted:
@@ -151,7 +159,7 @@ def tracking_of(
         case = case._replace(failure=failure)
     if failure is None:
         return None
-    cause = cause_of_task(case) if is_task else cause_of_walk(case)
+    cause, *others = causes_of_task(case) if is_task else causes_of_walk(case)
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
@@ -159,14 +167,16 @@ def tracking_of(
         wanted=limit if failure == "overshoots" and not is_task else settled.wanted,
         missing=settled.missing,
         moved=settled.peak if failure == "overshoots" else settled.moved,
-        reversals=_rate(settled, is_restless, reversals / duration) * (stride_time if stride_time > 0.0 else 1.0),
+        reversals=_rate(settled, turning > 1.0, reversals / duration) * (stride_time if stride_time > 0.0 else 1.0),
         per="stride" if stride_time > 0.0 else "second",
         cause=cause.text,
         advice=cause.advice,
         remedies=cause.remedies,
+        others=tuple(other for other in others if other.remedies),
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,
+        span=settled.span if failure == "oscillates" and turning <= 1.0 and not settled.turns and settled.way else 0.0,
     )
 
 

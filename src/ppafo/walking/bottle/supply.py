@@ -199,7 +199,7 @@ def _check(reading: DocumentReader, device: Device, supply: BottleSupply) -> Non
     if device.supply.relieving:
         raise ScenarioError(f"{reading.file}: supply.relieving: no gas goes back into a bottle; set it to false")
     if kind_at(reading.document, "gas_model") == THERMAL:
-        raise reading.refusal("gas_model.kind", "goes with gas that arrives at room temperature, not with a bottle")
+        raise reading.refusal("gas_model.kind", "assumes supply gas at room temperature; omit it, or the bottle")
     for path in _OWN:
         if value_at(reading.document, path) is not None:
             raise reading.refusal(path, f"the bottle's regulator has its own: set {BOTTLE}.regulator.droop or .area")

@@ -175,7 +175,7 @@ def test_mistakes_are_one_line() -> None:
         compare(study=STUDY, draws=3)
     with pytest.raises(StudyError, match=r"confidence = 1\.0"):
         compare(study=STUDY, confidence=1.0)
-    with pytest.raises(StudyError, match="draws = 64: nothing is drawn here; give a study, or sensors with noise"):
+    with pytest.raises(StudyError, match="draws = 64: nothing in this comparison is random; give a study"):
         compare(["torque-task-solenoid", "torque-task-proportional"], draws=64)
 
 

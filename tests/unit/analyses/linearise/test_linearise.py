@@ -176,7 +176,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert at_stop.sides["ankle"] == "against a stop"
     assert "straight line" in at_stop.sides["source to chamber 1"]
     assert at_stop.edges == (SlopeKink("command", is_above=False),)
-    assert "the column of `command` holds below 1, and another one above it" in text_of(finding_of(at_stop))
+    assert "the column of `command` is valid below 1 only; its slope differs above it" in text_of(finding_of(at_stop))
     assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
     deaf = linear(TASK, 0.1, ["valve.dead_band=0.5"])
     assert "the command's column is 0" in deaf.sides["valve"]
@@ -266,7 +266,7 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
         assert "\n" not in str(refused.value)
     line = RegulatedLine(1e9, 1e-2, 1e-5)
     fed = replace(ppafo.load_scenario(TASK), supply_line=SupplyLine(line, line))
-    with pytest.raises(ScenarioError, match="constant supplies; omit"):
+    with pytest.raises(ScenarioError, match="constant supply pressure; omit"):
         linear(fed, 1.0)
 
 

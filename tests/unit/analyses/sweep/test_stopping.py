@@ -144,7 +144,7 @@ def test_equal_values_are_no_known_mean_before_a_rare_one_could_have_come() -> N
     many = drawn_until(outcomes(0.0), rare, mean_of("N m"), rule, 1)
     assert many.is_met
     (unseen,) = many.remarks
-    assert "would move the mean by up to 0.00018 times its distance" in unseen
+    assert "would shift the mean by up to 0.00018 times its distance" in unseen
 
 
 def test_a_mean_is_not_met_before_a_rare_jump_could_have_come() -> None:
@@ -181,7 +181,7 @@ def test_a_mean_of_fewer_draws_than_would_show_a_rare_value_is_not_met_and_says_
     rule = StoppingRule(0.5, is_relative=True, first=64, maximum=1024)
     finding = draw_until(Runs.of_model(value, [METRIC]), UNCERTAIN, METRIC, mean_of("N m"), rule, 1)
     assert not finding.found.is_met
-    assert "a mean is believed from 10,000 draws on, and the maximum is 1,024" in finding.said[0]
+    assert "a mean needs at least 10,000 draws, and the maximum is 1,024" in finding.said[0]
 
 
 def test_replicates_know_the_mean_of_a_smooth_function_far_better_than_independent_draws() -> None:

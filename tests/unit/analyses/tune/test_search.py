@@ -1,5 +1,6 @@
 """The search and its judging, on functions whose best points are known."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -37,9 +38,9 @@ def problem(**changes: Any) -> Problem:
 def runs(error: list[list[float]], gas: list[list[float]], failed: list[list[bool]] | None = None) -> CandidateMetrics:
     """Runs of candidates (rows) over draws (columns)."""
     shape = np.shape(error)
+    metrics = {"rms_error": np.array(error), "gas_supplied": np.array(gas)}
     return CandidateMetrics(
-        {"rms_error": np.array(error), "gas_supplied": np.array(gas)},
-        np.zeros(shape, bool) if failed is None else np.array(failed),
+        metrics, metrics, np.zeros(shape, bool) if failed is None else np.array(failed), np.zeros(shape)
     )
 
 
@@ -130,6 +131,13 @@ def test_feasible_comes_before_infeasible_and_both_before_failed() -> None:
     assert judged.cost[0] == 4.5
     assert judged.violation[:3] == pytest.approx([0.0, 0.2, 0.8])
     assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < UNUSABLE < judged.cost[3]
+
+
+def test_a_loop_that_does_not_follow_is_behind_those_that_do_however_little_it_costs() -> None:
+    tried = runs([[9.0], [0.1], [0.2]], [[0.5], [0.1], [0.1]])
+    judged = judge(replace(tried, off=np.array([[0.0], [0.2], [1.5]])), problem(), SCALES)
+    assert judged.cost[0] == 4.5
+    assert judged.cost[0] < INFEASIBLE < judged.cost[1] < judged.cost[2] < UNUSABLE
 
 
 def test_a_run_without_the_metric_counts_as_failed() -> None:

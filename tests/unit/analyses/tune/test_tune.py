@@ -191,7 +191,7 @@ def test_a_goal_that_is_zero_before_needs_a_scale() -> None:
 
 def test_an_objective_that_was_zero_has_no_percentage() -> None:
     found = tune(DOCUMENT).found
-    before = replace(found.before, objective=0.0)
+    before = replace(found.before, objective=0.0, off=0.0)
     after = replace(found.after, objective=-0.5)
     assert verdict(found.problem, before, after).endswith("objective 0 before, -0.5 after")
 
@@ -246,3 +246,33 @@ def test_gains_with_which_the_loop_oscillates_are_not_recommended_however_they_s
     assert verdict is None or verdict.kind != "oscillates"
     assert tuned.after.values["rms_error"] < highest.metrics["rms_error"].value
     assert tuned.after.gains["controller.proportional_gain"] < 1.0
+
+
+def test_gains_with_which_the_loop_rests_beside_its_reference_are_not_recommended_however_little_gas_they_need() -> (
+    None
+):
+    tuning = changed(
+        search=[{"path": "controller.proportional_gain", "minimum": "0.001 1/(N m)", "maximum": "1 1/(N m)"}],
+        overrides=[*DOCUMENT["overrides"], "controller.integral_gain=0 1/(N m s)"],
+        objective=[{"metric": "gas_supplied"}],
+    )
+    finding = tune(tuning)
+    lazy = ppafo.simulate("torque-task-proportional", [*tuning["overrides"], "controller.proportional_gain=0.01"])
+    assert lazy.tracking is not None
+    assert lazy.metrics["gas_supplied"].value < finding.found.after.values["gas_supplied"]
+    assert finding.found.after.result.tracking is None
+    assert "the loop follows its reference, with the previous gains it did not" in finding.found.verdict
+    never = tune(tuning | {"search": [tuning["search"][0] | {"maximum": "0.01 1/(N m)"}]})
+    assert not never.passed
+    assert "no gains within the bounds let the loop follow its reference" in never.found.verdict
+
+
+def test_the_metric_that_is_printed_is_the_metric_and_what_is_judged_stands_apart() -> None:
+    late = [*DOCUMENT["overrides"], "valve.delay=10 ms", "controller.proportional_gain=4 1/(N m)"]
+    quick = {"starts": 1, "generations": 1, "candidates_per_gain": 4}
+    before = tune(changed(overrides=late, objective=[{"metric": "final_error"}], effort=quick)).found.before
+    swinging = {name: before.metrics[name].value for name in ("final_error", "rms_error_hold", "oscillations_hold")}
+    assert swinging["oscillations_hold"] > 4.0
+    assert before.values["final_error"] == pytest.approx(swinging["final_error"], rel=1e-9)
+    assert before.judged["final_error"] == pytest.approx(max(list(swinging.values())[:2]), rel=1e-6)
+    assert before.judged["final_error"] > before.values["final_error"]

@@ -45,7 +45,7 @@ def test_a_leak_beside_the_delay_of_a_valve_is_not_identifiable_and_its_interval
     assert leak.high > 50.0 * LEAK
     # That they are hardly sensitive would be untrue: the model lacks what the bench has, and the leak stands in for it.
     assert leak.explanation == found.conflict
-    assert "the model lacks something" in found.conflict
+    assert "the model is incomplete" in found.conflict
     assert not any(one.is_identified for one in found.estimates)
 
 
@@ -66,8 +66,8 @@ def test_what_wanders_by_more_than_the_zero_of_its_sensor_may_be_off_holds_for_t
 ) -> None:
     found = wandering_by(experiment, 6000.0)
 
-    assert "what is left of pressure_1 wanders by" in found.conflict
-    assert "its zero by 0.3 psi at most; the model lacks something" in found.conflict
+    assert "the residual of pressure_1 drifts by" in found.conflict
+    assert "its zero by 0.3 psi at most; the model is incomplete" in found.conflict
     assert found.estimates[0].verdict == "holds for this model only"
 
 

@@ -96,7 +96,7 @@ class SizedValve:
         if notes.rated is not None:
             said.append(f"not tried above {_PRESSURE.text(notes.rated)}, the rated pressure of its parts")
         if notes.is_cold:
-            said.append("a lighter bottle has gas enough and ends before, as it is too cold")
+            said.append("a lighter bottle has enough gas, but gets too cold before the end")
         if notes.largest_bottle is not None:
             lasts = f"{notes.largest_bottle.name} lasts for {100 * notes.share:.0f} % of the use"
             said.append(f"no bottle is large enough: {lasts}")

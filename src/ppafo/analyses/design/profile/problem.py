@@ -106,7 +106,7 @@ def read_profile(table: ProfileSection, folder: Path, file: str) -> RequiredTorq
             raise StudyError(f"{where}.recording: has one sample only; a profile needs two or more")
         time, torque, kind = recording.time - recording.time[0], table.scale * channel, recording.kind
     if not np.any(torque):
-        raise StudyError(f"{where}: is 0 {_TORQUE} throughout; there is nothing to size for")
+        raise StudyError(f"{where}: is 0 {_TORQUE} throughout; give a profile that requires a torque")
     # The last sample is the first of the next repetition. Where the two differ it stays, a moment earlier: the table
     # then jumps as the profile does.
     samples = time[:-1], torque[:-1]
@@ -146,7 +146,7 @@ def _profile_of_table(table: ProfileSection, where: str) -> tuple[Floats, Floats
         series.append(np.array(numbers))
     time, torque = series
     if time[0] != 0.0 or np.any(np.diff(time) <= 0.0):
-        raise StudyError(f"{where}.time: must begin with '0 s' and grow from entry to entry")
+        raise StudyError(f"{where}.time: must start at '0 s' and increase from entry to entry")
     return time, table.scale * torque
 
 

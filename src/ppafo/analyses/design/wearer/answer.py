@@ -53,7 +53,11 @@ def finding_of(sizing: WearerSizing) -> Finding[WearerSizing]:
     ]
     remarks = ["toes below 0 would drag"] if any(tried.toes < 0.0 for tried in sizing.tried) else []
     table = finding.Section(
-        "What was walked with", columns_of(_HEAD, rows), remarks=remarks, left=2, is_detail=device is not None
+        "Parts that were tried in a walk",
+        columns_of(_HEAD, rows),
+        remarks=remarks,
+        left=2,
+        is_detail=device is not None,
     )
     stature = f"{requirements.height:.4g} m"
     if requirements.stature is None:
@@ -103,7 +107,9 @@ def _sections(requirements: DesignRequirements, device: SizedDevice) -> tuple[fi
         who_walks(walk_of(walked.scenario).wearer, walk_of(walked.scenario).gait, "as requested"),
     ]
     if not low <= requirements.mass <= high:
-        remarks.append(f"the gait is known of {low:.0f} to {high:.0f} kg: beyond, torque and gas are a guess")
+        remarks.append(
+            f"the gait is known for {low:.0f} to {high:.0f} kg: outside this range, torque and gas are extrapolated"
+        )
     caption, draw = _CAPTION.format(wished=wanted, lasts=lasts), partial(bottle_figure, walked)
     masses = ((name, MASS.text(mass, ".0f")) for name, mass in device.masses.items())
     return (

@@ -83,7 +83,7 @@ def _power_text(power: float) -> str:
 def electrical_sentences(electrical: Electrical) -> list[str]:
     """Return powers, and mass and minutes of the battery."""
     parts = ", ".join(f"{name} {_power_text(power)}" for name, power in electrical.powers.items())
-    valve = "" if electrical.is_whole else ", without the valve: the catalogue states no power of it"
+    valve = "" if electrical.is_whole else ", without the valve, whose power the catalogue does not state"
     return [
         f"electrical power: {electrical.power:.3g} W ({parts}){valve}",
         f"battery: {electrical.cells} x {electrical.cell.title}, {1000.0 * electrical.mass:.0f} g, "

@@ -58,7 +58,7 @@ def size_for_wearer(requirements: DesignRequirements, report: Report, catalogue:
         alternative.text(requirements) for alternative in alternatives_to(requirements, tried, shelf, report)
     )
     if not tried:
-        instead = ("no pair of valve and actuator may have this pressure, or none helps: take another pressure",)
+        instead = ("no pair of valve and actuator is rated for this pressure, or none assists: give another pressure",)
     return WearerSizing(requirements, healthy, tuple(tried), None, instead)
 
 

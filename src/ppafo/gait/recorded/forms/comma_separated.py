@@ -35,7 +35,7 @@ def _recognises(path: str | Path) -> bool:
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of columns with the names and signs of the package, which do not name the foot."""
     if side != "right":
-        raise DataError("a CSV file without a gait map has the columns of one foot; --side left has no meaning there")
+        raise DataError("a CSV file without a gait map has the columns of one foot; omit --side left")
     return Convention(package_map(side))
 
 
@@ -93,8 +93,8 @@ def read_plain_csv(path: str | Path) -> MotionTable:
 def _check_first_name(path: str | Path, name: str) -> None:
     if name.lower() not in _TIMES:
         raise DataError(
-            f"{path}: the first column must be 'time', it is {one_line(name)[:_LONGEST_SHOWN]!r}; a mean stride over 0 "
-            "to 100 % is written out as time, at least twice in a row"
+            f"{path}: the first column must be 'time', it is {one_line(name)[:_LONGEST_SHOWN]!r}; write a mean "
+            f"stride over 0 to 100 % against time, repeated at least twice"
         )
 
 

@@ -214,8 +214,8 @@ def _axes(
     oblique = float(np.degrees(np.arctan2(abs(way[across]), abs(way[along]))))
     if oblique > _MOST_OBLIQUE:
         raise DataError(
-            f"{table.file}: the walk goes {oblique:.0f} deg off the axis {'xyz'[along]} of the laboratory, and "
-            f"the lean of the shank is seen along an axis, to {_MOST_OBLIQUE:g} deg; rotate "
+            f"{table.file}: walking direction is {oblique:.0f} deg off lab axis {'xyz'[along]} (limit "
+            f"{_MOST_OBLIQUE:g} deg); rotate "
             "the coordinates so that one axis points along the walk"
         )
     forward = _FORWARDS[along + 3 * bool(way[along] < 0.0)]

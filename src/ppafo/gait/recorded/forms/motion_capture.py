@@ -5,7 +5,7 @@ and ``.z``, without the subject's name before a colon.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,7 +24,7 @@ from ppafo.gait.recorded.delimited import (
     rows_of,
     table_of,
 )
-from ppafo.gait.recorded.form import FileReader, GaitForm
+from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, MotionTable
 from ppafo.signals.recording import Floats
@@ -38,10 +38,10 @@ _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
 
 
-def _first_cell(path: str | Path, delimiters: str = ",;\t") -> str:
+def _first_cell(path: str | Path) -> str:
     """First cell of a text file; empty for a file that is no text."""
     line = next((line for line in lines_of(path) if line.strip()), "")
-    return re.split(f"[{delimiters}]", line, maxsplit=1)[0].strip().strip('"').strip()
+    return re.split(r"[,;\t]", line, maxsplit=1)[0].strip().strip('"').strip()
 
 
 def _bare(label: str) -> str:
@@ -262,7 +262,7 @@ def _read_bts(path: str | Path) -> MotionTable:
     return table_of(path, block, cells, "time", noun="markers")
 
 
-def _form(name: str, summary: str, first: Sequence[str], read: FileReader) -> GaitForm:
+def _form(name: str, summary: str, first: Sequence[str], read: Callable[[str | Path], MotionTable]) -> GaitForm:
     return GaitForm(
         name=name,
         summary=summary,

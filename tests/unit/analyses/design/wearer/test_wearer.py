@@ -240,7 +240,7 @@ def test_a_device_of_parts_of_one_s_own_walks_on_a_bottle_of_one_s_own(
     supplied = walk_of(device.walked.scenario).bottle
     assert supplied is not None
     assert supplied.bottle.mass == pytest.approx(0.12)
-    assert "without the valve: the catalogue states no power of it" in text_of(finding_of(found))
+    assert "without the valve, whose power the catalogue does not state" in text_of(finding_of(found))
 
 
 def test_a_catalogue_whose_valves_have_no_walk_is_refused(tmp_path: Path) -> None:

@@ -1,0 +1,166 @@
+"""Settled part of metered runs: the numbers by which a verdict on tracking judges a run that was not recorded.
+
+The settled part is the second half of the hold, or of the run where the reference rests for less than a tenth of it.
+These numbers are for verdicts: no table and no study lists them.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ppafo.metrics.command import Reversals, start_reversals, update_reversals
+from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less
+from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
+from ppafo.model.columns import larger, root
+from ppafo.model.controlled import value_in
+from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
+
+SHORTEST_HOLD = 0.1
+"""Share of a run that a hold must last to be judged as one [-]."""
+
+
+class SettledSums(NamedTuple):
+    """Sums over the samples of the settled part so far, and extremes of what is controlled over the run.
+
+    Squared error, error, number of samples, swing, lowest and highest value of the error, reversals of the command,
+    lowest and highest angle [rad]; then what is controlled
+    at the start, its lowest and highest value, and these since the reference was met from that side (1 once it was).
+    """
+
+    squares: float
+    total: float
+    taken: float
+    swing: Swing
+    lowest_error: float
+    highest_error: float
+    command: Reversals
+    lowest_angle: float
+    highest_angle: float
+    begun: float
+    lowest: float
+    highest: float
+    met_upwards: float
+    top: float
+    met_downwards: float
+    bottom: float
+
+
+def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
+    """Sums of the first sample."""
+    value = value_in(sample)
+    error = value - sample.reference
+    return SettledSums(
+        squares=error * error,
+        total=error,
+        taken=1.0,
+        swing=Swing(error, UNDECIDED, error),
+        lowest_error=error,
+        highest_error=error,
+        command=start_reversals(course, sample),
+        lowest_angle=sample.angle,
+        highest_angle=sample.angle,
+        begun=value,
+        lowest=value,
+        highest=value,
+        met_upwards=1.0 if error <= 0.0 else 0.0,
+        top=value,
+        met_downwards=1.0 if error >= 0.0 else 0.0,
+        bottom=value,
+    )
+
+
+def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
+    """Sums with one more sample; they begin anew where half of the run, or of the hold, is over."""
+    value = value_in(sample)
+    error = value - sample.reference
+    # The first sample of a half is that from which on twice its number is at least this.
+    of_run, of_hold = course.samples - 1.0, course.hold_start + course.samples - 1.0
+    twice = 2.0 * sample.number
+    rests = course.hold_start <= sample.number and is_long_enough(course.hold_start, course.samples)
+    half_of_run = twice >= of_run and twice < of_run + 2.0
+    half_of_hold = rests and twice >= of_hold and twice < of_hold + 2.0
+    anew = half_of_run or half_of_hold
+    swing = next_swing(state.swing, error, OSCILLATION_THRESHOLD * course.largest)
+    command = update_reversals(state.command, course, sample)
+    met_upwards = 1.0 if state.met_upwards > 0.0 or error <= 0.0 else 0.0
+    met_downwards = 1.0 if state.met_downwards > 0.0 or error >= 0.0 else 0.0
+    return SettledSums(
+        squares=error * error + (0.0 if anew else state.squares),
+        total=error + (0.0 if anew else state.total),
+        taken=1.0 if anew else state.taken + 1.0,
+        swing=Swing(
+            error if anew else swing.play, UNDECIDED if anew else swing.turns, error if anew else swing.highest
+        ),
+        lowest_error=error if anew else min(state.lowest_error, error),
+        highest_error=error if anew else max(state.highest_error, error),
+        command=Reversals(command.way, command.task, 0.0 if anew else command.turns),
+        lowest_angle=sample.angle if anew else min(state.lowest_angle, sample.angle),
+        highest_angle=sample.angle if anew else max(state.highest_angle, sample.angle),
+        begun=state.begun,
+        lowest=min(state.lowest, value),
+        highest=max(state.highest, value),
+        met_upwards=met_upwards,
+        top=value if met_upwards > state.met_upwards else max(state.top, value),
+        met_downwards=met_downwards,
+        bottom=value if met_downwards > state.met_downwards else min(state.bottom, value),
+    )
+
+
+def is_long_enough(hold_start: float, samples: float) -> bool:
+    """Tell whether a reference rests for long enough to be judged there, from the number of its first sample."""
+    length = samples - 1.0 - hold_start
+    return length >= 1.0 and length >= SHORTEST_HOLD * (samples - 1.0)
+
+
+SETTLED = MeterKind("settled", SettledSums, start_settled, update_settled, True)
+
+
+def root_mean(squares: Floats, samples: Floats) -> Floats:
+    """Root mean square of some samples."""
+    return root(squares / samples)
+
+
+def quotient(total: Floats, number: Floats) -> Floats:
+    """Mean of some samples."""
+    return total / number
+
+
+def farther(highest: Floats, lowest: Floats) -> Floats:
+    """Larger of how far two numbers are from 0, the one above it and the other below."""
+    found: Floats = larger(highest, -lowest)
+    return found
+
+
+def read_reversals(readings: Readings) -> Floats:
+    """``settled_reversals`` of the command [1/s]; of less than a second as of one."""
+    sums = readings.meters[SETTLED.name]
+    return np.asarray(sums.command.turns / larger((sums.taken - 1.0) * readings.interval, 1.0))
+
+
+def read_share_of_hold(readings: Readings) -> Floats:
+    """``settled_share_of_hold`` [-], the hold over the run."""
+    return np.asarray((readings.samples - 1 - readings.course.hold_start) / (readings.samples - 1))
+
+
+def _of_sums(*names: str, by: Callable[..., Floats] | None = None) -> ReadAt:
+    return ReadAt(tuple(f"meters.{SETTLED.name}.{name}" for name in names), by)
+
+
+_NUMBERS: dict[str, Callable[[Readings], Floats]] = {
+    "error": _of_sums("squares", "taken", by=root_mean),
+    "missing": _of_sums("total", "taken", by=quotient),
+    "worst": _of_sums("highest_error", "lowest_error", by=farther),
+    "span": _of_sums("highest_error", "lowest_error", by=less),
+    "turns": _of_sums("swing.turns", by=count_of),
+    "angle_range": _of_sums("highest_angle", "lowest_angle", by=less),
+    **{name: _of_sums(name) for name in ("begun", "lowest", "highest", "top", "bottom")},
+    "reversals": read_reversals,
+    "share_of_hold": read_share_of_hold,
+    "extent": ReadAt(("course.largest",)),
+}
+SETTLED_METRICS = {
+    f"settled_{name}": MetricKind(f"settled_{name}", "-", "for verdicts", (), None, read, (SETTLED,))
+    for name, read in _NUMBERS.items()
+}
+"""Numbers of the settled part by name, in SI of what is controlled; beside METRICS, since nobody lists them."""
