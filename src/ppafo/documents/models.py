@@ -152,6 +152,8 @@ def _wrong_name(spot: _Spot, detail: ErrorDetails) -> str:
         return f"{table}: the name {quote(detail['input'])} must consist of letters, digits, '-' and '_'"
     if detail["ctx"]["pattern"] == QUANTITY:
         return f"{spot.path} = {quote(detail['input'])} does not start with a number; write for example '1.3 m/s'"
+    if detail["ctx"]["pattern"] == LABEL:
+        return f"{spot.path} = {quote(detail['input'])} must be a line of text without spaces around it"
     return f"{spot.path} = {quote(detail['input'])} must consist of lower-case letters, digits, '-' and '_'"
 
 
@@ -187,6 +189,9 @@ Model = TypeVar("Model", bound=BaseModel)
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """Pattern of the name of a set or scenario."""
+
+LABEL = r"^[^\x00-\x20\x7f-\xa0](?:[^\x00-\x1f\x7f-\x9f]*[^\x00-\x20\x7f-\xa0])?$"
+"""Pattern of a name that only people read: a line of text that neither begins nor ends with a space."""
 
 QUANTITY = r"^\s*[+-]?(\d|\.\d)"
 """Pattern of the start of a number with its unit."""

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 
 from ppafo.engine import loading
@@ -24,7 +23,7 @@ from ppafo.engine.cache.making import load_all
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import Effort
-from ppafo.engine.lanes import effort_for
+from ppafo.engine.lanes import Batch, effort_for
 from ppafo.errors import ProgramError
 from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
@@ -120,11 +119,15 @@ def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(
     assert made() == ["full", "quick"]
 
 
-def test_a_run_of_seconds_is_compiled_quickly_and_many_runs_are_not() -> None:
+def test_some_runs_of_seconds_are_compiled_quickly_and_many_runs_are_not() -> None:
     batch = plain_batch("torque-task-proportional")
-    twice = replace(batch, parameters=np.repeat(batch.parameters, 2, 1), states=np.repeat(batch.states, 2, 1))
+
+    def repeated(runs: int) -> Batch:
+        return replace(batch, parameters=batch.parameters.repeat(runs, 1), states=batch.states.repeat(runs, 1))
+
     hours = replace(batch, clock=replace(batch.clock, step_count=10_000_000))
-    assert [effort_for(each) for each in (batch, twice, hours)] == [Effort.QUICK, Effort.FULL, Effort.FULL]
+    efforts = [effort_for(each) for each in (batch, repeated(12), repeated(1000), hours)]
+    assert efforts == [Effort.QUICK, Effort.QUICK, Effort.FULL, Effort.FULL]
 
 
 @pytest.mark.parametrize(

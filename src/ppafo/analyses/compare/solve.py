@@ -11,6 +11,7 @@ from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
+from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import (
     CONFIDENCE,
     FEWEST_DRAWS,
@@ -26,8 +27,6 @@ from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
 
 AS_WRITTEN = "as written"
 """Name of a configuration's task where no other task is requested."""
-DEFAULT_SEED = 1
-"""Seed of the draws of a comparison without a study."""
 DEFAULT_DRAWS = 4096
 """Draws of the uncertain values unless given."""
 _SAME = 1.0e-9

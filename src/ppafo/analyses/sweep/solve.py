@@ -37,7 +37,7 @@ from ppafo.storage.places import place_at
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
-from ppafo.studies.study import Study
+from ppafo.studies.study import Study, check_can_be_swept
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import RunCounter, joined
@@ -243,6 +243,7 @@ def sweep(
     """
     name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)
+    check_can_be_swept(chosen)
     if scheduler is not None:
         from ppafo.analyses.sweep.cluster import check_scheduler
 

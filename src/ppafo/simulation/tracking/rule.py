@@ -165,7 +165,9 @@ def settled_task(scenario: Scenario, recording: Recording) -> SettledPart:
     # A joint that is moved disturbs the loop of a torque or a pressure all the time, as a moving reference does.
     is_angle = scenario.controlled == ANGLE
     rests = rests and (is_angle or float(np.ptp(recording["angle"][samples])) <= MOVED_JOINT)
-    turns = reversals(np.asarray(error, dtype=np.float64), OSCILLATION_THRESHOLD * wanted)
+    # An error behind a reference that turns turns with it.
+    turns = reversals(error, OSCILLATION_THRESHOLD * wanted)
+    turns -= 0 if rests else reversals(np.asarray(reference[samples]), OSCILLATION_THRESHOLD * wanted)
     return SettledPart(
         samples=samples,
         duration=float(time[-1] - time[samples][0]),

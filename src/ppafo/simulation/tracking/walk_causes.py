@@ -17,9 +17,9 @@ _ANGLES_OF_WALK = 400
 """Samples of a walk at which the reach is compared with the request."""
 
 
-def cause_of_walk(case: Case) -> TrackingCause:
-    """First cause that applies to a walk."""
-    return next(cause for find in _OF_WALK if (cause := find(case)) is not None)
+def causes_of_walk(case: Case) -> tuple[TrackingCause, ...]:
+    """Causes that apply to a walk, the surest first."""
+    return tuple(cause for find in _OF_WALK if (cause := find(case)) is not None)
 
 
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
