@@ -1,5 +1,6 @@
 """A tuning as a finding: gains and metrics before and after, how the search went, and lines to paste."""
 
+import json
 import math
 import shlex
 from collections.abc import Mapping, Sequence
@@ -207,7 +208,7 @@ def _tuned(
 
 
 def _options(tuned: Tuned) -> str:
-    return " ".join(f'--set "{line}"' for line in tuned.overrides)
+    return " ".join(f"--set {shlex.quote(line)}" for line in tuned.overrides)
 
 
 def _command(tuned: Tuned) -> str:
@@ -223,7 +224,8 @@ def _named(scenario: Scenario) -> str:
 
 def _pasted(tuned: Tuned) -> str:
     """Return the gains found to paste on a command line, into a study file and into Python."""
-    listed = ", ".join(f'"{line}"' for line in tuned.overrides)
+    # Texts of TOML and of Python alike.
+    listed = ", ".join(json.dumps(line, ensure_ascii=False) for line in tuned.overrides)
     call = tuned.problem.scenario.motion.motion_kind.python_call(_named(tuned.problem.scenario), listed)
     return (
         f"# {tuned.verdict}\n\n# on the command line\n{_options(tuned)}\n\n# in a study file\n"
