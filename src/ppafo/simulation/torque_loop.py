@@ -444,6 +444,7 @@ _OF_LOOP: dict[str, Callable[[TorqueLoop], float]] = {
 _OF_REACH: dict[str, Callable[[float], float]] = {
     torque_loop.DEAD_ZONE: torque_loop.dead_zone,
     torque_loop.RELEASE: torque_loop.release,
+    torque_loop.REACH: torque_loop.whole_reach,
 }
 """Rule of each number that follows the torque reach of a device."""
 

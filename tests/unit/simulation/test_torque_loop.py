@@ -88,6 +88,17 @@ def test_a_dead_zone_that_nobody_gives_is_a_share_of_what_the_device_reaches() -
     assert given.controller.dead_zone == 0.4
 
 
+def test_a_walk_asks_for_no_more_torque_than_its_device_reaches() -> None:
+    """The paper's walks state 5 N m; one that does not has what its own actuator gives."""
+    pair = ("controller.kind=event_on_off", "device.valve=solenoid")
+    cylinder = ("controller.kind=pid", "device.valve=proportional", "device.set=cylinder-lever")
+    for changes in (pair, (*pair, *SMALL_AIR[:-1]), cylinder):
+        mine = load_walk("off", changes)
+        _, reach = torque_reach(mine.device, 0.5 * math.pi)
+        assert mine.controller.settings["largest_torque"] == pytest.approx(reach, rel=1e-6)
+    assert {load_walk(name).controller.settings["largest_torque"] for name in ("proportional", "solenoid")} == {5.0}
+
+
 def test_a_gain_is_the_same_through_every_door() -> None:
     walk = load_walk("proportional", ["controller.kind=pid"])
     small = load_walk("proportional", ["controller.kind=pid", "valve.delay=5 ms", "supply.pressure=70 psi_g"])

@@ -68,7 +68,7 @@ _VIEW = (-0.62, 0.62, -0.12, 0.78)
 _TICK = 0.35
 """Distance of the marks on the ground [m]."""
 
-_CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1.colour), ("pressure_2", "dorsiflexion", CHAMBER_2.colour))
+_CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
 """Channel, name and colour of each chamber."""
 
 _VALVE = {0: ("closed", "#ffffff"), 1: ("plantarflexion", "#8fbfe0"), -1: ("dorsiflexion", "#f0b48a")}
@@ -326,9 +326,10 @@ def _legs(axes: "Axes", result: WalkResult) -> None:
 
 def _pressures(axes: "Axes", result: WalkResult) -> None:
     atmosphere = result.scenario.device.supply.atmospheric_pressure
-    for channel, name, colour in _CHAMBERS:
+    for channel, name, look in _CHAMBERS:
         if channel in result.averages:
-            axes.plot(_PERCENT, display_values(result.averages[channel].mean, "pressure"), color=colour, label=name)
+            mean = display_values(result.averages[channel].mean, "pressure")
+            axes.plot(_PERCENT, mean, color=look.colour, linestyle=look.line, label=name)
     axes.axhline(display_value(atmosphere, "pressure"), color=GREY, linewidth=0.8)
     axes.set_ylabel(f"Chambers\n({axis_unit('pressure')})", rotation=0, ha="right", va="center")
     axes.yaxis.set_label_coords(-0.045, 0.5)
@@ -420,10 +421,11 @@ def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list
     worn, configuration = comparison.with_device, comparison.with_device.scenario
     fine = np.linspace(turns[0], turns[-1], 400)
     atmosphere = configuration.device.supply.atmospheric_pressure
-    for channel, name, colour in _CHAMBERS:
+    for channel, name, look in _CHAMBERS:
         times = fine * walk_of(configuration).gait.stride_time
         pressures = np.interp(times, worn.recording.time, worn.recording[channel])
-        traces.plot(fine - turns[0], display_values(pressures, "pressure"), color=colour, linewidth=1.3, label=name)
+        shown = display_values(pressures, "pressure")
+        traces.plot(fine - turns[0], shown, color=look.colour, linestyle=look.line, linewidth=1.3, label=name)
     traces.set_xlim(0.0, turns[-1] - turns[0])
     least = display_value(atmosphere + 10.0 * PASCALS_PER_PSI, "pressure")
     traces.set_ylim(top=max(least, traces.get_ylim()[1]))
