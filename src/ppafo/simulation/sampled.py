@@ -12,7 +12,6 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
-from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
@@ -148,8 +147,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
                 pressure_2=pressure_2,
                 torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
-        seen = measure(sensors, angle, pressure_1, pressure_2, plant, sample)
-        return measurement_of(actuator, plant, seen)
+        return measure(sensors, angle, pressure_1, pressure_2, plant, sample, parts=program.functions)
 
     return see
 
@@ -184,9 +182,10 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
                 heel_force=heel,
                 toe_force=toe,
             )
+        time, functions = sample * period, program.functions
         seen, last = measure_gait(
-            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, sample * period, sample
+            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, time, sample, parts=functions
         )
-        return measurement_of(actuator, plant, seen)
+        return seen
 
     return see
