@@ -45,7 +45,7 @@ def link_program(program: Program, collector: LinkCollector) -> None:
     if program.leg is not None:
         of_walk = program.leg.links(program)
         collector.links.update(of_walk)
-        collector.effects.update({function: program.leg.ASKED[function] for function in of_walk.values()})
+        collector.effects.update(dict.fromkeys(of_walk.values(), program.leg.ASKED))
     followed = CONTROLLED[program.controlled]
     if program.controlled != TORQUE:
         collector.links[controlled] = followed.value

@@ -10,7 +10,8 @@ from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
 from ppafo.exports import c_library
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation, PreparedLane, set_laws
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation, PreparedLane, start
 from ppafo.loading import load_scenario
 from ppafo.simulation.plan import plan_runs
 
@@ -52,8 +53,8 @@ def test_a_library_prepares_a_run_with_the_numbers_that_python_plans(name: str, 
 
 
 def test_a_number_that_no_function_prepares_is_named_with_its_group(monkeypatch: pytest.MonkeyPatch) -> None:
-    without_laws = tuple(function for function in VANE_PREPARATION if function is not set_laws)
-    monkeypatch.setattr(c_library, "VANE_PREPARATION", without_laws)
-    said = r"preparation\.py:\d+: no function of preparation sets 'lane\.valve', a IdealProportional of the program"
+    unstarted = tuple(function for function in VANE_PREPARATION if function is not start)
+    monkeypatch.setattr(c_library, "VANE_PREPARATION", unstarted)
+    said = r"preparation\.py:\d+: no function of preparation sets 'lane\.result', a LaneResult of the program"
     with pytest.raises(ProgramError, match=said):
-        library_of(load_scenario("torque-task-proportional"))
+        library_files(library_of(load_scenario("torque-task-proportional")))
