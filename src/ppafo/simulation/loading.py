@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.documents.models import all_problems, is_gap, is_unknown_kind
+from ppafo.documents.problems import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.controlled import CONTROLLED, TORQUE
