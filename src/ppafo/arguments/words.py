@@ -141,9 +141,9 @@ class NumberWithUnit(float):
         given.unit = unit
         return given
 
-    def __getnewargs__(self) -> tuple[float, str]:
+    def __reduce__(self) -> tuple[Any, ...]:
         """Return what a copy is made of."""
-        return float(self), self.unit
+        return NumberWithUnit, (float(self), self.unit)
 
 
 def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
