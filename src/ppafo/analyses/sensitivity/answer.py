@@ -34,12 +34,14 @@ _CAPTION = (
 def finding_of(influences: Influences) -> Finding[Influences]:
     """Return the indices in words, a table and two panels for each metric."""
     settings, method = influences.settings, METHODS[influences.method]
-    said = (
+    said = [
         f"{influences.study}: {influences.method}, {settings.samples:,} {method.sizes_label}, {influences.runs:,} runs "
         f"of {len(influences.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
         f"{influences.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
-    )
+    ]
+    if influences.not_following:
+        said.append(f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too")
     figure = Section(
         "Indices and their convergence",
         panels=partial(_panels, influences),
@@ -55,7 +57,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         name="sensitivity",
         kicker="Sensitivity",
         title=f"What matters in {influences.study}",
-        said=said,
+        said=tuple(said),
         parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
         found=influences,
     )

@@ -18,6 +18,7 @@ from ppafo.documents.json_text import plain
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
+from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.studies.distributions import Floats, floored_interval, noise_interval
 from ppafo.studies.draws import REPLICATES, Columns, Uncertainty, atmosphere_of, check_metrics, drawn_in
 from ppafo.studies.sampling import with_new_noise
@@ -54,15 +55,33 @@ def estimate(
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[StatisticEstimate]:
-    """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
+    """Statistic of a metric over the distributions of a study, drawn until its confidence interval is narrow enough.
 
-    ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a fraction of its value
-    (default ``1 %``) or a difference with its unit (``0.01 N m``; for a probability a number, 0.02). Draws are
-    those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a mean, else
-    independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
-    StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
+    The sampling method of the study is not used: a mean takes randomised Sobol replicates, other statistics take
+    independent draws.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Arguments:
+        study: a study, its name, its file or its content
+        metric: name of the metric
+        statistic: ``mean``, ``quantile 0.95``, ``probability above 3 N m`` or ``probability below 3 N m``
+        width: target width of the interval: ``1 %`` of the value (default), ``0.01 N m``, or 0.02 for a probability
+        also: further metrics, whose means over the same draws are given
+        configuration: configuration of the study, needed if it has several
+        first_draws: draws before the first estimate
+        overrides: changes of every configuration, as texts or a dictionary
+        draws: maximum number of draws
+        seed: random seed; default: the study's
+        confidence: confidence of the interval
+        maximum_failed: fraction of the runs that may fail before the study is refused
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with the Progress of the draws
+
+    Returns:
+        Finding with the estimate, its interval and the draws that it took
+
+    Raises:
+        StudyError: a study or setting that cannot be used, or too many failed runs
 
     >>> import ppafo
     >>> study = "torque-task-uncertainty"
@@ -77,6 +96,7 @@ def estimate(
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)
     rule = stopping_rule(what, metric, asked, StoppingRule(1.0, False, first_draws, draws, confidence, maximum_failed))
+    tell_coarse_pairs([base.scenario])
     runs = Runs(base.scenario, wanted, RunCounter(rule.first, progress), uncertainty.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
         first = chosen.sample.seed if seed is None else seed

@@ -36,7 +36,7 @@ _CHANNELS = {
 """Panels from top to bottom, and the channels in each of them that are drawn for every walk."""
 
 
-class MeanStrideData(Protocol):
+class _MeanStrideData(Protocol):
     """A walk as its figure of the mean stride needs it."""
 
     @property
@@ -56,7 +56,7 @@ class MeanStrideData(Protocol):
         """Numbers of the whole walk."""
 
 
-def walk_figure(walks: Mapping[str, MeanStrideData]) -> "Figure":
+def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
     """Return the mean stride of one or two walks of the same wearer by name, and the healthy gait beside them."""
     first = next(iter(walks.values()))
     gait = walk_of(first.scenario).gait
