@@ -6,6 +6,8 @@ Child processes are timed, or time themselves; none of them outlives the benchma
 import os
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,11 +19,12 @@ PATIENCE = 900.0
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """Exit code, standard output and the last line of standard error of a child."""
+    """Exit code, standard output and last line of standard error of a child, and when its output began [s]."""
 
     code: int
     output: str
     complaint: str
+    first: float = 0.0
 
 
 def run_python(arguments: Sequence[str], environment: Mapping[str, str]) -> Outcome:
@@ -29,20 +32,35 @@ def run_python(arguments: Sequence[str], environment: Mapping[str, str]) -> Outc
 
     It gets a session of its own so that Ctrl-C reaches only the benchmark, which then ends it.
     """
-    try:
-        done = subprocess.run(
+    start = time.perf_counter()
+    with (
+        tempfile.TemporaryFile("w+", encoding="utf-8") as complaints,
+        subprocess.Popen(
             [sys.executable, *arguments],
             env={**os.environ, **environment},
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=complaints,
             text=True,
-            timeout=PATIENCE,
-            check=False,
             start_new_session=True,
-        )
-    except subprocess.TimeoutExpired:
+        ) as process,
+    ):
+        assert process.stdout is not None
+        patience = threading.Timer(PATIENCE, process.kill)
+        patience.start()
+        try:
+            begun = process.stdout.read(1)
+            first = time.perf_counter() - start
+            output = begun + process.stdout.read()
+            code = process.wait()
+        finally:
+            is_late = not patience.is_alive()
+            patience.cancel()
+            process.kill()
+        complaints.seek(0)
+        lines = complaints.read().strip().splitlines()
+    if is_late:
         return Outcome(1, "", f"no answer after {PATIENCE:.0f} s")
-    lines = done.stderr.strip().splitlines()
-    return Outcome(done.returncode, done.stdout, lines[-1] if lines else f"exit code {done.returncode}")
+    return Outcome(code, output, lines[-1] if lines else f"exit code {code}", first)
 
 
 @dataclass(frozen=True, slots=True)

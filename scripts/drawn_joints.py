@@ -32,6 +32,8 @@ _BAND = 1.25
 """Factor about a limit within which a run is neither good nor failing."""
 _MEAN, _MEAN_OF_PAIR, _HALF_RANGE, _HALF_RANGE_OF_PAIR, _MOVING = 0.05, 0.15, 0.1, 0.45, 0.3
 """Limits over the wanted change: mean error, half range of the error, RMS error of a moving one of a pair."""
+_FARTHEST, _FARTHEST_SHARE, _SWING, _SWING_SHARE = math.radians(2.0), 0.05, math.radians(1.0), 0.03
+"""Largest error of an angle, and range of that of one at rest [rad], or shares of the range of the reference."""
 _TURNS = 15.0
 """Reversals of the command a second, from more than half open to more than half open, of a loop that fails."""
 
@@ -266,6 +268,12 @@ def judge(result: Result, only_switches: bool) -> str:
             measure = max(abs(float(np.mean(error))) / _MEAN_OF_PAIR, half / _HALF_RANGE_OF_PAIR)
         else:
             measure = max(mean / _MEAN, half / _HALF_RANGE)
+    if of == "angle":
+        way = max(change, float(np.ptp(reference)))
+        farthest = change * float(np.max(np.abs(error))) / max(_FARTHEST, _FARTHEST_SHARE * way)
+        swing = change * float(np.ptp(error)) / max(_SWING, _SWING_SHARE * way)
+        is_moving = np.ptp(reference[last]) > 0.02 * change
+        measure = max(measure, farthest, 0.0 if is_moving else swing)
     command = recording["command"][last]
     open_ways = np.sign(command[np.abs(command) > 0.5])
     turns = np.count_nonzero(np.diff(open_ways)) / float(np.ptp(recording.time[last][[0, -1]]))

@@ -80,32 +80,37 @@ def most_reversals(scenario: Scenario) -> float:
 def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     """Return a verdict with the first of its remedies that lets the run follow, from runs with each, side by side.
 
-    They are given as the overrides that the verdict prints; a walk is tried on its first strides. Where none lets it
-    follow, it is the one that leaves the least error, if that is less than half.
+    They are given as the overrides that the verdict prints; a walk is tried on its first strides. Where none of the
+    surest cause lets it follow, a remedy of another names that one as the cause. Where none does, it is the one that
+    leaves the least error, if that is less than half.
     """
-    if verdict is None or verdict.accepted or not verdict.remedies:
+    if verdict is None or verdict.accepted:
+        return verdict
+    causes = [(verdict.cause, remedy) for remedy in verdict.remedies]
+    causes += [(other.text, remedy) for other in verdict.others for remedy in other.remedies]
+    if not causes:
         return verdict
     from ppafo.simulation.tracking.remedies import change_text
 
     # What was changed in Python would be lost with overrides.
     is_of_file = replace(reloaded(scenario, ()), run=scenario.run) == scenario
-    candidates: list[tuple[Remedy, Scenario]] = []
-    for remedy in verdict.remedies[:MOST_TRIED]:
+    candidates: list[tuple[str, Remedy, Scenario]] = []
+    for cause, remedy in causes[:MOST_TRIED]:
         with contextlib.suppress(PpafoError):
             again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
-            candidates.append((remedy, replace(again, run=_trial_run(scenario))))
+            candidates.append((cause, remedy, replace(again, run=_trial_run(scenario))))
     try:
-        results = of_loaded.simulate_many([candidate for _, candidate in candidates])
+        results = of_loaded.simulate_many([candidate for *_, candidate in candidates])
     except PpafoError:
         return verdict
     best: tuple[Remedy, float] | None = None
-    for (remedy, _), result in zip(candidates, results, strict=True):
+    for (cause, remedy, _), result in zip(candidates, results, strict=True):
         left = result.tracking
         if not result.status.is_completed:
             continue
         if left is None:
-            return replace(verdict, tried=f"with {remedy.text} it does, as a further run shows")
-        if left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
+            return replace(verdict, cause=cause, tried=f"with {remedy.text} it does, as a further run shows")
+        if cause == verdict.cause and left.error < 0.5 * verdict.error and (best is None or left.error < best[1]):
             best = (remedy, left.error)
     if best is not None:
         with shown_in(verdict.units):
@@ -113,6 +118,8 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
         left_text = f"an RMS error of {error} is left{verdict.time_text}"
         return replace(verdict, tried=f"with {best[0].text} {left_text}, as a further run shows")
     names = ", ".join(dict.fromkeys(path for remedy in verdict.remedies for path in remedy.numbers))
+    if not names:
+        return verdict
     advice = f"{verdict.advice}; " if verdict.advice else ""
     return replace(verdict, tried=f"{advice}other {names} alone did not mend it")
 

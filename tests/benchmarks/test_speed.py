@@ -1,5 +1,6 @@
 import argparse
 import json
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -132,16 +133,23 @@ def test_the_metrics_that_are_timed_are_those_of_the_single_runs():
 def test_a_command_that_fails_at_the_start_is_not_measured(monkeypatch):
     monkeypatch.setattr(start_up, "ENTRY", ("-c", "import sys; sys.exit('no such thing')"))
     lines = start_up.measure_start_up(1, 1, silent)
-    assert [line.value for line in lines] == [None, None, None]
+    assert [line.value for line in lines] == [None] * 5
     assert "no such thing" in lines[0].note
 
 
 def test_the_help_of_the_command_line_is_timed(monkeypatch):
     monkeypatch.setattr(start_up, "SCENARIO", "there-is-no-such-scenario")
-    help_line, first, later = start_up.measure_start_up(1, 2, silent)
+    help_line, *simulations = start_up.measure_start_up(1, 2, silent)
     assert help_line.value > 0.0
-    assert first.value is None
-    assert later.value is None
+    assert [line.value for line in simulations] == [None] * 4
+
+
+def test_the_first_output_of_a_child_is_timed_apart_from_its_end():
+    late = "import time; print(1, flush=True); time.sleep(1.0); print(2)"
+    start = time.perf_counter()
+    outcome = run_python(["-c", late], {})
+    assert outcome.output == "1\n2\n"
+    assert 0.0 < outcome.first < time.perf_counter() - start - 0.9
 
 
 def test_a_child_reports_its_exit_code_output_and_last_complaint():

@@ -15,8 +15,10 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.engine.source_text import SourceCollector
 from ppafo.metrics import METRICS
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.sensors import (
@@ -129,6 +131,8 @@ def sensors(draw: random.Random) -> Iterator[Entry]:
         *(fault, Fault(0.01, 0.0, 0.0, 1.0, 0.8, 5.0, 90.0, 0.3, 0.7, 0.2, 0.02), *(Fault(9.0, 0.0, 1.0),) * 2),
         Fault(0.03, 0.0, 2e5),
     )
+    seen = made_of(measure, "measure", VANE_FUNCTIONS)
+    seen_in_gait = made_of(measure_gait, "measure_gait", VANE_FUNCTIONS)
     shown, plant = GaitSeen(*(0.0,) * 8), plant_parameters(load_device("ppafo2011"))
     readings, walking = [], []
     for sample in range(50):
@@ -137,9 +141,9 @@ def sensors(draw: random.Random) -> Iterator[Entry]:
         walking.append(
             (noisy, gait, shown, *now, draw.uniform(0, 400), draw.uniform(0, 400), plant, 1e-3 * sample, sample)
         )
-        _, shown = measure_gait(*walking[-1])
-    yield Entry("measure", measure, readings)
-    yield Entry("measure_gait", measure_gait, walking)
+        _, shown = seen_in_gait(*walking[-1])
+    yield Entry("measure", seen, readings)
+    yield Entry("measure_gait", seen_in_gait, walking)
 
 
 def effects(draw: random.Random) -> Iterator[Entry]:

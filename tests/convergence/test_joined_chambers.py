@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     begin_still_gas,
@@ -70,7 +71,7 @@ def stepped(*overrides: str) -> Course:
     valve, coils = solenoid_recycling.prepare(valve_settings(device.valve)), solenoid_recycling.RecyclingState()
     angle = math.radians(75.0)
     state = state_with_volumes(plant, angle, 0.0, *chamber_volumes(plant, angle), ROOM, ROOM)
-    held = held_chambers(plant, state.angle)
+    held = held_chambers(plant, state.angle, parts=VANE_FUNCTIONS)
     rows = []
     for number in range(round(0.6 / STEP) + 1):
         time = number * STEP
@@ -168,8 +169,8 @@ def test_gas_that_a_joint_carries_is_that_of_a_leak_of_its_size() -> None:
     closed = Openings(source_1=0.0, vent_1=0.0, source_2=0.0, vent_2=0.0)
     contents, masses = (3.0e-4, 1.0e-4), (2.5e-4, 1.1e-4)
     given = (closed, contents, masses, math.radians(75.0), 0.0)
-    leaking = thermal_gas_rates(plant, thermal, wide, wide, *given)
-    tight = thermal_gas_rates(plant, thermal, wide, shut, *given)
+    leaking = thermal_gas_rates(plant, thermal, wide, wide, *given, parts=VANE_FUNCTIONS)
+    tight = thermal_gas_rates(plant, thermal, wide, shut, *given, parts=VANE_FUNCTIONS)
     pressures = chamber_pressures(plant, math.radians(75.0), *contents)
     warmths = (contents[0] / masses[0], contents[1] / masses[1])
     assert joined_thermal_rates(tight, thermal, wide, 1.0, *pressures, *warmths) == pytest.approx(leaking, rel=1e-12)

@@ -15,16 +15,16 @@ from ppafo.engine.rows import leaf_paths, row_expression
 from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.engine.step.lane import NoParameters
-from ppafo.model.actuators.vane import chambers
+from ppafo.model.binding import made_of
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.leg import FootLoad
 from ppafo.model.orifice import ExactOrifice, exact_flow
 from ppafo.model.plant import (
+    ActuatorFunctions,
     Openings,
     PlantParameters,
     ThermalParameters,
     admitted_flow,
-    chamber_pressures,
     chamber_volumes,
 )
 from ppafo.model.ports import exhaust_path, leakage_path, supply_path
@@ -131,14 +131,16 @@ def thermal_gas_rates(
     masses: tuple[float, float],
     angle: float,
     angular_velocity: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> ThermalGasRates:
     """All rates of gas with an energy balance [kg/s]; contents as in ``PlantState``. Equations (3), (6) to (9)."""
     source_pressure_1, source_pressure_2 = plant.supply_pressure, plant.dorsiflexion_pressure
     room, full = plant.atmospheric_pressure, valve_orifice.conductance
-    pressure_1, pressure_2 = chamber_pressures(plant, angle, contents[0], contents[1])
-    here = chambers(plant, angle, pressure_1, pressure_2)
-    less = chambers(plant, angle - NEAR, pressure_1, pressure_2)
-    more = chambers(plant, angle + NEAR, pressure_1, pressure_2)
+    pressure_1, pressure_2 = parts.pressures(plant, angle, contents[0], contents[1])
+    here = parts.chambers(plant, angle, pressure_1, pressure_2)
+    less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
+    more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
     warmth_1, warmth_2 = contents[0] / masses[0], contents[1] / masses[1]
     supply_1 = exact_flow(source_pressure_1, pressure_1, supply_path(openings.source_1 * full), valve_orifice)
     supply_2 = exact_flow(source_pressure_2, pressure_2, supply_path(openings.source_2 * full), valve_orifice)
@@ -299,14 +301,15 @@ def slope_lines(program: Program, collector: SourceCollector) -> list[str]:
     add = collector.add
     lines = [
         f"openings = {add(program.valve.instant)}(valve, valve_state, command)",
-        f"pressure_1, pressure_2 = {add(chamber_pressures)}(plant, angle, y[2], y[3])",
+        f"pressure_1, pressure_2 = {add(program.actuator.pressures)}(plant, angle, y[2], y[3])",
         *gas_lines(program, add),
         "slopes[4] = gas.supplied",
         "slopes[5] = gas.vented",
         "slopes[6] = gas.leaked",
     ]
     if program.angle is None:
-        moved = f"{add(free_motion)}(plant, y[0], y[1], pressure_1, pressure_2, added, way)"
+        motion = add(made_of(free_motion, "free_motion", program.functions))
+        moved = f"{motion}(plant, y[0], y[1], pressure_1, pressure_2, added, way)"
         lines += [f"added = {torque_of_leg(program, collector)}", f"slopes[0], slopes[1] = {moved}"]
     else:
         lines += ["slopes[0] = 0.0", "slopes[1] = 0.0"]
@@ -341,8 +344,9 @@ def gas_lines(program: Program, add: Callable[..., str]) -> list[str]:
     if joint is not None:
         across = "valve_orifice, joined, pressure_1, pressure_2, y[2] / y[7], y[3] / y[8]"
         joined.append(f"gas = {add(joined_thermal_rates)}(gas, thermal, {across})")
+    rates_of = add(made_of(thermal_gas_rates, "thermal_gas_rates", program.functions))
     return [
-        f"gas = {add(thermal_gas_rates)}(plant, thermal, {orifices}, {given})",
+        f"gas = {rates_of}(plant, thermal, {orifices}, {given})",
         *joined,
         "slopes[2] = gas.content_1",
         "slopes[3] = gas.content_2",

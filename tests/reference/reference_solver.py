@@ -23,13 +23,12 @@ from ppafo.engine.continuous_time import (
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import BatchResult, run_batch, samples_in
-from ppafo.engine.loading import load_source
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run, batch_of, states_at_start
-from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import SimulationError
 from ppafo.model.ports import at_valve, friction_at_rest, shown_signals
 from ppafo.model.sensors import Measurement, measure
+from tests.interpreted import load_source
 from tests.reference.reference_slopes import (
     PLANT_UNKNOWNS,
     gas_unknowns,
@@ -97,7 +96,7 @@ class SampledControl:
                 pressure_2=pressure_2,
                 torque=run.program.actuator.torque(run.plant, angle, pressure_1, pressure_2),
             )
-        return measurement_of(run.program.actuator, run.plant, measure(run.sensors, *signals, run.plant, sample))
+        return measure(run.sensors, *signals, run.plant, sample, parts=run.program.functions)
 
 
 Floats = NDArray[np.float64]

@@ -44,6 +44,7 @@ STIFFENED = 1.7
 LOAD_PERIODS = 4.0
 """Time constant of the observed load over 1/w: a quicker observer makes the loop swing."""
 LEAST_TOLERANCE = math.radians(0.5)
+"""rad: about the play of an orthosis on its wearer, whatever moves it."""
 STEPS_OF_TOLERANCE = 2.0
 """Resolutions of the angle sensor that a tolerance is at least; and as many standard deviations of its noise, twice."""
 NOISE_IN_FILTER = 6.0

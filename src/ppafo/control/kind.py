@@ -51,6 +51,7 @@ NOMINAL = {
         "line_largest_flow_2",
         "line_volume_2",
         "line_relieving",
+        "converter_range",
     )
 }
 """Device numbers that the default of a model-based controller's setting may follow, by their name in the model.

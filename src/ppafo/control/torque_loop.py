@@ -32,6 +32,7 @@ CONVERGENCE = "convergence rate of the torque loop"
 OPENING = "opening of the torque loop"
 DEAD_ZONE = "dead zone of the torque loop"
 RELEASE = "release of the torque loop"
+REACH = "torque reach of the device"
 LEARNING_GAIN = "learning gain of the torque loop"
 LEAD = "lead of the torque loop"
 """Names of the loop's numbers that the default of a setting may follow; the functions below compute them."""
@@ -104,6 +105,11 @@ def convergence_rate(loop: TorqueLoop) -> float:
 def dead_zone_opening(loop: TorqueLoop, dead_zone: float) -> float:
     """Opening [-] of a law with a dead zone [N m]: with it the torque does not pass the zone in the dead time."""
     return min(LARGEST_OPENING, dead_zone / torque_in_dead_time(loop))
+
+
+def whole_reach(reach: float) -> float:
+    """Torque reach of an actuator [N m], all of which a law may ask for."""
+    return reach
 
 
 def dead_zone(reach: float) -> float:

@@ -14,8 +14,8 @@ from ppafo.engine.scheme.pneumatics import StageFlows, plant_with_leak_at, stage
 from ppafo.engine.scheme.real_gas import content_rate
 from ppafo.engine.scheme.thermal_gas import WarmChambers, thermal_flows
 from ppafo.model.actuators.kind import Chambers
-from ppafo.model.actuators.vane import chambers
 from ppafo.model.plant import (
+    ActuatorFunctions,
     Openings,
     PlantParameters,
     PlantState,
@@ -58,14 +58,20 @@ class TurningChambers(NamedTuple):
 
 
 def turning_chambers(
-    plant: PlantParameters, angle: float, angular_velocity: float, pressure_1: float, pressure_2: float
+    plant: PlantParameters,
+    angle: float,
+    angular_velocity: float,
+    pressure_1: float,
+    pressure_2: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> TurningChambers:
     """Both chambers at an angle [rad], its rate [rad/s] and absolute pressures [Pa]. Equations (4), (5)."""
-    less = chambers(plant, angle - NEAR, pressure_1, pressure_2)
-    more = chambers(plant, angle + NEAR, pressure_1, pressure_2)
+    less = parts.chambers(plant, angle - NEAR, pressure_1, pressure_2)
+    more = parts.chambers(plant, angle + NEAR, pressure_1, pressure_2)
     per_angle = angular_velocity / (2.0 * NEAR)
     return TurningChambers(
-        now=chambers(plant, angle, pressure_1, pressure_2),
+        now=parts.chambers(plant, angle, pressure_1, pressure_2),
         growth_1=(more.volume_1 - less.volume_1) * per_angle,
         growth_2=(more.volume_2 - less.volume_2) * per_angle,
     )
@@ -172,6 +178,8 @@ def free_motion(
     pressure_2: float,
     added_torque: float,
     way: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[float, float]:
     """Slopes of angle [rad/s] and angular velocity [rad/s^2] of a vane that slides towards ``way`` (0: it sticks).
 
@@ -179,7 +187,7 @@ def free_motion(
     """
     if way == 0.0:
         return 0.0, 0.0
-    torque = driving_torque(plant, angle, pressure_1, pressure_2) + added_torque
+    torque = driving_torque(plant, angle, pressure_1, pressure_2, parts=parts) + added_torque
     friction = way * friction_in_motion(plant.dynamic_torque, angular_velocity, pressure_1, pressure_2)
     return angular_velocity, vane_acceleration(
         torque, friction, plant.viscous_damping, plant.inertia, angle, angular_velocity
@@ -195,7 +203,7 @@ def torque_at_rest(run: Run) -> Callable[[Mapping[str, Any], float, float, float
     driving = in_program(driving_torque, program, run.effects)
 
     def torque(states: Mapping[str, Any], time: float, angle: float, pressure_1: float, pressure_2: float) -> float:
-        alone: float = driving(states, run.plant, angle, pressure_1, pressure_2)
+        alone: float = driving(states, run.plant, angle, pressure_1, pressure_2, parts=program.functions)
         return alone if run.leg is None else alone + torque_of_leg(program, run.leg, time, angle)
 
     return torque

@@ -27,7 +27,7 @@ from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import parse_module
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaves, rebuilt
-from ppafo.engine.source_text import COMPILED_BUILTINS
+from ppafo.engine.source_text import COMPILED_BUILTINS, MadeFrom, Read
 from ppafo.errors import ProgramError
 from ppafo.model.binding import is_made_of
 from ppafo.model.declaration import PlainFunction
@@ -58,21 +58,24 @@ class PythonFunctions:
     ) -> None:
         self._links, self._effects, self._rows, self._operations = links, effects, rows, operations
         self._made: dict[Any, Any] = {}
+        self.made_from = MadeFrom()
 
     def parts(self, program: Program) -> Any:
         """All that a program says of itself, worked out once."""
         names = [name for name in dir(program) if not name.startswith("_")]
         values = {name: getattr(program, name) for name in names}
-        return SimpleNamespace(**{name: self._part(value) for name, value in values.items()})
+        return SimpleNamespace(**{name: self.part(value) for name, value in values.items()})
 
-    def _part(self, value: Any) -> Any:
-        """A part of a program, with the functions that stand for its own."""
+    def part(self, value: Any) -> Any:
+        """A part of a program or an argument, with the functions that stand for its own."""
         if isinstance(value, FunctionType | ModuleType):
             return self.of(value)
         if isinstance(value, Mapping):
-            return {key: self._part(part) for key, part in value.items()}
+            return {key: self.part(part) for key, part in value.items()}
+        if is_made_of(value):
+            return type(value)(*map(self.part, value))
         if is_dataclass(value) and not isinstance(value, type):
-            changed = {part.name: self._part(getattr(value, part.name)) for part in fields(value) if part.init}
+            changed = {part.name: self.part(getattr(value, part.name)) for part in fields(value) if part.init}
             return replace(value, **changed)
         return value
 
@@ -104,6 +107,7 @@ class PythonFunctions:
             given = function.__globals__
             # A module has many more names than a function asks for.
             read = {name: given[name] for name in _names_of(function.__code__) if name in given}
+            self.made_from.reads += [Read(given, name, value) for name, value in read.items()]
             scope: dict[str, Any] = {"__builtins__": given["__builtins__"], "__name__": function.__module__}
             copied = FunctionType(code, scope, function.__name__, function.__defaults__, function.__closure__)
             rows = self._effects.get(function, ())
@@ -118,11 +122,7 @@ class PythonFunctions:
 
     def _named_defaults(self, function: FunctionType) -> dict[str, Any]:
         """Defaults of the parameters by name, and in its parts what the program has in the place of functions."""
-
-        def linked(part: Any) -> Any:
-            return type(part)(*map(linked, part)) if is_made_of(part) else self.of(part, function)
-
-        return {name: linked(value) for name, value in (function.__kwdefaults__ or {}).items()}
+        return {name: self.part(value) for name, value in (function.__kwdefaults__ or {}).items()}
 
     def _law(self, function: FunctionType, rows: tuple[str, ...]) -> PlainFunction:
         """Return the law of an effect, called as its port is, with the present rows of the effect."""
@@ -167,9 +167,9 @@ def in_program(
     rows = {effect.name: row for effect, row in zip(program.effects, effects, strict=True)}
     own = functions_of(program, rows, operations).of(function)
 
-    def called(states: Mapping[str, Any], *arguments: Any) -> Any:
+    def called(states: Mapping[str, Any], *arguments: Any, **named: Any) -> Any:
         rows.update(states)
-        return own(*arguments)
+        return own(*arguments, **named)
 
     return called
 
@@ -203,14 +203,40 @@ def over_samples(function: PlainFunction, *arguments: Any) -> Any:
 
     What is the same for all samples may stay one number.
     """
-    return _over_samples(lambda operations: PythonFunctions({}, {}, {}, operations).of(function), arguments)
+    return _over_samples(partial(_with_operations, function), arguments)
+
+
+def _with_operations(function: PlainFunction, operations: "Operations | None") -> PlainFunction:
+    """A function of the model with other operations, made anew where a name in it stands for something else by now."""
+    if operations is not COLUMNS:
+        own: PlainFunction = PythonFunctions({}, {}, {}, operations).of(function)
+        return own
+    functions, own = _for_columns(function)
+    if functions.made_from.is_current():
+        return own
+    _for_columns.cache_clear()
+    return _for_columns(function)[1]
+
+
+@lru_cache(maxsize=256)
+def _for_columns(function: PlainFunction) -> tuple[PythonFunctions, PlainFunction]:
+    functions = PythonFunctions({}, {}, {}, COLUMNS)
+    return functions, functions.of(function)
 
 
 def over_samples_in(
     program: Program, effects: Sequence[Any], function: PlainFunction, states: Mapping[str, Any], *arguments: Any
 ) -> Any:
     """Value of a function of the model as a program has it, with parameters and states of effects, over samples."""
+    if not _reaches_law(program, function):
+        return over_samples(function, *arguments)
     return _over_samples(partial(in_program, function, program, effects), (states, *arguments))
+
+
+@lru_cache(maxsize=256)
+def _reaches_law(program: Program, function: PlainFunction) -> bool:
+    """True where a law of an effect acts in a function."""
+    return functions_of(program, {}).of(function) is not function
 
 
 def _over_samples(make: Callable[[Operations | None], PlainFunction], arguments: Sequence[Any]) -> Any:
@@ -398,11 +424,6 @@ def quotient(dividend: float, divisor: float) -> float:
 def whole_part(value: float) -> int:
     """Return a number without its fraction; ``LOWEST_INTEGER`` for NaN and for what 64 bits do not hold."""
     return int(value) if LOWEST_INTEGER <= value < -LOWEST_INTEGER else LOWEST_INTEGER
-
-
-def power(base: float, exponent: float) -> float:
-    """Return a power as the C library has it: NaN for a root of a negative number, where Python's is complex."""
-    return float(MATH.pow(base, exponent))
 
 
 def _square_root(value: float) -> float:

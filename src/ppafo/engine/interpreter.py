@@ -1,6 +1,6 @@
 """The step run by Python itself: the same functions (``in_python.py``) over lanes, with the bits of compiled code."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,52 +15,62 @@ from ppafo.engine.step.lane import Lane
 Floats = NDArray[np.float64]
 
 
+Table = tuple[Mapping[str, Any], Floats]
+"""Groups by name, and the array (numbers, lanes) of their numbers."""
+
+
 class PythonProgram:
     """Pure-Python program with the interface of a compiled one."""
 
     def __init__(self, program: Program) -> None:
         self._program = program
 
-    def advance(
-        self,
-        states: Floats,
-        parameters: Floats,
-        signal_history: Floats,
-        command_history: Floats,
-        record: Floats,
-        trace: Floats,
-        *clock: Any,
-    ) -> None:
-        """Take all runs some steps further."""
-        arrays = (signal_history, command_history, record, trace)
-        # What was written before Python raised is as it was: the steps are done again from where they began.
-        before = [array.copy() for array in arrays[:2]]
-        try:
-            self._advanced(states, parameters, arrays, clock, None)
-        except (ArithmeticError, ValueError):
-            for array, kept in zip(arrays, before, strict=False):
-                array[:] = kept
-            self._advanced(states, parameters, arrays, clock, GOING_ON)
-
-    def _advanced(
-        self,
-        states: Floats,
-        parameters: Floats,
-        arrays: tuple[Floats, ...],
-        clock: tuple[Any, ...],
-        operations: Operations | None,
-    ) -> None:
-        """Run the loop over steps on lanes made of the rows, and write their states back.
-
-        With ``GOING_ON``, operations that Python refuses give what compiled code gets.
-        """
+    def advance(self, states: Floats, parameters: Floats, *arrays_and_clock: Any) -> None:
+        """Take all runs some steps further; arrays of histories and samples come before the numbers of the clock."""
         program = self._program
-        lanes = PythonLanes(program, states, parameters, *arrays)
+        tables = (program.state_rows(), states), (program.parameter_rows(), parameters)
+        run_lanes(program, loop.advance, tables, arrays_and_clock[:4], arrays_and_clock[4:])
+
+
+def run_lanes(
+    program: Program,
+    function: Callable[..., None],
+    tables: Sequence[Table],
+    histories: Sequence[Floats],
+    arguments: Sequence[Any],
+) -> None:
+    """Run a function of lanes, ``function(parts, lanes, *arguments)``, on tables that it changes.
+
+    The first table is the state of the runs; ``histories`` are signals, commands, samples and traces, as far as there
+    are any.
+    """
+
+    def run(operations: Operations | None) -> None:
+        lanes = PythonLanes(tables, *histories)
         linked = functions_of(program, lanes, operations)
         parts: Any = linked.parts(program)
-        linked.of(loop.advance)(parts, lanes, *clock)
-        for number, lane in enumerate(lanes.lanes):
-            states[:, number] = lanes.row_of(lane)
+        linked.of(function)(parts, lanes, *map(linked.part, arguments))
+        for groups, table in tables:
+            for number, lane in enumerate(lanes.lanes):
+                table[:, number] = _numbers_of(lane, groups)
+
+    # What was written before Python raised is as it was: all is done again from where it began.
+    before = [array.copy() for array in histories[:2]]
+    try:
+        run(None)
+    except (ArithmeticError, ValueError):
+        for array, kept in zip(histories, before, strict=False):
+            array[:] = kept
+        # Operations that Python refuses give what compiled code gets.
+        run(GOING_ON)
+
+
+def _numbers_of(lane: Lane, groups: Iterable[str]) -> list[float]:
+    return [value for name in groups for value in numbers(lane[name])]
+
+
+NONE = np.empty((0, 0, 0))
+"""A history or record without numbers."""
 
 
 class PythonLanes:
@@ -68,28 +78,29 @@ class PythonLanes:
 
     def __init__(
         self,
-        program: Program,
-        states: Floats,
-        parameters: Floats,
+        tables: Sequence[Table],
         signal_history: Floats,
-        command_history: Floats,
-        record: Floats,
-        trace: Floats,
+        command_history: Floats = NONE,
+        record: Floats = NONE,
+        trace: Floats = NONE,
     ) -> None:
-        self.groups, self.records, self.trace = program.state_rows(), record, trace
+        (self.groups, states), self.records, self.trace = tables[0], record, trace
         self.signal_history, self.command_history = signal_history, command_history
         # Lanes that only fill a vector repeat the last run.
         width = record.shape[2] if record.size else states.shape[1]
         self.lanes = [Lane() for _ in range(width)]
         self.now = self.lanes[0]
         for number, lane in enumerate(self.lanes):
-            for groups, table in ((self.groups, states), (program.parameter_rows(), parameters)):
+            for groups, table in tables:
                 start = 0
                 for name, row in groups.items():
                     count = len(leaf_paths(row, name))
                     lane[name] = rebuilt(row, table[start : start + count, number].tolist()) if count else ()
                     start += count
-            lane.trace, lane.command_history = trace[:, :, number], command_history[:, number]
+            if trace.size:
+                lane.trace = trace[:, :, number]
+            if command_history.size:
+                lane.command_history = command_history[:, number]
             lane.signal_history = signal_history[:, :, number]
 
     def __iter__(self) -> Iterator[Lane]:
@@ -102,14 +113,10 @@ class PythonLanes:
         """A group of the run that is gone through."""
         return self.now[name]
 
-    def row_of(self, lane: Lane) -> list[float]:
-        """The state of a lane as a row has it."""
-        return [value for name in self.groups for value in numbers(lane[name])]
-
     def record(self, index: int) -> None:
         """Keep the state of all runs as a sample."""
         for number, lane in enumerate(self.lanes):
-            self.records[index, :, number] = self.row_of(lane)
+            self.records[index, :, number] = _numbers_of(lane, self.groups)
 
     def set_aside(self) -> None:
         """Keep what lanes that wait get again: their state, and what the step was handed."""

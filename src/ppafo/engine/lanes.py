@@ -45,7 +45,7 @@ STEPS_PER_CALL = 10_000
 """Steps in one call of compiled code: some hundredths of a second, seconds where each step takes hundreds of parts."""
 
 QUICK_STEPS = 200_000
-"""Steps of one run up to which a program that is compiled quickly ends sooner: a second of either."""
+"""Steps of all runs up to which a program that is compiled quickly ends sooner: a second of either."""
 
 SIGNAL_ROWS = 5
 """Readings that may come late: angle and pressures, and in a walk two forces."""
@@ -111,7 +111,7 @@ class RunnableProgram(Protocol):
 
 def effort_for(batch: Batch) -> Effort:
     """Optimisation with which a batch by itself ends soonest where its program has yet to be compiled."""
-    is_short = batch.states.shape[1] == 1 and batch.clock.step_count <= QUICK_STEPS
+    is_short = batch.states.shape[1] * batch.clock.step_count <= QUICK_STEPS
     return Effort.QUICK if is_short else Effort.FULL
 
 

@@ -1,14 +1,14 @@
-"""Replacement of model functions in a program by those of its actuator, effects and components."""
+"""Laws of effects at their ports, and what else stands for a function of the model in a program."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
 from ppafo.engine.program import Program
-from ppafo.engine.scheme.actuators import links_of
 from ppafo.errors import ProgramError
 from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
+from ppafo.model.plant import PlantParameters
 from ppafo.model.valves.kind import valve_problem
 
 
@@ -32,10 +32,8 @@ def link_program(program: Program, collector: LinkCollector) -> None:
     problem = valve_problem(program.valve)
     if problem:
         raise ProgramError(f"valve: {problem}")
-    own = links_of(program.actuator)
-    collector.links.update(own)
-    if own:
-        collector.links.update(program.gas.IN_SHAPES)
+    if program.actuator.plant is not PlantParameters:
+        collector.links[PlantParameters, "_replace"] = program.actuator.plant
     if program.leg is not None:
         of_walk = program.leg.links(program)
         collector.links.update(of_walk)
@@ -53,20 +51,16 @@ def link_program(program: Program, collector: LinkCollector) -> None:
     for effect in program.effects:
         if taken & set(effect.rows):
             raise ProgramError(f"effect '{effect.name}': other rows of a program have this name; it needs another")
-    link_effects(program.effects, collector, own)
+    link_effects(program.effects, collector)
 
 
-def link_effects(effects: Sequence[Effect], collector: LinkCollector, own: Mapping[Any, Any] | None = None) -> None:
-    """Let a collector call the laws of effects at their ports, of which an actuator may have its ``own``.
-
-    ProgramError for an effect that cannot act.
-    """
+def link_effects(effects: Sequence[Effect], collector: LinkCollector) -> None:
+    """Let a collector call the laws of effects at their ports. ProgramError for an effect that cannot act."""
     for effect in effects:
         problem = effect_problem(effect)
         if problem:
             raise ProgramError(f"effect '{effect.name}': {problem}")
-    for key, stands in laws_in_order(effects).items():
-        collector.links[key] = (own or {}).get(stands, stands)
+    collector.links.update(laws_in_order(effects))
     for effect in effects:
         for law in effect.laws.values():
             # By the names of its parameters: a law says itself which structs it needs.

@@ -58,7 +58,7 @@ def _compilers(name: str, folder: Path | None) -> tuple[Compiler, ...]:
     if name not in ("", ANY_OF_C):
         allowed = (ANY_OF_C, *OFFERED, PYTHON)
         hint = nearest_name(name, allowed)
-        raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is none of {', '.join(allowed)}{hint}")
+        raise SimulationError(f"{BACKEND_VARIABLE}: '{one_line(name)}' is not one of {', '.join(allowed)}{hint}")
     compilers: list[Compiler] = []
     for make in OFFERED.values():
         with contextlib.suppress(SimulationError):
@@ -76,23 +76,11 @@ def backend_described() -> str:
     return compilers[0].described() if compilers else "Python itself, which compiles nothing"
 
 
-def load_source(source: str) -> ModuleType:
-    """Return the module of a composed text, compiled where it is not kept already; else as Python runs it.
-
-    ProgramError for a mistake in it, SimulationError where the compiler that ``PPAFO_BACKEND`` names does not work.
-    """
-    module = compiled(source)
-    if module is not None:
-        return module
-    from ppafo.engine.interpreted import interpreted  # most computers have a compiler
-
-    return interpreted(source)
-
-
 def compiled(source: str, effort: Effort = Effort.FULL) -> ModuleType | None:
     """Return the module of a composed text by a compiler; None where Python has to run it, which a line has said.
 
-    A quick program is not made where the full one is kept. Raises as ``load_source``.
+    A quick program is not made where the full one is kept. ProgramError for a mistake in it, SimulationError where the
+    compiler that ``PPAFO_BACKEND`` names does not work.
     """
     return None if runs_by_python() else _load_by(source, compilers_to_try(), effort)
 

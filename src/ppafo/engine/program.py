@@ -10,6 +10,7 @@ from ppafo.control.profiles import CONSTANT
 from ppafo.engine.channels import REQUEST, paths_of_traces
 from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
 from ppafo.engine.rows import leaf_paths
+from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
 from ppafo.engine.scheme.pneumatics import HeldChambers, SlopedFlows, StageFlows
 from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParameters
@@ -18,13 +19,14 @@ from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.kind import Effect, State
-from ppafo.model.plant import PlantParameters, PlantState, SinglePort
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, SinglePort
 from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
 from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY, WALK, FootSample, MeterKind, ReferenceSummary
 
 if TYPE_CHECKING:
+    from ppafo.engine.scheme.thermal_gas import WarmFunctions
     from ppafo.engine.step.lane import Lane, Now
 
 Rows = Mapping[str, type]
@@ -43,12 +45,8 @@ class GasPhases(Protocol):
         """True where its true masses stand beside what ``PlantState`` counts."""
 
     @property
-    def START(self) -> Callable[[Any, PlantState], Any] | None:  # noqa: N802
-        """``START(plant, initial)`` makes the only group of states; None where there is none."""
-
-    @property
-    def IN_SHAPES(self) -> Mapping[Any, Any]:  # noqa: N802
-        """Replacements of its functions for an actuator with chamber volumes of its own."""
+    def START(self) -> Callable[..., Any] | None:  # noqa: N802
+        """``START(plant, initial, parts=functions)`` makes the only group of states; None where there is none."""
 
     def groups(self, parts: "Program") -> Groups:
         """Groups of numbers that it has in a lane."""
@@ -245,6 +243,23 @@ class Program:
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that a phase of a step hands to the later ones, in order."""
         return rows_of(self.groups, Role.STEP)
+
+    @property
+    def functions(self) -> ActuatorFunctions:
+        """Functions of its actuator."""
+        return functions_of_actuator(self.actuator)
+
+    @property
+    def warm_functions(self) -> "WarmFunctions":
+        """Functions of its actuator's chambers for gas with an energy balance."""
+        from ppafo.engine.scheme.warm_actuators import warm_functions
+
+        return warm_functions(self.actuator)
+
+    @property
+    def has_vane(self) -> bool:
+        """True where the actuator is a vane, whose volumes are the same at every pressure."""
+        return self.actuator == VANE
 
     @property
     def shank_jumps(self) -> bool:

@@ -22,6 +22,7 @@ from ppafo.engine.plain_python import parse_module, refusal
 from ppafo.engine.rows import is_number, is_row, members, rebuilt
 from ppafo.engine.source_text import is_step_function
 from ppafo.errors import ProgramError
+from ppafo.model.binding import made_of
 
 TRACE = "trace"
 """History of what is shown at samples."""
@@ -361,7 +362,7 @@ class Reduction:
     def of_call(self, node: ast.Call) -> ast.expr:
         """A call, with what the function is handed."""
         called = self.outside(node.func)
-        called = getattr(called, "__wrapped__", called)
+        called, node = self.with_parts(getattr(called, "__wrapped__", called), node)
         if called is getattr:
             name = self.value_of(node.args[1])
             return ast.Attribute(self.visit(node.args[0]), name, ast.Load())
@@ -386,6 +387,15 @@ class Reduction:
             else self.visit(node.func)
         )
         return ast.Call(function, arguments, named)
+
+    def with_parts(self, called: Any, node: ast.Call) -> tuple[Any, ast.Call]:
+        """A function that is called with ``parts=``, as the function with these parts, and the call without them."""
+        given = next((keyword for keyword in node.keywords if keyword.arg == "parts"), None)
+        if given is None or not isinstance(called, FunctionType) or is_step_function(called):
+            return called, node
+        others = [keyword for keyword in node.keywords if keyword is not given]
+        made = made_of(called, called.__name__, self.value_of(given.value))
+        return made, ast.copy_location(ast.Call(node.func, node.args, others), node)
 
     def called(self, called: FunctionType, node: ast.Call) -> tuple[str, list[ast.expr]]:
         """Name in the module of a function of the step that is called, and its own arguments."""

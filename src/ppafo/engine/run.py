@@ -256,13 +256,13 @@ def gas_at_start(run: Run) -> Any:
     if start is None:
         return NoParameters()
     if not program.effects:
-        return start(run.plant, run.initial)
+        return start(run.plant, run.initial, parts=program.functions)
     rows: dict[str, Any] = {}
     own = functions_of(program, rows).of(start)
 
     def started(plant: Any, initial: Any, *effects: Any) -> Any:
         rows.update(zip((effect.name for effect in program.effects), effects, strict=True))
-        return own(plant, initial)
+        return own(plant, initial, parts=program.functions)
 
     return of_each(started, run.plant, run.initial, *run.effects)
 

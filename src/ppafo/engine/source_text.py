@@ -27,7 +27,7 @@ from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
 from ppafo.errors import ProgramError, nearest_name, one_line
-from ppafo.model.binding import is_made_of, made_of, parts_of
+from ppafo.model.binding import frame_of, is_made_of, made_of, parts_of
 from ppafo.model.declaration import PlainFunction
 
 COMPILED_BUILTINS = frozenset(
@@ -187,7 +187,10 @@ class Composer(ast.NodeTransformer):
         if not is_made_of(parts):
             raise self.refuse(node, f"'parts={ast.unparse(given.value)}' must be parts of this function")
         others = [keyword for keyword in node.keywords if keyword is not given]
-        name = f"{called.__name__}_of_{self.function.__name__}"
+        # What a function hands on as it was given by a phase is the same for all of a program.
+        frame = frame_of(self.function) if parts is parts_of(self.function) else None
+        is_same = frame is not None and frame.function.__name__ == self.function.__name__
+        name = called.__name__ if is_same else f"{called.__name__}_of_{self.function.__name__}"
         return made_of(called, name, parts), ast.copy_location(ast.Call(node.func, node.args, others), node)
 
     def rows_for(self, function: ast.expr, node: ast.AST) -> list[ast.expr]:

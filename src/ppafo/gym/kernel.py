@@ -4,11 +4,13 @@ Commands go in; physics, sensors, observations and rewards come out. The lane lo
 stands around it are functions of lanes, as the loop is, on arrays that stay between calls.
 """
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.generator import StepText
+from ppafo.engine.interpreter import Floats, PythonProgram, run_lanes
 from ppafo.engine.lane_rows import ARGUMENTS, COMPILED
 from ppafo.engine.loop_text import lane_entry, lane_loop
 from ppafo.engine.program import Program
@@ -18,7 +20,6 @@ from ppafo.engine.step.lane import Now
 from ppafo.engine.step.phases import hold_chambers
 from ppafo.engine.step.sample import fill_signals, remember_readings, sense
 from ppafo.gym.tasks import Goal, Memory, Outcome, Requested, Task, finite, reward_of
-from ppafo.model.plant import chamber_pressures, joint_torque
 
 
 class Action(NamedTuple):
@@ -105,8 +106,10 @@ def observe(
     time = now.step * lane.timing.step
     torque_wanted, rate, _ = parts.reference.value(lane.reference, time)
     wanted = Requested(torque_wanted, rate)
-    pressure_1, pressure_2 = chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
-    torque = joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
+    pressure_1, pressure_2 = parts.actuator.pressures(
+        lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2
+    )
+    torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     gas = lane.state.supplied_mass - lane.memory.supplied_mass
     lane.memory = task.kept(lane.memory, lane.state.supplied_mass, lane.seen, time)
     lane.view = task.observed(lane.seen, lane.goal, lane.memory, wanted, lane.result.command, time)
@@ -121,6 +124,37 @@ def observe(
     )
 
 
+def tables_judged(program: Program, task: Task) -> dict[str, Mapping[str, Any]]:
+    """Groups of the arrays that a judgement takes, by their names."""
+    return {
+        "states": program.state_rows(),
+        "parameters": program.parameter_rows(),
+        "own": OWN,
+        "chosen": {"asked": ObservationFlag},
+        "observations": {"view": task.view},
+        "outcomes": {"outcome": Outcome},
+    }
+
+
+class PythonKernel:
+    """The three calls of a kernel, run by Python itself."""
+
+    def __init__(self, program: Program, task: Task) -> None:
+        self._program, self._task = program, task
+        self.advance = PythonProgram(program).advance
+
+    def command(self, states: Floats, actions: Floats, signals: Floats) -> None:
+        """Give every environment the command of its action."""
+        tables = (self._program.state_rows(), states), ({"action": Action}, actions)
+        run_lanes(self._program, command, tables, (signals,), (self._task,))
+
+    def judge(self, *arrays_and_numbers: Any) -> None:
+        """Sense, observe and judge the environments that are asked."""
+        groups = tables_judged(self._program, self._task).values()
+        tables, rest = list(zip(groups, arrays_and_numbers, strict=False)), arrays_and_numbers[len(groups) :]
+        run_lanes(self._program, judge, tables, rest[:1], (self._task, *rest[1:]))
+
+
 @lru_cache(maxsize=16)
 def kernel_source(program: Program, task: Task) -> str:
     """Return the source text of the module with ``command``, ``advance`` and ``judge``, each of a block of lanes."""
@@ -129,13 +163,5 @@ def kernel_source(program: Program, task: Task) -> str:
     step = StepText(program, collector, further=further)
     loop = lane_loop(step, COMPILED, "advance", ARGUMENTS)
     begin = lane_entry(step, command, {"states": step.states, "actions": {"action": Action}}, {"task": task})
-    arrays = {
-        "states": step.states,
-        "parameters": step.parameters,
-        "own": OWN,
-        "chosen": {"asked": ObservationFlag},
-        "observations": {"view": task.view},
-        "outcomes": {"outcome": Outcome},
-    }
-    end = lane_entry(step, judge, arrays, {"task": task})
+    end = lane_entry(step, judge, tables_judged(program, task), {"task": task})
     return "\n\n\n".join([HEADER, collector.text(), loop, begin, end])

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from ppafo.engine.entries import with_arrays
 from ppafo.engine.lane_rows import VECTOR, lanes_of
 from ppafo.engine.lanes import SIGNAL_ROWS, Batch, Clock, Floats
-from ppafo.engine.loading import load_source
+from ppafo.engine.loading import compiled
 from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.step.lane import LaneStart
 from ppafo.errors import ScenarioError
-from ppafo.gym.kernel import OWN_PATHS, Action, kernel_source
+from ppafo.gym.kernel import OWN_PATHS, Action, PythonKernel, kernel_source
 from ppafo.gym.tasks import Outcome, Task
 from ppafo.model.sensors import Measurement
 
@@ -129,7 +129,7 @@ class Environments:
         self._outcomes = np.zeros((blocks, _OUTCOMES, width))
         self._signals = np.zeros((blocks, SIGNAL_ROWS, clock.signal_delay + 2, width))
         self._now = 0
-        module = load_source(kernel_source(program, task))
+        module: Any = compiled(kernel_source(program, task)) or PythonKernel(program, task)
         record, trace = np.empty((0, len(state_rows), width)), np.empty((0, 0, width))
         self._blocks = [
             EnvironmentBlock(

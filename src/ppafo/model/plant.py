@@ -12,7 +12,8 @@ unless its regulator is a relieving one: a flow back into a node is multiplied b
 atmosphere and for a relieving supply, 0 for a supply with a check valve.
 """
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 from ppafo.model.columns import Numeric
 from ppafo.model.elementary import QUARTER_TURN, TURN
@@ -101,6 +102,23 @@ class TrueMasses(NamedTuple):
     mass_2: float
 
 
+class ActuatorFunctions(NamedTuple):
+    """Functions of an actuator, each of a plant first, in SI units: parts of those that step, measure and record."""
+
+    chambers: Callable[..., Any]
+    """Both ``Chambers`` at an angle and two absolute pressures."""
+    pressures: Callable[..., tuple[float, float]]
+    """Absolute pressures at an angle with two masses."""
+    torque: Callable[..., float]
+    """Torque at an angle and two absolute pressures."""
+    rest_volumes: Callable[..., tuple[float, float]]
+    """Volumes of both chambers at an angle, of chambers that give at the pressures of their supplies."""
+    rest_pressures_per_mass: Callable[..., tuple[float, float]]
+    """Pressures over masses in these volumes."""
+    held_pressures: Callable[..., tuple[float, float]]
+    """Absolute pressures of the gas of a state in ``HeldChambers``."""
+
+
 class Openings(NamedTuple):
     """Fraction of the valve's full area that joins each chamber to the source and to the atmosphere, each 0 to 1."""
 
@@ -118,7 +136,7 @@ def actuator_torque(pressure_1: float, pressure_2: float, torque_constant: float
 def joint_torque(plant: PlantParameters, _angle: float, pressure_1: float, pressure_2: float) -> float:
     """Torque of the actuator [N m] at an angle [rad] and two absolute pressures [Pa]. Equation (2).
 
-    A vane's is the same at every angle; a program with an actuator of another kind calls that kind's own here.
+    A vane's is the same at every angle.
     """
     return actuator_torque(pressure_1, pressure_2, plant.torque_constant)
 
@@ -195,9 +213,11 @@ def holds_still(net_torque: float, static_torque: float, at_lower_stop: bool, at
     return within or against_stop
 
 
-def driving_torque(plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float) -> float:
+def driving_torque(
+    plant: PlantParameters, angle: float, pressure_1: float, pressure_2: float, *, parts: ActuatorFunctions
+) -> float:
     """Torque on a vane at rest before friction [N m], positive in plantarflexion. Equations (1), (2)."""
-    actuator = joint_torque(plant, angle, pressure_1, pressure_2)
+    actuator = parts.torque(plant, angle, pressure_1, pressure_2)
     gravity = gravity_torque(angle, plant.gravity_torque)
     return loaded(net_driving_torque(actuator, gravity, plant.external_torque), angle)
 

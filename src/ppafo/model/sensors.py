@@ -9,7 +9,7 @@ the same.
 from typing import NamedTuple
 
 from ppafo.model.elementary import DOUBLINGS, SMALLEST_FRACTION, TERMS
-from ppafo.model.plant import PlantParameters, joint_torque
+from ppafo.model.plant import ActuatorFunctions, PlantParameters
 
 MASK = 0xFFFFFFFF
 ARRIVAL = 40.0
@@ -114,7 +114,14 @@ def quantise(value: float, resolution: float) -> float:
 
 
 def measure(
-    sensors: SensorParameters, angle: float, pressure_1: float, pressure_2: float, plant: PlantParameters, sample: int
+    sensors: SensorParameters,
+    angle: float,
+    pressure_1: float,
+    pressure_2: float,
+    plant: PlantParameters,
+    sample: int,
+    *,
+    parts: ActuatorFunctions,
 ) -> Measurement:
     """Measurement of one sample with noise and quantisation; angle [rad], pressures [Pa absolute].
 
@@ -126,7 +133,7 @@ def measure(
     second = quantise(
         pressure_2 + sensors.pressure_noise * standard_noise(seed, sample, 2), sensors.pressure_resolution
     )
-    torque = joint_torque(plant, angle, first, second)
+    torque = parts.torque(plant, angle, first, second)
     return Measurement(angle=angle, pressure_1=first, pressure_2=second, torque=torque)
 
 
@@ -274,6 +281,8 @@ def measure_gait(
     plant: PlantParameters,
     time: float,
     sample: int,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[GaitMeasurement, GaitSeen]:
     """Measurement [SI] of a sample with bandwidth, noise, steps, loss and faults, and what to remember of it."""
     seed = int(sensors.seed)
@@ -286,7 +295,7 @@ def measure_gait(
     smooth_2 = pressure_2 + (last.smooth_pressure_2 - pressure_2) * pressure_memory
     # Channels of the noise: 0 to 4 values, 5 to 9 lost samples, 10 faults; 11 is the controller's own
     # (plant_faults.py).
-    seen = measure(sensors, smooth_angle, smooth_1, smooth_2, plant, sample)
+    seen = measure(sensors, smooth_angle, smooth_1, smooth_2, plant, sample, parts=parts)
     heel = force_reading(gait_sensors, heel_force, seed, sample, 3)
     toe = force_reading(gait_sensors, toe_force, seed, sample, 4)
     was_angle = previous_reading(last.angle, seen.angle, sample)
@@ -317,7 +326,7 @@ def measure_gait(
         smooth_pressure_2=smooth_2,
     )
     # The torque follows from the readings, right or wrong.
-    shown = late_measurement(shown_heel, shown_toe, shown_angle, shown_1, shown_2, plant)
+    shown = late_measurement(shown_heel, shown_toe, shown_angle, shown_1, shown_2, plant, parts=parts)
     return shown, remembered
 
 
@@ -329,14 +338,21 @@ def samples_late(fault: Fault, time: float, sample: int) -> int:
 
 
 def late_measurement(
-    heel_force: float, toe_force: float, angle: float, pressure_1: float, pressure_2: float, plant: PlantParameters
+    heel_force: float,
+    toe_force: float,
+    angle: float,
+    pressure_1: float,
+    pressure_2: float,
+    plant: PlantParameters,
+    *,
+    parts: ActuatorFunctions,
 ) -> GaitMeasurement:
     """Measurement of a walking controller from readings, possibly delayed: forces [N], angle [rad], pressures [Pa]."""
     return GaitMeasurement(
         angle=angle,
         pressure_1=pressure_1,
         pressure_2=pressure_2,
-        torque=joint_torque(plant, angle, pressure_1, pressure_2),
+        torque=parts.torque(plant, angle, pressure_1, pressure_2),
         heel_force=heel_force,
         toe_force=toe_force,
     )

@@ -64,7 +64,7 @@ def build_device(parameter_set: ParameterSet, valve: str | None = None, links: G
     if missing:
         completed = parameter_set.completed_by
         remedy = f"use '{completed}', which completes it" if completed else "add them to the file or as overrides"
-        raise ParameterError(f"{parameter_set.file}: a device needs {', '.join(missing)}: missing here; {remedy}")
+        raise ParameterError(f"{parameter_set.file}: the device lacks {', '.join(missing)}; {remedy}")
     read, kind = _reader(parameter_set), parameter_set.valve_kinds[name]
     relieving = parameter_set.flags.get(declaration.RELIEVING_PATH)
     species = _species(parameter_set)

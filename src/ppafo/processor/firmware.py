@@ -17,6 +17,7 @@ from ppafo.processor.catalog import TARGETS, target_of
 from ppafo.processor.fixed_point import COMMAND_STEPS, LARGEST_READING, SETTINGS, ConverterCounts, converter_with
 from ppafo.processor.torque_laws.catalog import FIXED_LAWS
 from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.simulation.nominal import converter_range
 from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.translation.c99 import c_source, documents_of
@@ -192,7 +193,9 @@ def integer_form(scenario: Scenario) -> Scenario:
             f"{', '.join(name.removesuffix(FIXED_POINT) for name in FIXED_LAWS)}"
         )
     scenario.device.check_torque_constant("a fixed-point controller")
-    settings = {**scenario.controller.settings, **{quantity.name: quantity.default or 0.0 for quantity in SETTINGS}}
+    supply, (bits, pressure_range) = scenario.device.supply, SETTINGS
+    shown = converter_range(float(supply.pressure), float(supply.dorsiflexion_pressure))
+    settings = {**scenario.controller.settings, bits.name: bits.default or 0.0, pressure_range.name: shown}
     return replace(scenario, controller=replace(scenario.controller, kind=f"{kind}{FIXED_POINT}", settings=settings))
 
 

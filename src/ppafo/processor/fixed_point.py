@@ -6,6 +6,7 @@ A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 1
 import math
 from typing import NamedTuple
 
+from ppafo.control.kind import NOMINAL
 from ppafo.control.torque_loop import SHARPNESS
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -85,7 +86,13 @@ LARGEST_READING: int = 2**MOST_BITS - 1
 SETTINGS = (
     Quantity("converter_bits", "", "bits of the converter, a whole number", 12.0, float(FEWEST_BITS), float(MOST_BITS)),
     Quantity(
-        "converter_range", "Pa_a", "pressure at which the converter shows its largest number", 1.0e6, 1.0e4, 1.0e8
+        "converter_range",
+        "Pa_a",
+        "pressure at which the converter shows its largest number",
+        None,
+        1.0e4,
+        1.0e8,
+        follows=(NOMINAL["converter_range"],),
     ),
 )
 """Settings of the converter of an integer controller."""

@@ -6,6 +6,7 @@ chamber with its own orifice, a laminar part of the leak, friction that grows wi
 
 from typing import NamedTuple
 
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.model.effects.seal_friction import SealFriction, pressed_at_rest, pressed_in_motion
 from ppafo.model.effects.second_virial import gas_enthalpy, real_density, real_pressure
 from ppafo.model.effects.stribeck import Stribeck, more_near_standstill
@@ -190,7 +191,7 @@ def observables(given: RigNumbers, state: RigState, angle: float, added_torque: 
     """Observable quantities of a bench at an angle [rad]; ``added_torque`` [N m] comes from a leg."""
     plant, rig = given.plant, given.rig
     node_1, node_2 = chamber_nodes(plant, rig, state, angle)
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS) + added_torque
     return Observables(
         node_1=node_1,
         node_2=node_2,
@@ -257,7 +258,7 @@ def rig_rates(
         given, node_2, regulated_2, state.line_mass_2, state.line_energy_2, openings.source_2, openings.vent_2
     )
     leak = leak_exchange(rig, node_1, node_2, given.leak_orifice)
-    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure) + added_torque
+    torque = driving_torque(plant, angle, node_1.pressure, node_2.pressure, parts=VANE_FUNCTIONS) + added_torque
     pressed = pressed_in_motion(plant.dynamic_torque, speed, node_1.pressure, node_2.pressure, rig.seal_friction)
     friction = direction * more_near_standstill(pressed, speed, node_1.pressure, node_2.pressure, rig.stribeck)
     acceleration = vane_acceleration(torque, friction, plant.viscous_damping, plant.inertia, angle, speed)

@@ -365,8 +365,9 @@ def _read_only(values: ArrayLike) -> Floats:
         copy = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise DataError(f"a channel is a plain list of numbers: {error}") from error
-    # A masked value is none, whatever number stands behind the mask.
-    copy[np.ma.getmaskarray(given)] = np.nan
+    if isinstance(given, np.ma.MaskedArray):
+        # A masked value is none, whatever number stands behind the mask.
+        copy[np.ma.getmaskarray(given)] = np.nan
     if copy.ndim != 1:
         raise DataError(f"a channel is a plain list of numbers, not an array of {copy.ndim} dimensions")
     copy.setflags(write=False)

@@ -43,6 +43,10 @@ AREA_PATHS, SONIC_PATHS = (
 """Paths of the numbers of an orifice in each of its forms, by its section."""
 LEAST_SHARE = 0.05
 """Part of a chamber's volume in the middle of its range that is dead volume at least."""
+USUAL_RANGE = 1.0e6
+"""Pa: absolute pressure of the transducers that are usual with supplies up to 7 bar."""
+COMPRESSED = 1.25
+"""Part of a supply pressure up to which a converter is to show more: its largest reading counts as a broken wire."""
 _PAIRS = ("solenoid", "solenoid_recycling")
 _SPOOL = "proportional"
 
@@ -93,6 +97,11 @@ def per_content(number: float, molar_mass: float, temperature: float) -> float:
 def as_content(number: float, molar_mass: float, temperature: float) -> float:
     """A mass [kg] as a content p V [J], from molar mass [kg/mol] and temperature [K]."""
     return number * specific_gas_constant(UNIVERSAL_GAS_CONSTANT, molar_mass) * temperature
+
+
+def converter_range(supply: float, dorsiflexion: float) -> float:
+    """Pressure [Pa] that a converter shows at most: 1 MPa, or what a joint may compress a supply [Pa] to."""
+    return max(USUAL_RANGE, COMPRESSED * max(supply, dorsiflexion))
 
 
 def time_of_joint(joining: float, holding: float) -> float:
@@ -159,6 +168,7 @@ def nominal_terms(device: Device, lines: "SupplyLines | None") -> dict[str, Link
         "lag": LinkFunction(tuple(f"valve.{name}" for name in names), spool_lag, (kind.settings,))
         if valve.kind == _SPOOL
         else LinkFunction(_ANY, no),
+        "converter_range": LinkFunction(("supply.pressure", "supply.dorsiflexion_pressure"), converter_range),
         "joining_time": LinkFunction(("valve.joining_time", "valve.holding_time"), time_of_joint)
         if "joining_time" in names
         else LinkFunction(_ANY, no),

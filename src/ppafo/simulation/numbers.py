@@ -1,5 +1,6 @@
 """The numbers of a scenario by dotted path: which there are, and columns of them in their place for many runs."""
 
+from collections import deque
 from collections.abc import Collection, Mapping
 from dataclasses import fields, replace
 from typing import Any
@@ -60,8 +61,14 @@ _PARTS = {
 """Class of each part of a scenario, whatever moves its ankle; two of them may be None."""
 
 
+_ACCEPTED: deque[Scenario] = deque(maxlen=16)
+"""Scenarios that were checked last: a frozen one stays what it is, and many are simulated again and again."""
+
+
 def check_parts(scenario: Scenario) -> None:
     """Refuse a scenario that was changed in Python to what no file could say: a foreign part, a number out of range."""
+    if any(scenario is accepted for accepted in _ACCEPTED):
+        return
 
     def refusal(path: str, value: Any, must: str) -> ScenarioError:
         return ScenarioError(f"{scenario.name}: {path} = {shown(value)}: {must}")
@@ -91,6 +98,7 @@ def check_parts(scenario: Scenario) -> None:
             is_good = False
         if not is_good:
             raise refusal(path, value, range_rule(quantity, limits_text(quantity, quantity.unit)))
+    _ACCEPTED.append(scenario)
 
 
 def declared_numbers(scenario: Scenario) -> dict[str, Quantity]:

@@ -1,8 +1,10 @@
 """Runs a controller that is any Python object, sample by sample, on the same lanes."""
 
+import logging
 import math
 from collections.abc import Callable
 from typing import Any, final
+from weakref import WeakSet
 
 import numpy as np
 
@@ -10,11 +12,12 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
-from ppafo.engine.scheme.actuators import measurement_of
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
+
+logger = logging.getLogger("ppafo")
 
 
 @final
@@ -73,7 +76,10 @@ class SampledRun:
 
 
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
-    """Run a batch of one with a Python controller; SimulationError where it returns no finite number."""
+    """Run a batch of one with a Python controller; SimulationError where it returns no finite number.
+
+    A command beyond what the valve has is limited, which a line says once for each class of controllers.
+    """
     run = SampledRun(batch)
     # What an earlier run left behind in the object must not steer this one.
     controller.reset()
@@ -88,8 +94,25 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
             )
         # Above what opens the valve fully there is one more command, of a walk: both chambers are vented.
         is_vent = batch.program.walks and command > VENTS_ABOVE
-        run.go_on(VENT if is_vent else max(-1.0, min(1.0, float(command))))
+        taken = VENT if is_vent else max(-1.0, min(1.0, float(command)))
+        if taken != command:
+            allowed = f"-1 to 1, or {VENT:g} to vent both chambers" if batch.program.walks else "-1 to 1"
+            _say_limited(type(controller), f"{command:g} at t = {run.time:.6g} s", allowed)
+        run.go_on(taken)
     return run.result()
+
+
+_SAID: "WeakSet[type]" = WeakSet()
+"""Classes of controllers of which a line said that their commands are limited."""
+
+
+def _say_limited(kind: type, returned: str, allowed: str) -> None:
+    """Say once what a controller returned beyond the range of commands."""
+    if kind not in _SAID:
+        _SAID.add(kind)
+        logger.warning(
+            "ppafo: %s.update returned %s; commands are %s: those beyond are limited", kind.__name__, returned, allowed
+        )
 
 
 def _group(batch: Batch, name: str) -> Any:
@@ -124,8 +147,7 @@ def _measurement_source(batch: Batch, block: LaneBlock) -> Callable[[int], Measu
                 pressure_2=pressure_2,
                 torque=actuator.torque(plant, angle, pressure_1, pressure_2),
             )
-        seen = measure(sensors, angle, pressure_1, pressure_2, plant, sample)
-        return measurement_of(actuator, plant, seen)
+        return measure(sensors, angle, pressure_1, pressure_2, plant, sample, parts=program.functions)
 
     return see
 
@@ -160,9 +182,10 @@ def _gait_measurements(batch: Batch, block: LaneBlock) -> Callable[[int], GaitMe
                 heel_force=heel,
                 toe_force=toe,
             )
+        time, functions = sample * period, program.functions
         seen, last = measure_gait(
-            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, sample * period, sample
+            sensors, gait_sensors, last, angle, *pressures, heel, toe, plant, time, sample, parts=functions
         )
-        return measurement_of(actuator, plant, seen)
+        return seen
 
     return see

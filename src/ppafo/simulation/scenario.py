@@ -410,9 +410,7 @@ class Scenario:
         # A class has both methods too, and would fail only when it runs.
         if isinstance(controller, type):
             name = controller.__name__
-            raise ScenarioError(
-                f"{self.name}: {name} is a class; give an instance of it, as in controlled_by({name}())"
-            )
+            raise ScenarioError(f"{self.name}: {name} is a class; give an instance, as in controlled_by({name}())")
         for method in ("reset", "update"):
             if not callable(getattr(controller, method, None)):
                 kind = type(controller).__name__

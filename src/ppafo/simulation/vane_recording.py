@@ -130,7 +130,7 @@ def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
 
 def _friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Any:
     """Size of the friction torque in motion [N m] at each sample, with the effects of a run."""
-    if not run.program.effects:
+    if "friction_in_motion" not in run.program.ports_with_laws:
         return run.plant.dynamic_torque
     angle, masses = rows["state.angle"], (rows["state.mass_1"], rows["state.mass_2"])
     pressures = pressures_of(run.program.actuator, run.plant, angle, *masses)

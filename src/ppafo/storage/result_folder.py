@@ -268,7 +268,10 @@ def read_document(folder: str | Path) -> dict[str, Any]:
         raise DataError(f"{path}: is not of a ppafo result (its 'format' is not '{FORMAT}')")
     if document.get("schema_version") is True or document.get("schema_version") != SCHEMA_VERSION:
         version = document.get("schema_version")
-        raise DataError(f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}")
+        raise DataError(
+            f"{path}: has schema_version {version!r}, this version of ppafo reads {SCHEMA_VERSION}; "
+            f"make the result again with this version"
+        )
     if not isinstance(document.get("recording"), dict) or not isinstance(document.get("files"), list):
         raise DataError(f"{path}: does not state what its recording and its files are")
     return document

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema
+from ppafo.documents.problems import LABEL, NAME
 
 MAXIMUM_RUNS = 2**32
 """Draws after which a Sobol sequence of 32 bits repeats; no other method needs a lower limit."""
@@ -16,6 +17,8 @@ MAXIMUM_RUNS_OF_CHUNK = 1_000_000
 """Rows that are held in memory until they are on the disk: of some ten columns about 100 MB."""
 LARGEST_SEED = 2**32 - 1
 """Largest seed: 32 bits, so that it is exact in a column of floats."""
+DEFAULT_SEED = 1
+"""Seed of draws unless given."""
 MAXIMUM_GRID_VALUES = 1_000_000
 """Values of one axis, which are made before anything is run."""
 DEFAULT_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -30,7 +33,7 @@ _Only = Annotated[Texts, Field(description="names of the configurations in which
 class ConfigurationSection(StrictTable):
     """Base scenario of a study; all configurations get the same draws."""
 
-    name: Annotated[str, Field(pattern=NAME, max_length=100, description="label in tables and figures")]
+    name: Annotated[str, Field(pattern=LABEL, max_length=100, description="label in tables and figures")]
     scenario: Annotated[Text, Field(description="name of a scenario, or a path relative to this file")]
     overrides: Annotated[Texts, Field(description="such as 'valve.area=12.6mm^2'")] = ()
 
@@ -168,7 +171,7 @@ class SamplingSection(StrictTable):
 
     method: Literal["random", "latin_hypercube", "sobol"]
     runs: Annotated[int, Field(ge=1, le=MAXIMUM_RUNS, description="draws; each is run in every configuration")]
-    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 1
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = DEFAULT_SEED
 
 
 class OutputsSection(StrictTable):
@@ -202,6 +205,8 @@ Varied = (
 )
 VARIED = get_args(Varied)
 """The classes of ``Varied``, one for each kind of ``[[vary]]``."""
+NOT_RANDOM = (SameAs, Grid, Listed)
+"""The classes of ``Varied`` that are no distribution."""
 
 
 class StudyFile(StrictTable):
@@ -221,8 +226,10 @@ class StudyFile(StrictTable):
             description="runs computed and written together; default: chosen automatically",
         ),
     ] = None
-    sample: Annotated[SamplingSection | None, Field(description="required if there are distributions")] = None
-    outputs: Annotated[OutputsSection, Field(description="what is kept of each run")]
+    sample: Annotated[SamplingSection | None, Field(description="for 'sweep': required if there are distributions")] = (
+        None
+    )
+    outputs: Annotated[OutputsSection, Field(description="for 'sweep': what is kept of each run")] = OutputsSection()
 
 
 def json_schema() -> dict[str, Any]:

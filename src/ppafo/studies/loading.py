@@ -23,7 +23,6 @@ from ppafo.errors import (
     refused_as,
 )
 from ppafo.loading import load_scenario, placed, reloaded
-from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
 from ppafo.plugins import Plugins, name_plugins
@@ -31,7 +30,7 @@ from ppafo.simulation.numbers import chosen_path
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import ShiftedDistribution
 from ppafo.studies.sampling import MAXIMUM_SOBOL_DIMENSIONS, Factor, cholesky_factor, with_noise
-from ppafo.studies.study import Axis, Configuration, RandomValue, SamplingPlan, Study, valid_outputs
+from ppafo.studies.study import NO_SAMPLE, Axis, Configuration, RandomValue, SamplingPlan, Study, valid_outputs
 from ppafo.studies.varying import (
     VariedPath,
     axis_or_distribution,
@@ -92,6 +91,8 @@ def load_study(
                 changed = _configuration(configuration, source.folder, changes).scenario
                 table["overrides"] = list(changed.origin.overrides)
         if given and parsed.sample is None:
+            if any(not isinstance(entry, declared.NOT_RANDOM) for entry in parsed.vary):
+                raise StudyError(NO_SAMPLE)
             raise StudyError(
                 "has no [sample], so the number of runs follows from its grid and nothing is random: it takes neither "
                 "draws nor a seed"
@@ -201,11 +202,8 @@ def _configuration(entry: declared.ConfigurationSection, folder: Path, overrides
 
 
 def _check_requests(parsed: declared.StudyFile) -> None:
-    """Refuse a study that keeps nothing, varies nothing, or one path twice, or the length of what is kept over time."""
+    """Refuse a study that varies nothing, or one path twice, or the length of what is kept over time."""
     outputs = parsed.outputs
-    if not (outputs.metrics or outputs.trajectories or outputs.bands):
-        known = ", ".join(list(METRICS)[:4])
-        raise StudyError(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")
     if not parsed.vary and len(parsed.configurations) == 1:
         raise StudyError("varies nothing: give at least one [[vary]] or a second configuration")
     paths = [entry.path for entry in parsed.vary]
@@ -330,8 +328,9 @@ def _sample(parsed: declared.StudyFile, drawn: Sequence[RandomValue]) -> Samplin
         if parsed.sample is not None:
             raise StudyError("[sample] is given, but nothing has a distribution; omit it")
         return SamplingPlan(None, 1, 0)
+    # Enough where something else draws, such as a sensitivity analysis.
     if parsed.sample is None:
-        raise StudyError("'sample' is missing: distributions need [sample] with method and runs")
+        return SamplingPlan(None, 1, declared.DEFAULT_SEED)
     # The direction numbers of SciPy's sequence end there.
     if parsed.sample.method == "sobol" and len(drawn) > MAXIMUM_SOBOL_DIMENSIONS:
         raise StudyError(f"sample.method = 'sobol' allows at most {MAXIMUM_SOBOL_DIMENSIONS} distributions")

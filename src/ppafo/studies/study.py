@@ -128,6 +128,10 @@ class SamplingPlan:
     seed: int
 
 
+NO_SAMPLE = "'sample' is missing: distributions need [sample] with method and runs"
+"""Refusal of a study that is to be drawn, and does not say how often."""
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Study:
     """Configurations, each run at every grid point with every draw.
@@ -250,3 +254,13 @@ def with_overrides(scenario: Scenario, overrides: Iterable[str]) -> Scenario:
             f"scenario '{scenario.name}' was changed in Python; overrides need the scenario as it is in its file"
         )
     return reloaded(scenario, changes)
+
+
+def check_can_be_swept(study: Study) -> None:
+    """Refuse a study that does not say how often it is drawn, or that keeps nothing: other commands need neither."""
+    with refused_as(StudyError, f"study '{study.name}'", StudyError):
+        if study.drawn and study.sample.method is None:
+            raise StudyError(NO_SAMPLE)
+        if not (study.outputs.metrics or study.outputs.traces):
+            known = ", ".join(list(METRICS)[:4])
+            raise StudyError(f"[outputs] requests nothing: give metrics (such as {known}), trajectories or bands")

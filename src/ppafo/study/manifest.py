@@ -17,7 +17,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
-from ppafo.documents.models import quote, validate
+from ppafo.documents.models import validate
+from ppafo.documents.problems import quote
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError, UnitError, one_line
 from ppafo.metrics import METRICS
@@ -184,8 +185,8 @@ def read_manifest(location: Place) -> dict[str, Any]:
         raise DataError(f"{location.address}: {MANIFEST} is not a manifest of study results")
     if document.get("schema_version") != SCHEMA_VERSION:
         raise DataError(
-            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, "
-            f"this version of ppafo reads {SCHEMA_VERSION}"
+            f"{location.address}: has schema_version {quote(document.get('schema_version'))}, this version of ppafo "
+            f"reads {SCHEMA_VERSION}; make the result again with this version"
         )
     validate(_Stored, document, f"{location.address}: {MANIFEST}", DataError)
     return document

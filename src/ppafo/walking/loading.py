@@ -28,6 +28,7 @@ from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, DocumentReader, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
 from ppafo.simulation.loading import (
     Layout,
     ScenarioRequest,
@@ -52,7 +53,7 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.simulation.torque_loop import IN_WALK, PERIOD_PATH, loop_terms
+from ppafo.simulation.torque_loop import loop_terms
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (

@@ -136,7 +136,7 @@ def test_a_mistake_in_a_file_is_one_line_with_what_is_allowed(
 
 
 def test_a_claim_that_is_there_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="'held' is there twice"):
+    with pytest.raises(ScenarioError, match="'held' appears twice"):
         load_publication(written(tmp_path, TEXT + TEXT[TEXT.index("[[claims]]") :]))
 
 

@@ -40,8 +40,10 @@ WIDEST = 2**30
 """Size of the largest value that ``fraction_of`` takes without leaving 32 bits."""
 
 
-PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12}
-"""Gains of the paper's torque task, and an opening."""
+PAPER = {"proportional_gain": 0.095, "integral_gain": 0.25, "derivative_gain": 0.006, "opening": 0.12} | {
+    "converter_range": RANGE
+}
+"""Gains of the paper's torque task, an opening, and the range of the converter."""
 
 
 def parameters(law: FixedLaw, **changed: float) -> Any:

@@ -25,7 +25,6 @@ from tests.reference.reference_slopes import right_hand_side_source
 START = """
 import sys, time
 import ppafo
-from ppafo.simulation.loading import load_scenario
 if len(sys.argv) > 1:
     import ppafo.model.plant as vane
     text = open(vane.__file__).read().replace("(pressure_1 - pressure_2)", "(pressure_1 - 0.5 * pressure_2)")

@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
 
 from ppafo.engine import loading
@@ -24,7 +23,7 @@ from ppafo.engine.cache.making import load_all
 from ppafo.engine.cache.programs import load_generated
 from ppafo.engine.cache.tidying import list_programs
 from ppafo.engine.compilers import Effort
-from ppafo.engine.lanes import effort_for
+from ppafo.engine.lanes import Batch, effort_for
 from ppafo.errors import ProgramError
 from ppafo.golden_bits import plain_batch
 from tests.compilers_here import ScriptCompiler
@@ -68,6 +67,17 @@ def test_the_time_expected_is_that_of_what_this_computer_has_compiled_by_length(
     (tmp_path / "e").mkdir()
     assert estimate_seconds("y" * 200, sorted(tmp_path.iterdir()), 2.5e-4) == pytest.approx(8.0)
     assert 5.0 < estimate_seconds("y" * 40_000, [], 2.5e-4) < 20.0
+
+
+def test_the_time_expected_is_that_of_the_program_with_the_most_lines_in_common(tmp_path: Path) -> None:
+    bladder, vane = ["step", "volume of a table"], ["step", "torque"]
+    for name, lines, seconds in (("a", bladder, "20.0"), ("b", vane, "2.0"), ("c", vane, "2.0")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "program.py").write_text("\n".join(lines))
+        (tmp_path / name / "seconds.txt").write_text(seconds)
+    kept = sorted(tmp_path.iterdir())
+    assert estimate_seconds("\n".join(bladder), kept, 1.0) == pytest.approx(20.0)
+    assert estimate_seconds("\n".join(vane), kept, 1.0) == pytest.approx(2.0)
 
 
 def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_message(
@@ -120,11 +130,15 @@ def test_a_quick_program_is_made_only_where_the_full_one_is_not_kept(
     assert made() == ["full", "quick"]
 
 
-def test_a_run_of_seconds_is_compiled_quickly_and_many_runs_are_not() -> None:
+def test_some_runs_of_seconds_are_compiled_quickly_and_many_runs_are_not() -> None:
     batch = plain_batch("torque-task-proportional")
-    twice = replace(batch, parameters=np.repeat(batch.parameters, 2, 1), states=np.repeat(batch.states, 2, 1))
+
+    def repeated(runs: int) -> Batch:
+        return replace(batch, parameters=batch.parameters.repeat(runs, 1), states=batch.states.repeat(runs, 1))
+
     hours = replace(batch, clock=replace(batch.clock, step_count=10_000_000))
-    assert [effort_for(each) for each in (batch, twice, hours)] == [Effort.QUICK, Effort.FULL, Effort.FULL]
+    efforts = [effort_for(each) for each in (batch, repeated(12), repeated(1000), hours)]
+    assert efforts == [Effort.QUICK, Effort.QUICK, Effort.FULL, Effort.FULL]
 
 
 @pytest.mark.parametrize(

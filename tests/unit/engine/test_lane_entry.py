@@ -7,12 +7,12 @@ import pytest
 
 from ppafo.engine.entries import HEADER, INLINE
 from ppafo.engine.generator import StepText
-from ppafo.engine.loading import load_source
 from ppafo.engine.loop_text import lane_entry
 from ppafo.engine.source_text import SourceCollector
 from ppafo.errors import ProgramError
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run
+from tests.interpreted import load_source
 
 
 class RunCounter(NamedTuple):

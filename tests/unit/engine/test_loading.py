@@ -15,10 +15,11 @@ from ppafo.engine import loading
 from ppafo.engine.cache.folder import LEFT_OUT_FOR
 from ppafo.engine.cache.tidying import list_left_out, list_programs
 from ppafo.engine.compilers import OFFERED
-from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try, load_source
+from ppafo.engine.loading import BACKEND_VARIABLE, compilers_to_try
 from ppafo.errors import ProgramError, SimulationError
 from ppafo.translation import compiling, native
 from tests.compilers_here import compilers_here
+from tests.interpreted import load_source
 
 HEADER = "import math\n\n\n"
 ADVANCE = '@entry("void(float64[:, ::1])")\ndef advance(x):\n    x[0, 0] = '

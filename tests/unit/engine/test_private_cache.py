@@ -22,8 +22,10 @@ SOURCE = '@entry("void(float64[::1])")\ndef twice(x):\n    x[0] = 2.0 * x[0]\n'
 LIBRARY = "program.so"
 
 RUN = f"""
+import sys
 import numpy as np
-from ppafo.engine.loading import load_source
+sys.path.insert(0, {str(Path(__file__).parents[3])!r})
+from tests.interpreted import load_source
 x = np.array([21.0])
 load_source({SOURCE!r}).twice(x)
 print(x[0])

@@ -9,6 +9,7 @@ import pytest
 
 from ppafo.engine.lanes import run_batch
 from ppafo.engine.run import Run, batch_of, state_row_numbers
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.engine.scheme.motion import with_gas
 from ppafo.engine.scheme.pneumatics import (
     GasChange,
@@ -95,7 +96,9 @@ def filled(plant: PlantParameters, lines: SupplyLines, step: float) -> Filled:
     )
     for _ in range(round(DURATION / step)):
         ports = open_ports(plant_at_line_pressures(plant, lines, gas))
-        begun = begin_fed_gas(plant, lines, gas, state, ANGLE, flowing_now(plant, state, ports), step)
+        begun = begin_fed_gas(
+            plant, lines, gas, state, ANGLE, flowing_now(plant, state, ports), step, parts=VANE_FUNCTIONS
+        )
         ports = open_ports(plant_at_line_pressures(plant, lines, begun.lines.after))
         change = end_of(plant, begun.chambers, ports, step)
         from_2 = single_port_flow(begun.chambers.still.end_2, ports[1], plant.valve_curve).from_source
@@ -192,8 +195,8 @@ def test_without_droop_and_limit_a_filling_is_that_of_a_constant_supply() -> Non
         ),
     )
     for _ in range(round(DURATION / step)):
-        held, flowing = held_chambers(plant, ANGLE), flowing_now(plant, state, ports)
-        begun = begin_moving_gas(plant, state, held, ANGLE, flowing, step)
+        held, flowing = held_chambers(plant, ANGLE, parts=VANE_FUNCTIONS), flowing_now(plant, state, ports)
+        begun = begin_moving_gas(plant, state, held, ANGLE, flowing, step, parts=VANE_FUNCTIONS)
         state = with_gas(state, end_of(plant, begun, ports, step))
     ideal = np.array(chamber_pressures(plant, ANGLE, state.mass_1, state.mass_2))
     away = []

@@ -10,6 +10,7 @@ import pytest
 
 import ppafo
 from ppafo.engine.loading import BACKEND_VARIABLE
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.catalog import ACTUATORS
 from ppafo.model.sensors import Measurement, measure
@@ -196,6 +197,21 @@ def test_every_compiler_gives_the_same_bits(name: str, monkeypatch: pytest.Monke
     assert all(other == shown for other in found.values())
 
 
+@pytest.mark.parametrize("name", TASK_NAMES)
+def test_python_without_a_compiler_gives_the_same_bits(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: dict[str, list[bytes]] = {"": [], "python": []}
+    for backend, found in shown.items():
+        monkeypatch.setenv(BACKEND_VARIABLE, backend)
+        many = vector(name, AutoresetMode.NEXT_STEP, 2)
+        many.action_space.seed(1)
+        found.append(many.reset(seed=7)[0].tobytes())
+        for _ in range(6):
+            observations, rewards, *_ended = many.step(many.action_space.sample())
+            found += [observations.tobytes(), rewards.tobytes()]
+    assert len(set(shown["python"])) > 10
+    assert shown["python"] == shown[""]
+
+
 def test_replayed_commands_of_a_law_have_the_bits_of_its_walk_and_its_sensors_are_late() -> None:
     recording = ppafo.walk("proportional", minutes=0.1).recording
     commands = recording["command"][:700]
@@ -213,7 +229,9 @@ def test_replayed_commands_of_a_law_have_the_bits_of_its_walk_and_its_sensors_ar
     pressures = recording["pressure_1"], recording["pressure_2"]
     for sample in (late, 400, 700):
         then = sample - late
-        seen = measure(sensors, recording["angle"][then], *(item[then] for item in pressures), plant, then)
+        seen = measure(
+            sensors, recording["angle"][then], *(item[then] for item in pressures), plant, then, parts=VANE_FUNCTIONS
+        )
         shown = (seen.angle, seen.pressure_1 / BAR, seen.pressure_2 / BAR, seen.torque)
         assert np.array_equal(observations[sample][:4], np.array(shown, dtype=np.float32))
 

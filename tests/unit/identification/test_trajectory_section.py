@@ -318,7 +318,7 @@ def test_the_published_schema_has_the_section() -> None:
         (f"[trajectory]\nexperiments = []\n{PARAMETERS}", "problem.toml: trajectory.experiments"),
         (
             FIT.replace("[trajectory]", "[trajectory]\nprofiles = ['foot_plate.inertia']"),
-            "problem.toml: trajectory: profiles: intervals come from the likelihood profile of every number; omit it",
+            "problem.toml: trajectory: profiles: the table of the result has the intervals; omit it",
         ),
         (FIT.replace("[trajectory]", "[trajectory]\nloss = 'huber'"), "loss: the first pass is always robust; omit"),
         (FIT.replace("low =", "scale = 'log'\nlow ="), "scale: numbers are scaled automatically; omit it"),

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.model.plant import (
     actuator_torque,
     chamber_1_volume,
@@ -85,5 +86,5 @@ def test_quantised_values_are_whole_quanta_within_half_of_one(value: float, quan
 
 def test_ideal_sensors_change_nothing() -> None:
     plant = plant_parameters(load_device("ppafo2011"))
-    seen = measure(SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0), 1.2, 3e5, 1e5, plant, 4)
+    seen = measure(SensorParameters(0.0, 0.0, 0.0, 0.0, 1.0), 1.2, 3e5, 1e5, plant, 4, parts=VANE_FUNCTIONS)
     assert seen == (1.2, 3e5, 1e5, pytest.approx(plant.torque_constant * 2e5))

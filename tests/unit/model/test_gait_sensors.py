@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from ppafo.engine.scheme.actuators import VANE_FUNCTIONS
 from ppafo.model.sensors import (
     NOTHING_SEEN,
     Fault,
@@ -29,7 +30,7 @@ TRUE = (1.5, 3.0e5, 1.0e5, 400.0, 120.0)
 def seen(
     sensors: GaitSensors, sample: int, last: GaitSeen, true: tuple[float, ...] = TRUE, quiet: SensorParameters = QUIET
 ) -> tuple[GaitMeasurement, GaitSeen]:
-    return measure_gait(quiet, sensors, last, *true, PLANT, sample * PERIOD, sample)
+    return measure_gait(quiet, sensors, last, *true, PLANT, sample * PERIOD, sample, parts=VANE_FUNCTIONS)
 
 
 def test_an_ideal_sensor_shows_what_is_there() -> None:

@@ -86,6 +86,14 @@ def test_a_processor_takes_the_integer_form_of_a_controller_with_its_gains() -> 
     assert fixed_point_controller(scenario).numbers == fixed_point_controller(named).numbers
 
 
+def test_the_converter_shows_more_than_the_supply_of_any_device() -> None:
+    """A reading at the end of the range counts as a broken wire, and shuts the valve for good."""
+    supply = [f"supply.{name}=12 bar_g" for name in ("pressure", "dorsiflexion_pressure")]
+    scenario = load_scenario("torque-task-proportional", [FIXED, *supply, "reference.level=4 N m"])
+    assert scenario.controller.settings["converter_range"] == 1.25 * scenario.device.supply.pressure
+    assert simulate(scenario).metrics["final_error"].value < 0.2
+
+
 def test_whole_numbers_have_no_exported_library() -> None:
     with pytest.raises(ProgramError, match="no library yet; 'ppafo export firmware' writes it"):
         c_library(load_scenario("torque-task-solenoid", ("controller.kind=on_off_fixed_point",)))

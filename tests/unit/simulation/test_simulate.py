@@ -121,6 +121,21 @@ def test_python_controller_sees_the_same_late_and_noisy_signals_as_a_compiled_on
     assert python.recording["command"] == pytest.approx(compiled.recording["command"], abs=1e-9)
 
 
+def test_a_python_controller_beyond_the_range_of_commands_is_limited_and_a_line_says_so_once(
+    torque_task: Callable[[str], Scenario], caplog: pytest.LogCaptureFixture
+) -> None:
+    class Seven(Proportional):
+        def update(self, time: float, reference: float, measurement: Measurement) -> float:
+            return 7.0
+
+    scenario = torque_task("proportional").controlled_by(Seven())
+    assert simulate(scenario).recording["command"].max() == 1.0
+    simulate(scenario)
+    assert caplog.messages == [
+        "ppafo: Seven.update returned 7 at t = 0 s; commands are -1 to 1: those beyond are limited"
+    ]
+
+
 @pytest.mark.parametrize("answer", [math.nan, None, "open", math.inf, True])
 def test_python_controller_that_returns_no_finite_number_is_refused_with_the_time(
     torque_task: Callable[[str], Scenario], answer: object

@@ -13,6 +13,7 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import torque_reach
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import moving_together, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
@@ -88,6 +89,17 @@ def test_a_dead_zone_that_nobody_gives_is_a_share_of_what_the_device_reaches() -
     assert given.controller.dead_zone == 0.4
 
 
+def test_a_walk_asks_for_no_more_torque_than_its_device_reaches() -> None:
+    """The paper's walks state 5 N m; one that does not has what its own actuator gives."""
+    pair = ("controller.kind=event_on_off", "device.valve=solenoid")
+    cylinder = ("controller.kind=pid", "device.valve=proportional", "device.set=cylinder-lever")
+    for changes in (pair, (*pair, *SMALL_AIR[:-1]), cylinder):
+        mine = load_walk("off", changes)
+        _, reach = torque_reach(mine.device, 0.5 * math.pi)
+        assert mine.controller.settings["largest_torque"] == pytest.approx(reach, rel=1e-6)
+    assert {load_walk(name).controller.settings["largest_torque"] for name in ("proportional", "solenoid")} == {5.0}
+
+
 def test_a_gain_is_the_same_through_every_door() -> None:
     walk = load_walk("proportional", ["controller.kind=pid"])
     small = load_walk("proportional", ["controller.kind=pid", "valve.delay=5 ms", "supply.pressure=70 psi_g"])
@@ -156,3 +168,55 @@ def test_an_ensemble_has_the_gains_of_each_run() -> None:
     for run, area in enumerate(areas.tolist()):
         alone = simulate(with_numbers(base, {"valve.area": area}))
         assert together.metrics["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-12)
+
+
+TABLE_OF_ANGLES = ("level=70 deg", "period=1 s", "value_01=-45 deg", "time_02=0.5 s", "value_02=10 deg")
+SINE_OF_ANGLES = ("level=52.5 deg", "amplitude=27.5 deg")
+RAMP_OF_ANGLES = ("start_level=80 deg", "level=25 deg")
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [
+        ("sine", SINE_OF_ANGLES),
+        ("ramp_hold", RAMP_OF_ANGLES),
+        ("tabulated", TABLE_OF_ANGLES),
+        ("smooth", TABLE_OF_ANGLES),
+    ],
+)
+def test_gains_of_a_torque_on_a_moving_joint_are_those_of_the_worst_place_of_its_way(
+    kind: str, settings: tuple[str, ...]
+) -> None:
+    law = "controller.kind=sliding_mode"
+    profile = (f"motion.profile.{text}" for text in (f"kind={kind}", *settings))
+    moving = load_scenario("torque-task-proportional", [law, "motion.kind=prescribed", *profile])
+    ends = [
+        load_scenario("torque-task-proportional", [law, f"motion.angle={angle} deg"]).controller.boundary_layer
+        for angle in (25.0, 80.0)
+    ]
+    assert ends[0] > 1.2 * ends[1]
+    assert moving.controller.boundary_layer == pytest.approx(ends[0], rel=1e-9)
+    higher = with_numbers(moving, {"motion.profile.level": float(moving.motion.profile.level) + 0.1})
+    assert higher.controller.boundary_layer < ends[0], "it follows what moves the joint"
+
+
+@pytest.mark.parametrize("kind", ["tabulated", "smooth"])
+def test_gains_of_an_angle_on_a_table_are_those_of_a_ramp_between_its_ends(kind: str) -> None:
+    table, ramp = (
+        load_scenario("cylinder-servo", [f"reference.{text}" for text in (f"kind={kind}", *settings)]).controller
+        for kind, settings in ((kind, TABLE_OF_ANGLES), ("ramp_hold", RAMP_OF_ANGLES))
+    )
+    assert table.settings == pytest.approx(ramp.settings)
+    assert table.settings != load_scenario("cylinder-servo").controller.settings
+
+
+def test_gains_say_that_they_do_not_know_a_load_which_may_move_the_joint() -> None:
+    load = ("controller.kind=sliding_mode", "effects.joint_load.stiffness=2 N m/rad")
+    free = load_scenario("torque-task-proportional", [*load, "motion.kind=free", "motion.angle=75 deg"])
+    locked, worn = load_scenario("torque-task-proportional", load), load_walk("proportional", load[1:])
+    said = [gains_of(item, item.motion.motion_kind.law(item)) for item in (free, locked, worn)]
+    assert [gains is not None and gains.unknown_loads for gains in said] == [
+        ("effects.joint_load",),
+        (),
+        ("effects.joint_load",),
+    ]

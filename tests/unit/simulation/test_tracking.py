@@ -15,6 +15,7 @@ from ppafo.running import most_reversals, simulate, tried
 from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.tracking.pair_step import coarse_pair
+from ppafo.simulation.tracking.rule import SettledPart, failure_of_task, settled_task
 from ppafo.study.runs import follows, with_companions
 
 TASK = "torque-task-proportional"
@@ -86,14 +87,34 @@ def test_a_pair_too_coarse_for_its_reference_is_told_before_the_run(changes: lis
 
 
 def test_the_area_offered_before_the_run_makes_a_pair_fine_enough(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     command = ["simulate", "torque-task-solenoid", "--set", "run.duration=0.1 s", "--out", str(tmp_path / "run")]
     assert main(command) == 0
-    offered = re.search(r"`valve.area = ([^`]*)`", capsys.readouterr().err)
+    offered = re.search(r"`valve.area = ([^`]*)`", caplog.text)
     assert offered is not None
+    caplog.clear()
     assert main([*command, "--set", f"valve.area={offered[1]}"]) == 0
-    assert capsys.readouterr().err == ""
+    assert "pair of valves" not in caplog.text
+
+
+def test_a_search_and_a_walk_tell_of_a_pair_too_coarse_before_they_run(caplog: pytest.LogCaptureFixture) -> None:
+    found = ppafo.find("torque-task-solenoid", vary="reference.level=2..6 N m", such_that="rms_error >= 0 N m", grid=3)
+    assert found.found.runs > 0
+    assert caplog.text.count("the pair of valves changes the torque by 2.19 N m") == 1
+    walk = load_scenario("solenoid")
+    assert "0.32 times the 5 N m wanted" in coarse_pair(walk)
+
+
+def test_a_walk_whose_pair_takes_the_torque_beyond_its_limit_is_told_with_a_valve_that_keeps_to_it() -> None:
+    changes = ["valve.area=60 mm^2", "supply.pressure=90 psi_g", "run.duration=6 s"]
+    scenario = load_scenario("solenoid", changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert verdict.kind == "overshoots"
+    offered = re.search(r"with `valve.area = ([^`]*)` it does, as a further run shows", verdict.sentence)
+    assert offered is not None
+    assert simulate("solenoid", [f"valve.area={offered[1]}", *changes[1:]]).tracking is None
 
 
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
@@ -108,6 +129,7 @@ def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
         ("torque-task-slow-valve", "controller.proportional_gain", [0.001, 0.3, 8.0]),
         ("torque-task-solenoid", "reference.level", [0.5, 4.0, 5.9, 7.0]),
         ("pressure-loop", "controller.proportional_gain", [1.0e-8, 1.0e-5]),
+        ("cylinder-servo", "motion.external_torque", [0.2, 5.0, 14.0]),
     ],
 )
 def test_metered_runs_are_judged_as_their_recordings_are(scenario: str, column: str, values: list[float]) -> None:
@@ -226,3 +248,72 @@ def test_a_law_that_rests_within_the_dead_band_is_given_what_it_lacks(law: tuple
     assert verdict is not None
     assert re.search(r"its command of 0\.\d+ stays within `valve\.dead_band = 0\.3`", verdict.sentence)
     assert re.search(rf"with `controller\.{given}` it does, as a further run shows", verdict.sentence)
+
+
+LATE_SINE = ["sensors.delay=10 ms", "reference.frequency=2 Hz", "run.duration=2 s"]
+"""A cylinder whose loop is too late for its sine."""
+
+
+def test_a_sine_that_is_too_quick_for_the_loop_is_told_with_one_that_it_follows() -> None:
+    scenario = load_scenario("cylinder-servo", LATE_SINE)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert verdict.kind == "does not follow", "an error that turns with its reference is no oscillation"
+    assert "its reference" in verdict.cause
+    offered = re.search(r"; with (.*) it does, as a further run shows", verdict.sentence)
+    assert offered is not None
+    changes = [text.replace(" = ", "=") for text in re.findall(r"`([^`]*)`", offered[1])]
+    changed = [text.partition("=")[0] for text in changes]
+    kept = [text for text in LATE_SINE if text.partition("=")[0] not in changed]
+    assert simulate("cylinder-servo", [*kept, *changes]).tracking is None
+
+
+def sampled(error: np.ndarray, controlled: str) -> SettledPart:
+    """Settled part of a loop that wants 40 deg, or N m, with an error in the same."""
+    unit = math.radians(1.0) if controlled == "angle" else 1.0
+    mean = float(np.mean(error))
+    return SettledPart(
+        samples=slice(None),
+        duration=2.0,
+        wanted=40.0 * unit,
+        error=float(np.sqrt(np.mean(error**2))) * unit,
+        missing=mean * unit,
+        swing=float(np.std(error)) * unit,
+        turns=0,
+        moved=40.0 * unit,
+        peak=0.0,
+        rests=True,
+        worst=float(np.max(np.abs(error))) * unit,
+        span=float(np.ptp(error)) * unit,
+        way=40.0 * unit if controlled == "angle" else 0.0,
+    )
+
+
+@pytest.mark.parametrize(
+    ("error", "rests", "kind"),
+    [
+        (0.7 * np.sin(np.linspace(0.0, 12.0, 200)), True, "oscillates"),
+        (0.5 * np.sin(np.linspace(0.0, 12.0, 200)), True, None),
+        (np.linspace(1.9, 0.1, 200), True, "does not follow"),
+        (1.9 * np.sin(np.linspace(0.0, 12.0, 200)), False, None),
+        (2.2 * np.sin(np.linspace(0.0, 12.0, 200)), False, "does not follow"),
+    ],
+)
+def test_an_angle_is_held_to_degrees_where_a_torque_is_held_to_shares(
+    error: np.ndarray, rests: bool, kind: str | None
+) -> None:
+    assert failure_of_task(sampled(error, "angle")._replace(rests=rests), 0.0, False) == kind
+    assert failure_of_task(sampled(error, "torque")._replace(rests=rests), 0.0, False) is None
+
+
+def test_noise_that_turns_the_command_on_the_way_is_no_oscillation_once_the_loop_rests() -> None:
+    noisy = ["sensors.angle_noise=0.05 deg", "run.duration=4 s", *RAMP[:3], "reference.ramp_time=1.5 s"]
+    scenario = load_scenario("cylinder-servo", [*noisy, "controller.torque_gain=0.9 1/(N m)"])
+    result = simulate(scenario)
+    settled = settled_task(scenario, result.recording)
+    assert settled.reversals < 10.0
+    columns = {"motion.external_torque": np.zeros(1)}
+    metered = run_ensemble(scenario, columns, with_companions([], scenario)).metrics
+    assert metered["settled_reversals"][0] == pytest.approx(settled.reversals, rel=1e-6)
+    assert metered["settled_span"][0] == pytest.approx(settled.span, rel=1e-6)
+    assert (follows(metered, scenario, columns)[0] == 1.0) == (result.tracking is None)

@@ -9,6 +9,7 @@ import pytest
 from ppafo.errors import StudyError
 from ppafo.studies.declaration import VARIED
 from ppafo.studies.loading import list_studies, load_study
+from ppafo.studies.study import check_can_be_swept
 from ppafo.studies.varying import _DISTRIBUTIONS
 
 AREA = {"path": "valve.area", "kind": "uniform", "minimum": "10 mm^2", "maximum": "12 mm^2"}
@@ -101,9 +102,13 @@ def test_a_path_is_varied_once(varying: Callable[..., Any]) -> None:
     assert "'valve.area' is varied twice" in refused(varying(AREA, CD, AREA))
 
 
-def test_a_study_that_asks_for_nothing_is_refused(small: Any) -> None:
-    small["outputs"] = {"metrics": []}
-    assert "[outputs] requests nothing" in refused(small)
+@pytest.mark.parametrize("outputs", [{"metrics": []}, None])
+def test_a_study_that_keeps_nothing_is_no_sweep_but_a_study(outputs: Any, small: Any) -> None:
+    small["outputs"] = outputs
+    document = {key: value for key, value in small.items() if value is not None}
+    study = load_study(document)
+    with pytest.raises(StudyError, match=r"study 'small': \[outputs\] requests nothing"):
+        check_can_be_swept(study)
 
 
 def test_a_study_that_varies_nothing_is_refused_unless_it_compares(small: Any) -> None:
@@ -200,7 +205,10 @@ def test_a_correlation_is_given_once(varying: Callable[..., Any]) -> None:
 def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., Any]) -> None:
     document = varying(AREA)
     del document["sample"]
-    assert "'sample' is missing" in refused(document)
+    with pytest.raises(StudyError, match="'sample' is missing"):
+        check_can_be_swept(load_study(document))
+    with pytest.raises(StudyError, match="'sample' is missing"):
+        load_study(document, draws=4)
     document = varying({"path": "valve.area", "kind": "list", "values": ["10 mm^2"]})
     assert "[sample] is given, but nothing has a distribution" in refused(document)
     del document["sample"]
@@ -208,6 +216,18 @@ def test_distributions_need_a_sample_and_a_grid_has_none(varying: Callable[..., 
         load_study(document, draws=4)
     with pytest.raises(StudyError, match="takes neither draws nor a seed"):
         load_study(document, seed=4)
+
+
+@pytest.mark.parametrize("name", ["Ventil A, schnell", "Stoß", "'x'"])
+def test_a_configuration_has_any_name_that_people_read(name: str, small: Any) -> None:
+    small["configurations"][1]["name"] = name
+    assert load_study(small).configurations[1].name == name
+
+
+@pytest.mark.parametrize("name", ["", " a", "a ", "a\nb", "a\x07"])
+def test_the_name_of_a_configuration_is_a_line_of_text(name: str, small: Any) -> None:
+    small["configurations"][1]["name"] = name
+    assert "must be a line of text without spaces around it" in refused(small)
 
 
 def test_configurations_have_names_of_their_own(small: Any) -> None:

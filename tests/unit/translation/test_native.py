@@ -102,7 +102,7 @@ def test_a_name_that_is_no_compiler_is_refused_in_one_line(
     monkeypatch.setenv("PPAFO_BACKEND", "gc")
     assert main(["simulate", "torque-task-proportional", "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert said == "ppafo: PPAFO_BACKEND: 'gc' is none of c, gcc, clang, zig, python, did you mean 'gcc'?\n"
+    assert said == "ppafo: PPAFO_BACKEND: 'gc' is not one of c, gcc, clang, zig, python, did you mean 'gcc'?\n"
     assert not (tmp_path / "out").exists()
 
 

@@ -14,7 +14,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.rows import leaf_paths, numbers, rebuilt
 from ppafo.engine.run import Run
 from ppafo.errors import SimulationError
-from ppafo.model.plant import Openings, ThermalParameters, joint_torque
+from ppafo.model.plant import Openings, ThermalParameters
 from ppafo.model.ports import at_valve
 from ppafo.model.valves.proportional import NO_SLEW_LIMIT
 
@@ -85,7 +85,7 @@ class LinearisedPlant:
         angle, rate = values["angle"], values["angular_velocity"]
         pressures = values["pressure_1"], values["pressure_2"]
         valve = valve_at(run, self.functions, values)
-        chambers = call(turning_chambers)(plant, angle, rate, *pressures)
+        chambers = call(turning_chambers)(plant, angle, rate, *pressures, parts=program.functions)
         moving, warm = {}, {}
         if isinstance(run.thermal, ThermalParameters):
             temperatures = values["temperature_1"], values["temperature_2"]
@@ -96,10 +96,10 @@ class LinearisedPlant:
         # A vane that is held or prescribed has no acceleration: angle and velocity are no states then.
         if self.way:
             added = 0.0 if run.leg is None else torque_of_leg(program, run.leg, self.time, angle)
-            moved = call(free_motion)(plant, angle, rate, *pressures, added, self.way)
+            moved = call(free_motion)(plant, angle, rate, *pressures, added, self.way, parts=program.functions)
             moving = dict(zip(("angle", "angular_velocity"), moved, strict=True))
         rates = moving | {"pressure_1": gas.pressure_1, "pressure_2": gas.pressure_2} | warm
-        outputs = {"torque": call(joint_torque)(plant, angle, *pressures)} | {name: values[name] for name in rates}
+        outputs = {"torque": program.actuator.torque(plant, angle, *pressures)} | {name: values[name] for name in rates}
         outputs |= {"supplied_flow": gas.supplied, "vented_flow": gas.vented}
         return PlantValues(rates | valve.rates, outputs | {name: values[name] for name in valve.rates})
 

@@ -86,7 +86,10 @@ def _compute(
         try:
             finished: FinishedChunk = future.result()
         except distributed.scheduler.KilledWorker as error:
-            raise StudyError(f"chunk {future.key}: its workers died repeatedly: {one_line(error)}") from error
+            raise StudyError(
+                f"chunk {future.key}: its workers died repeatedly: {one_line(error)}; give workers "
+                f"more memory and run the same command again, which resumes the study"
+            ) from error
         future.release()
         finish(finished)
         submit(1)

@@ -31,13 +31,14 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
+from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.storage.places import place_at
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import study_of
 from ppafo.studies.loading import list_studies, load_study
-from ppafo.studies.study import Study
+from ppafo.studies.study import Study, check_can_be_swept
 from ppafo.study.blocks import chunk_count, samples_of
 from ppafo.study.manifest import read_manifest
 from ppafo.study.runs import RunCounter, joined
@@ -243,6 +244,7 @@ def sweep(
     """
     name_plugins(plugins)
     chosen = study_of(study, overrides, draws, seed)
+    check_can_be_swept(chosen)
     if scheduler is not None:
         from ppafo.analyses.sweep.cluster import check_scheduler
 
@@ -250,6 +252,7 @@ def sweep(
         check_scheduler(scheduler)
     kept = temporary_folder("ppafo-study") if out is None else None
     location = place_at(kept.name if kept is not None else str(out))
+    tell_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
     store = StudyStore.claim(chosen, location, agreed, threads)
     _work(ChunkTask(chosen, location.address, threads), store, scheduler, progress)
     results = StudyResults(location, read_manifest(location), {}, kept)

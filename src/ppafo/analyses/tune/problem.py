@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.arguments import Overrides, checked
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
 from ppafo.loading import load_scenario, placed, reloaded

@@ -47,7 +47,7 @@ from ppafo.walking.walk import WalkComparison
 
 _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
-    "the foot, pauses or has stopped. A red line is where there is less help, a dashed one where something fails."
+    "the foot, pauses or has stopped. A solid line is where there is less help, a dashed one where something fails."
 )
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0
@@ -71,9 +71,10 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
     if cut:
         shown = _TORQUE.text(limit)
-        remarks.append(
-            f"{', '.join(cut)}: the request is limited by controller.largest_torque = {shown}; raise that too"
-        )
+        # A limit that nobody gave is what the device can do.
+        is_given = "controller.largest_torque" not in scenario.links
+        advice = "raise that too" if is_given else "the actuator gives no more at this supply"
+        remarks.append(f"{', '.join(cut)}: the request is limited by controller.largest_torque = {shown}; {advice}")
     # Where the foot drives the vane to its end, it compresses a chamber far above its supply.
     for channel, words, given in (
         ("pressure_1", "chamber 1", supply.pressure),

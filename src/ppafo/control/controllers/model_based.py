@@ -187,6 +187,7 @@ class FeedbackLinearisationParameters(NamedTuple):
     convergence_rate: Annotated[
         float, Number("1/s", "rate at which the torque error decays", None, 0.0, 1.0e6, follows=(CONVERGENCE,))
     ]
+    # Of the angle sensor and not of the device: some samples at 1 kHz, short against any valve.
     rate_filter: Annotated[float, Number("s", "time constant of the filter on the angle's rate", 0.0018, 0.0, 10.0)]
     nominal: NominalChambers
 

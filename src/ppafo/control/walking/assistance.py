@@ -9,6 +9,7 @@ zero, a smooth rise to the peak, a smooth fall, zero; cubic with level ends.
 
 from typing import Any, NamedTuple, Protocol
 
+from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.fault_checks import SAFETY_QUANTITIES, SafetyRules
 from ppafo.control.walking.phases import PHASE_QUANTITIES, PhaseRules, PhaseState
@@ -45,6 +46,9 @@ def profile_torque(profile: TorqueProfile, phase: float) -> float:
     return profile.peak_torque * (rise - fall)
 
 
+# What is asked for is a prescription for a wearer, not a number of the device: by default that of the paper, whatever
+# the actuator could give. Only the limit of it follows the device.
+
 HOLD_QUANTITIES = (
     Quantity("swing_angle", "rad", "angle about which the lifted foot is kept", 1.28, 0.5, 2.5),
     Quantity("hold_stiffness", "N m/rad", "requested torque per angle from it", 3.7, 0.0, 1.0e3),
@@ -73,10 +77,11 @@ ASSISTANCE_QUANTITIES = (
     Quantity(
         "largest_torque",
         "N m",
-        "limit of the requested torque, either direction; about what 50 psi_g holds",
-        5.0,
+        "limit of the requested torque, either direction; what the actuator reaches unless given",
+        None,
         0.0,
         1.0e3,
+        follows=(REACH,),
     ),
 )
 """Fields of ``Assistance`` in order."""
@@ -177,10 +182,10 @@ EASING_TIME = 0.1
 """Time [s] after a landing on the toes in which a torque in plantarflexion is taken off by the law; it vents after."""
 
 EASED = 0.3
-"""Torque in plantarflexion [N m] above which the law takes it off."""
+"""Torque in plantarflexion [N m] above which the law takes it off: of the wearer, and so the same of any actuator."""
 
 LARGEST_PRESS = 0.7
-"""Largest torque in plantarflexion [N m] that is requested in the swing."""
+"""Largest torque in plantarflexion [N m] that is requested in the swing: about the weight of a foot in its shoe."""
 
 
 def requested_torque(rules: Assistance, phase: PhaseState, time: GaitTime, angle: float, rate: float) -> float:

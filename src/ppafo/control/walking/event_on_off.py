@@ -8,6 +8,7 @@ the ground, so that its gas does not hold the foot down in the swing. The functi
 from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import ControllerKind
+from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
 from ppafo.control.walking.fault_checks import SafetyRules
@@ -37,7 +38,12 @@ class EventOnOffParameters(NamedTuple):
     largest_torque: Annotated[
         float,
         Number(
-            "N m", "torque, either direction, at which the chamber is vented until half of it is left", 5.0, 0.0, 1.0e3
+            "N m",
+            "torque, either direction, at which the chamber is vented until half of it is left",
+            None,
+            0.0,
+            1.0e3,
+            follows=(REACH,),
         ),
     ]
     phases: PhaseRules

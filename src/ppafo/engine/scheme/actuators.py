@@ -1,11 +1,7 @@
-"""An actuator of any kind: what a program calls in place of the vane's functions, and its values from Python.
+"""An actuator of any kind: the functions of its own, for those that take them as ``parts``, and values from Python."""
 
-A program is linked: where its text calls the vane's ``chambers``, ``chamber_pressures``, ``joint_torque`` and what is
-made of them, it calls its actuator's.
-"""
-
-from functools import partial
-from typing import Any, TypeVar
+from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -25,9 +21,11 @@ from ppafo.engine.scheme.pneumatics import (
 from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
 from ppafo.model.actuators.vane import chambers
+from ppafo.model.binding import made_of
 from ppafo.model.columns import over_runs
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.plant import (
+    ActuatorFunctions,
     PlantParameters,
     PlantState,
     chamber_pressures,
@@ -35,43 +33,45 @@ from ppafo.model.plant import (
     joint_torque,
     pressures_per_mass,
 )
-from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
-def rest_volumes(plant: PlantParameters, angle: float) -> tuple[float, float]:
+def rest_volumes(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> tuple[float, float]:
     """Volumes of both chambers [m^3] at the pressures of their supplies: what errors of gas are seen against."""
     # At the supplies' pressures, not the present ones: what an error is measured against must not move with it.
-    still = chambers(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
+    still = parts.chambers(plant, angle, plant.supply_pressure, plant.dorsiflexion_pressure)
     return still.volume_1, still.volume_2
 
 
-def rest_pressures_per_mass(plant: PlantParameters, angle: float) -> tuple[float, float]:
+def rest_pressures_per_mass(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> tuple[float, float]:
     """Pressures over masses [Pa/kg] of both chambers at the pressures of their supplies."""
-    volume_1, volume_2 = rest_volumes(plant, angle)
+    volume_1, volume_2 = rest_volumes(plant, angle, parts=parts)
     return plant.gas_product / volume_1, plant.gas_product / volume_2
 
 
-def pressures_held(plant: PlantParameters, held: HeldChambers, state: PlantState) -> tuple[float, float]:
+def pressures_held(
+    plant: PlantParameters, held: HeldChambers, state: PlantState, *, parts: ActuatorFunctions
+) -> tuple[float, float]:
     """Absolute pressures [Pa] of the gas of a state at the angle that is held, of chambers that may give."""
-    return chamber_pressures(plant, held.angle, state.mass_1, state.mass_2)
+    return parts.pressures(plant, held.angle, state.mass_1, state.mass_2)
 
 
 def begin_shaped_gas(
     plant: PlantParameters,
     state: PlantState,
-    _held: HeldChambers,
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> MovingGas:
     """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``.
 
     Mass answers to pressure as V + p dV/dp: a chamber that gives takes up more gas.
     """
-    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
+    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
     # Volumes at both angles at one pressure: the drift is what the angle alone does.
-    here = chambers(plant, state.angle, pressure_1, pressure_2)
-    ahead = chambers(plant, next_angle, pressure_1, pressure_2)
+    here = parts.chambers(plant, state.angle, pressure_1, pressure_2)
+    ahead = parts.chambers(plant, next_angle, pressure_1, pressure_2)
     per_mass_1 = plant.gas_product / (here.volume_1 + pressure_1 * here.compliance_1)
     per_mass_2 = plant.gas_product / (here.volume_2 + pressure_2 * here.compliance_2)
     linear, flows = linearise(per_mass_1, per_mass_2, flowing, step)
@@ -82,25 +82,33 @@ def begin_shaped_gas(
         pressure_2 * (here.volume_2 - ahead.volume_2) * per_duration,
     )
     first = solve_stage(linear, added_flows(flows, drift))
-    end_1, end_2 = chamber_pressures(
+    end_1, end_2 = parts.pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
     return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
 
 
-def links_of(actuator: ActuatorModel) -> dict[Any, Any]:
-    """Replacements of the vane's functions in a program with this actuator; empty for the vane."""
-    if actuator is VANE:
-        return {}
-    return {
-        chambers: actuator.chambers,
-        joint_torque: actuator.torque,
-        chamber_pressures: actuator.pressures,
-        chamber_volumes: rest_volumes,
-        pressures_per_mass: rest_pressures_per_mass,
-        held_pressures: pressures_held,
-        (PlantParameters, "_replace"): actuator.plant,
-    }
+VANE_FUNCTIONS = ActuatorFunctions(
+    chambers=chambers,
+    pressures=chamber_pressures,
+    torque=joint_torque,
+    rest_volumes=chamber_volumes,
+    rest_pressures_per_mass=pressures_per_mass,
+    held_pressures=held_pressures,
+)
+
+
+@lru_cache(maxsize=256)
+def functions_of_actuator(actuator: ActuatorModel) -> ActuatorFunctions:
+    """Return the functions of an actuator; the vane's volumes depend on no pressure, which spares divisions."""
+    if actuator == VANE:
+        return VANE_FUNCTIONS
+    own = VANE_FUNCTIONS._replace(chambers=actuator.chambers, pressures=actuator.pressures, torque=actuator.torque)
+    return own._replace(
+        rest_volumes=made_of(rest_volumes, "rest_volumes", own),
+        rest_pressures_per_mass=made_of(rest_pressures_per_mass, "rest_pressures_per_mass", own),
+        held_pressures=made_of(pressures_held, "pressures_held", own),
+    )
 
 
 def _of_plant(actuator: ActuatorModel, function: PlainFunction, plant: Any, *given: Any) -> Any:
@@ -139,11 +147,3 @@ def volumes_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any,
 def torque_of(actuator: ActuatorModel, plant: Any, angle: Any, pressure_1: Any, pressure_2: Any) -> Any:
     """Torque [N m] at an angle [rad] and two absolute pressures [Pa], positive in plantarflexion."""
     return _of_plant(actuator, actuator.torque, plant, angle, pressure_1, pressure_2)
-
-
-Seen = TypeVar("Seen", Measurement, GaitMeasurement)
-
-
-def measurement_of(actuator: ActuatorModel, plant: Any, seen: Seen) -> Seen:
-    """Sensor readings with the torque of the actuator at the measured angle and pressures."""
-    return seen._replace(torque=actuator.torque(plant, seen.angle, seen.pressure_1, seen.pressure_2))

@@ -11,15 +11,13 @@ A step may be done in parts, each of which ends where something changes abruptly
 import math
 from typing import NamedTuple
 
-from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers, held_pressures
+from ppafo.engine.scheme.pneumatics import GasChange, HeldChambers
 from ppafo.model.plant import (
+    ActuatorFunctions,
     PlantParameters,
     PlantState,
-    chamber_pressures,
-    chamber_volumes,
     driving_torque,
     holds_still,
-    joint_torque,
     loaded,
     net_torque,
     undamped_torque,
@@ -244,7 +242,7 @@ def depart(
 
 
 def begin_part(
-    plant: PlantParameters, state: PlantState, added_torque: float, longest: float
+    plant: PlantParameters, state: PlantState, added_torque: float, longest: float, *, parts: ActuatorFunctions
 ) -> tuple[FreePart, float]:
     """Predicted part of a step of an unconstrained vane, up to ``longest`` [s] or to a stop, and its length [s].
 
@@ -252,8 +250,8 @@ def begin_part(
     ``added_torque`` [N m] is the leg's at the beginning, beside the plant's own.
     """
     velocity = state.angular_velocity
-    pressure_1, pressure_2 = chamber_pressures(plant, state.angle, state.mass_1, state.mass_2)
-    torque = driving_torque(plant, state.angle, pressure_1, pressure_2) + added_torque
+    pressure_1, pressure_2 = parts.pressures(plant, state.angle, state.mass_1, state.mass_2)
+    torque = driving_torque(plant, state.angle, pressure_1, pressure_2, parts=parts) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
     stays = holds_still(torque, friction.at_rest, state.angle <= plant.angle_min, state.angle >= plant.angle_max)
     leaving = 0.0 if stays else direction_of(torque)
@@ -277,7 +275,13 @@ def begin_part(
 
 
 def slide_part(
-    plant: PlantParameters, state: PlantState, begun: FreePart, added_torque: float, length: float
+    plant: PlantParameters,
+    state: PlantState,
+    begun: FreePart,
+    added_torque: float,
+    length: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[PartSlide, PartEnd]:
     """End of a part of a step for an unconstrained vane that slides on or stays at rest.
 
@@ -285,8 +289,8 @@ def slide_part(
     part would lead without reversal.
     """
     velocity, way = state.angular_velocity, begun.way
-    next_1, next_2 = chamber_pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
-    next_torque = driving_torque(plant, begun.next_angle, next_1, next_2) + added_torque
+    next_1, next_2 = parts.pressures(plant, begun.next_angle, state.mass_1, state.mass_2)
+    next_torque = driving_torque(plant, begun.next_angle, next_1, next_2, parts=parts) + added_torque
     next_rate = velocity + begun.acceleration * length
     friction = friction_now(plant, next_rate, next_1, next_2)
     sliding_torque = undamped_torque(next_torque, way * friction.in_motion, begun.next_angle, next_rate)
@@ -309,11 +313,20 @@ def slide_part(
         departs=0.0 if slides or rests else 1.0,
     )
     angle = begun.next_angle if slides else place
-    return slid, PartEnd(angle, slid_velocity if slides else 0.0, part_error(plant, begun, slid, angle, length))
+    return slid, PartEnd(
+        angle, slid_velocity if slides else 0.0, part_error(plant, begun, slid, angle, length, parts=parts)
+    )
 
 
 def depart_part(
-    plant: PlantParameters, state: PlantState, begun: FreePart, slid: PartSlide, ended: PartEnd, length: float
+    plant: PlantParameters,
+    state: PlantState,
+    begun: FreePart,
+    slid: PartSlide,
+    ended: PartEnd,
+    length: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> PartEnd:
     """The end of a part in which a vane turns or begins to move; any other part ends as it did.
 
@@ -326,7 +339,7 @@ def depart_part(
     left_torque = begun.torque + fraction * (slid.torque - begun.torque)
     departure = Departure(fraction, turning_angle, 0.0)
     angle, rate = depart(plant, departure, left_torque, slid.torque, slid.friction, length)
-    error = part_error(plant, begun, slid, angle, length)
+    error = part_error(plant, begun, slid, angle, length, parts=parts)
     departs = slid.departs > 0.5
     return PartEnd(
         angle=angle if departs else ended.angle,
@@ -335,7 +348,15 @@ def depart_part(
     )
 
 
-def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: float, length: float) -> float:
+def part_error(
+    plant: PlantParameters,
+    begun: FreePart,
+    slid: PartSlide,
+    angle: float,
+    length: float,
+    *,
+    parts: ActuatorFunctions,
+) -> float:
     """Error of the angle [rad] at which a part ends over what is allowed [-]."""
     friction, rate = begun.way * slid.friction.in_motion, slid.angular_velocity
     last = net_torque(slid.torque, friction, plant.viscous_damping, begun.next_angle, rate) * (1.0 / plant.inertia)
@@ -344,7 +365,7 @@ def part_error(plant: PlantParameters, begun: FreePart, slid: PartSlide, angle: 
     # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
     missed = MISSED_FRACTION * abs(angle - begun.next_angle)
     # Where a chamber is small, a little of the angle is much of the pressure.
-    volume_1, volume_2 = chamber_volumes(plant, begun.next_angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, begun.next_angle)
     swept = plant.displacement_per_radian * (plant.angle_max - plant.angle_min)
     allowed_volume = min(ALLOWED_OF_ANGLE * swept, ALLOWED_BY_GAS * min(volume_1, volume_2))
     return (bent + missed) * plant.displacement_per_radian / allowed_volume
@@ -389,7 +410,13 @@ def first_event(
 
 
 def begin_free(
-    plant: PlantParameters, state: PlantState, held: HeldChambers, added_torque: float, step: float
+    plant: PlantParameters,
+    state: PlantState,
+    held: HeldChambers,
+    added_torque: float,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> FreeStep:
     """Predicted step [s] of a vane that is unconstrained between its stops. Equations (1), (2), (10).
 
@@ -397,8 +424,8 @@ def begin_free(
     """
     velocity = state.angular_velocity
     way = direction_of(velocity)
-    pressure_1, pressure_2 = held_pressures(plant, held, state)
-    torque = loaded(joint_torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
+    pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
+    torque = loaded(parts.torque(plant, state.angle, pressure_1, pressure_2), state.angle) + added_torque
     friction = friction_now(plant, velocity, pressure_1, pressure_2)
     sliding = vane_acceleration(
         torque, way * friction.in_motion, plant.viscous_damping, plant.inertia, state.angle, velocity
@@ -415,6 +442,8 @@ def end_free(
     begun: FreeStep,
     added_torque: float,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> FreeEnd:
     """The end of the step [s] of a vane that slides through, from ``state`` with the new gas and the old motion.
 
@@ -424,8 +453,8 @@ def end_free(
     velocity = state.angular_velocity
     way = direction_of(velocity)
     predicted = clamp_angle(plant, begun.free_angle)
-    next_1, next_2 = held_pressures(plant, ahead, state)
-    next_torque = loaded(joint_torque(plant, predicted, next_1, next_2), predicted) + added_torque
+    next_1, next_2 = parts.held_pressures(plant, ahead, state)
+    next_torque = loaded(parts.torque(plant, predicted, next_1, next_2), predicted) + added_torque
     next_rate = velocity + begun.acceleration * step
     friction = friction_now(plant, next_rate, next_1, next_2)
     sliding_torque = undamped_torque(next_torque, way * friction.in_motion, predicted, next_rate)
@@ -441,10 +470,17 @@ def end_free(
 
 
 def depart_free(
-    plant: PlantParameters, state: PlantState, ahead: HeldChambers, begun: FreeStep, ended: FreeEnd, step: float
+    plant: PlantParameters,
+    state: PlantState,
+    ahead: HeldChambers,
+    begun: FreeStep,
+    ended: FreeEnd,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[float, float]:
     """Angle [rad] and angular velocity [rad/s] at the end of the step [s] of a vane that does not slide through."""
-    pressure_1, pressure_2 = held_pressures(plant, ahead, state)
+    pressure_1, pressure_2 = parts.held_pressures(plant, ahead, state)
     friction = friction_now(plant, 0.0, pressure_1, pressure_2)
     departure = first_event(plant, state, begun.free_angle, begun.acceleration, ended.angular_velocity, step)
     departure_torque = begun.torque + departure.fraction * (ended.torque - begun.torque)

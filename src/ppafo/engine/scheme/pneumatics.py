@@ -17,14 +17,12 @@ from typing import Any, NamedTuple
 from ppafo.model.columns import smaller
 from ppafo.model.orifice import FlowCurve, orifice_flow, orifice_flow_slopes
 from ppafo.model.plant import (
+    ActuatorFunctions,
     PlantParameters,
     PlantState,
     PortFlow,
     PortFlowSlopes,
     admitted_flow,
-    chamber_pressures,
-    chamber_volumes,
-    pressures_per_mass,
 )
 from ppafo.model.ports import leakage_path
 
@@ -190,9 +188,9 @@ class HeldChambers(NamedTuple):
     angle: float
 
 
-def held_chambers(plant: PlantParameters, angle: float) -> HeldChambers:
+def held_chambers(plant: PlantParameters, angle: float, *, parts: ActuatorFunctions) -> HeldChambers:
     """Both chambers at an angle [rad]. Equation (3)."""
-    per_mass_1, per_mass_2 = pressures_per_mass(plant, angle)
+    per_mass_1, per_mass_2 = parts.rest_pressures_per_mass(plant, angle)
     return HeldChambers(per_mass_1=per_mass_1, per_mass_2=per_mass_2, angle=angle)
 
 
@@ -290,10 +288,12 @@ def begin_moving_gas(
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> MovingGas:
     """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    return begin_moving_stage(plant, state, held, next_angle, linear, flows, step)
+    return begin_moving_stage(plant, state, held, next_angle, linear, flows, step, parts=parts)
 
 
 def begin_moving_stage(
@@ -304,10 +304,12 @@ def begin_moving_stage(
     linear: Linearisation,
     flows: Flows,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> MovingGas:
     """First stage of one step [s] with moving volumes, from all flows at its beginning and their linearisation."""
-    volumes = chamber_volumes(plant, state.angle)
-    next_volumes = chamber_volumes(plant, next_angle)
+    volumes = parts.rest_volumes(plant, state.angle)
+    next_volumes = parts.rest_volumes(plant, next_angle)
     # A growing volume lowers the pressure as a loss of mass at this rate would; parts of a step may have no length.
     per_duration = 1.0 / (plant.gas_product * max(step, SHORTEST))
     drift = response(
@@ -316,7 +318,7 @@ def begin_moving_stage(
         state.mass_2 * held.per_mass_2 * (volumes[1] - next_volumes[1]) * per_duration,
     )
     first = solve_stage(linear, added_flows(flows, drift))
-    end_1, end_2 = chamber_pressures(
+    end_1, end_2 = parts.pressures(
         plant, next_angle, state.mass_1 + step * first.mass_1, state.mass_2 + step * first.mass_2
     )
     return MovingGas(StillGas(linear=linear, first=first, end_1=end_1, end_2=end_2), drift)
@@ -387,7 +389,15 @@ def moving_change(plant: PlantParameters, begun: StillGas, second: Flows, step: 
     )
 
 
-def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle: float, step: float) -> float:
+def gas_error(
+    plant: PlantParameters,
+    begun: StillGas,
+    second: Flows,
+    next_angle: float,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
+) -> float:
     """Estimated error of both pressures at the end of a step [s] over what is allowed [-].
 
     What the second stage adds to the first, damped once by the matrix of the step, so that a chamber that has settled
@@ -398,7 +408,7 @@ def gas_error(plant: PlantParameters, begun: StillGas, second: Flows, next_angle
     refused = admitted_flow(drawn, plant.relieving) - drawn
     added_1 = linear.d * (begun.first.mass_1 + second.mass_1) - linear.b * (begun.first.mass_2 + second.mass_2)
     added_2 = linear.a * (begun.first.mass_2 + second.mass_2) - linear.c * (begun.first.mass_1 + second.mass_1)
-    volume_1, volume_2 = chamber_volumes(plant, next_angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
     # Damped by the matrix once, not twice: the estimate stays above the error that it stands for.
     scale = abs(linear.scale)
     content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)
@@ -413,13 +423,21 @@ def larger_share(part_1: float, whole_1: float, part_2: float, whole_2: float) -
     return max(part_1 * whole_2, part_2 * whole_1) / (whole_1 * whole_2)
 
 
-def opening_error(plant: PlantParameters, begun: StillGas, shift: float, next_angle: float, step: float) -> float:
+def opening_error(
+    plant: PlantParameters,
+    begun: StillGas,
+    shift: float,
+    next_angle: float,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
+) -> float:
     """Error of taking a valve's mean opening in a step [s] over what is allowed [-].
 
     ``shift`` [-] is the relative change of the opening. Opening and flow change together, and a twelfth of the product
     of both changes is missed; the matrix of the step says how the flow responds to itself.
     """
-    volume_1, volume_2 = chamber_volumes(plant, next_angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, next_angle)
     response_1 = abs(begun.linear.a - 1.0) * abs(begun.first.mass_1)
     response_2 = abs(begun.linear.d - 1.0) * abs(begun.first.mass_2)
     content_1 = volume_1 * pressure_that_matters(plant, begun.end_1)

@@ -19,7 +19,7 @@ from ppafo.engine.scheme.pneumatics import (
     response,
     solve_stage,
 )
-from ppafo.model.plant import PlantParameters, PlantState, TrueMasses, chamber_volumes
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, TrueMasses
 from ppafo.model.ports import gas_density, ideal_density
 
 
@@ -44,9 +44,9 @@ def true_mass(content: float, volume: float) -> float:
     return volume * gas_density(content / volume)
 
 
-def masses_at_start(plant: PlantParameters, initial: PlantState) -> TrueMasses:
+def masses_at_start(plant: PlantParameters, initial: PlantState, *, parts: ActuatorFunctions) -> TrueMasses:
     """True masses [kg] of the gas in both chambers of a state, whose masses are those of an ideal gas."""
-    volume_1, volume_2 = chamber_volumes(plant, initial.angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, initial.angle)
     return TrueMasses(true_mass(initial.mass_1, volume_1), true_mass(initial.mass_2, volume_2))
 
 
@@ -73,10 +73,12 @@ def begin_real_gas(
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> RealGas:
     """First stage of one step [s] in which the angle runs to ``next_angle`` [rad]; as ``begin_moving_gas``."""
-    volume_1, volume_2 = chamber_volumes(plant, state.angle)
-    next_1, next_2 = chamber_volumes(plant, next_angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, state.angle)
+    next_1, next_2 = parts.rest_volumes(plant, next_angle)
     density_1, density_2 = masses.mass_1 / volume_1, masses.mass_2 / volume_2
     _, stiffness_1 = ideal_density(density_1)
     _, stiffness_2 = ideal_density(density_2)
@@ -124,7 +126,9 @@ def with_real_gas(state: PlantState, masses: TrueMasses, change: RealChange) -> 
     )
 
 
-def at_angle(plant: PlantParameters, state: PlantState, masses: TrueMasses, angle: float) -> PlantState:
+def at_angle(
+    plant: PlantParameters, state: PlantState, masses: TrueMasses, angle: float, *, parts: ActuatorFunctions
+) -> PlantState:
     """State with the gas contents at the angle [rad] that the vane reached."""
-    volume_1, volume_2 = chamber_volumes(plant, angle)
+    volume_1, volume_2 = parts.rest_volumes(plant, angle)
     return state._replace(mass_1=content_of(masses.mass_1, volume_1), mass_2=content_of(masses.mass_2, volume_2))

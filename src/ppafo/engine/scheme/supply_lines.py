@@ -21,14 +21,14 @@ from ppafo.engine.scheme.pneumatics import (
     linearise,
     pressure_that_matters,
 )
-from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, begin_thermal_stage, chambers_at_begin, transport
+from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas, WarmFunctions, begin_thermal_stage, transport
 from ppafo.model.plant import (
+    ActuatorFunctions,
     PlantParameters,
     PlantState,
     PortFlowSlopes,
     ThermalParameters,
     ThermalState,
-    chamber_volumes,
 )
 from ppafo.model.regulator import LineState, LineStep, SupplyLines, line_pressures, step_lines
 
@@ -86,16 +86,18 @@ def begin_fed_gas(
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> FedGas:
     """First stage of one step [s] with volumes that run towards ``next_angle`` [rad]; ports at line pressures."""
-    held = held_chambers(plant, state.angle)
+    held = held_chambers(plant, state.angle, parts=parts)
     linear, flows = linearise(held.per_mass_1, held.per_mass_2, flowing, step)
-    volumes = chamber_volumes(plant, state.angle)
+    volumes = parts.rest_volumes(plant, state.angle)
     linear = with_lines(linear, volumes[0] / lines.volume_1, volumes[1] / lines.volume_2)
-    chambers = begin_moving_stage(plant, state, held, next_angle, linear, flows, step)
+    chambers = begin_moving_stage(plant, state, held, next_angle, linear, flows, step, parts=parts)
     first = chambers.still.first
     # What of the sums is line 2's: the same stage once more, for one number.
-    growth = (volumes[1] - chamber_volumes(plant, next_angle)[1]) / (volumes[1] * max(step, SHORTEST))
+    growth = (volumes[1] - parts.rest_volumes(plant, next_angle)[1]) / (volumes[1] * max(step, SHORTEST))
     drift_2 = linear.supplied_by_2 * state.mass_2 * growth
     taken_2 = flowing.in_2.from_source + drift_2 + linear.supplied_by_2 * first.mass_2
     stepped = lines_after(plant, lines, line_state, step * (first.supplied - taken_2), step * taken_2, 0.0, step)
@@ -173,9 +175,11 @@ def begin_fed_thermal_gas(
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: WarmFunctions,
 ) -> FedThermalGas:
     """First stage of one step [s] as ``begin_fed_gas``, for gas with an energy balance."""
-    at_begin = chambers_at_begin(plant, state, next_angle, step)
+    at_begin = parts.chambers_at_begin(plant, state, next_angle, step)
     at, ratio = at_begin.chambers, thermal.heat_capacity_ratio
     # A chamber that gives takes more gas for a rise of its pressure.
     share_1 = at.volume_1 * (1.0 + ratio * at.give_1) / lines.volume_1
@@ -184,7 +188,7 @@ def begin_fed_thermal_gas(
     in_1 = with_line(flowing.in_1, 1.0 / ratio * share_1)
     in_2 = with_line(flowing.in_2, 1.0 / ratio * share_2)
     flowing = SlopedFlows(in_1, in_2, flowing.leak)
-    chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step)
+    chambers = begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
     first, by_2 = chambers.first, chambers.matrix.slopes.supplied_by_2
     drift_2 = -by_2 * state.mass_2 * at.growth_2 / at.volume_2
     taken_2 = mass_from_source(thermal, in_2.from_source, state, masses) + drift_2 + by_2 * first.content_2

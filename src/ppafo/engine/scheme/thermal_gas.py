@@ -20,6 +20,7 @@ A rigid chamber has ``x`` 0 (docs/equations.md).
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from ppafo.engine.scheme.pneumatics import (
@@ -33,6 +34,7 @@ from ppafo.engine.scheme.pneumatics import (
 )
 from ppafo.model.gas import enthalpy_flow_ratio, mass_flow_ratio
 from ppafo.model.plant import (
+    ActuatorFunctions,
     PlantParameters,
     PlantState,
     PortFlow,
@@ -372,6 +374,15 @@ def solve_thermal_stage(matrix: ThermalMatrix, right: ThermalFlows) -> ThermalFl
     )
 
 
+class WarmFunctions(NamedTuple):
+    """Functions of chambers with an energy balance, which an actuator has of its own."""
+
+    chambers_at_begin: Callable[..., ThermalBegin]
+    chambers_at_end: Callable[..., WarmChambers]
+    after_motion: Callable[..., PlantState]
+    with_work: Callable[..., ThermalState]
+
+
 def begin_thermal_gas(
     plant: PlantParameters,
     thermal: ThermalParameters,
@@ -380,10 +391,12 @@ def begin_thermal_gas(
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: WarmFunctions,
 ) -> ThermalGas:
     """First stage of one step [s] in which the volumes run linearly towards ``next_angle`` [rad]."""
-    at_begin = chambers_at_begin(plant, state, next_angle, step)
-    return begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step)
+    at_begin = parts.chambers_at_begin(plant, state, next_angle, step)
+    return begin_thermal_stage(plant, thermal, state, masses, at_begin, next_angle, flowing, step, parts=parts)
 
 
 def chambers_at_begin(plant: PlantParameters, state: PlantState, next_angle: float, step: float) -> ThermalBegin:
@@ -419,6 +432,8 @@ def begin_thermal_stage(
     next_angle: float,
     flowing: SlopedFlows,
     step: float,
+    *,
+    parts: WarmFunctions,
 ) -> ThermalGas:
     """First stage of one step [s] with chambers that run to ``next_angle`` [rad], from all flows and their slopes."""
     in_1, in_2, leak = flowing.in_1, flowing.in_2, flowing.leak
@@ -446,7 +461,7 @@ def begin_thermal_stage(
         drift=drift,
         end=end,
         end_masses=end_masses,
-        ended=chambers_at_end(plant, at, state, end, next_angle, step),
+        ended=parts.chambers_at_end(plant, at, state, end, next_angle, step),
     )
 
 
@@ -585,7 +600,12 @@ def with_work(plant: PlantParameters, masses: ThermalState, before: PlantState, 
     )
 
 
-def masses_at_start(_plant: PlantParameters, initial: PlantState) -> ThermalState:
+def masses_at_start(
+    _plant: PlantParameters,
+    initial: PlantState,
+    *,
+    parts: ActuatorFunctions,  # noqa: ARG001 - those of a gas that is not ideal need them
+) -> ThermalState:
     """True masses [kg] of gas at the reference temperature, where they are what the state counts, and no energy yet."""
     return ThermalState(
         mass_1=initial.mass_1,

@@ -14,7 +14,7 @@ from ppafo.engine.scheme.motion import (
     end_free,
     with_motion,
 )
-from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers, held_pressures
+from ppafo.engine.scheme.pneumatics import HeldChambers, held_chambers
 from ppafo.model import contact as ground
 from ppafo.model.elementary import TURNS_OF_RADIAN, sine_and_cosine_of_turns
 from ppafo.model.gait import (
@@ -22,7 +22,7 @@ from ppafo.model.gait import (
     GaitTiming,
 )
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.plant import PlantParameters, PlantState, joint_torque, loaded, net_torque
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, loaded, net_torque
 from ppafo.model.ports import friction_in_motion
 
 
@@ -164,10 +164,12 @@ def begin_walk(
     carried: CarriedFoot,
     next_gait: GaitNow,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> WalkStep:
     """Predicted step [s] of the foot, free and on the ground; ``carried`` is its load at the start of the step."""
     torque = torque_with_carried(leg, walk.contact, walk.now, timing.ground_angle, state.angle, carried)
-    free = begin_free(plant, state, held, torque, step)
+    free = begin_free(plant, state, held, torque, step, parts=parts)
     # The difference fades implicitly, so that a step longer than the fading time does not overshoot.
     offset = walk.offset / (1.0 + step / ground.FADING_TIME)
     prescribed = ground.prescribed_ankle(walk.contact, next_gait, timing.ground_angle, leg.keeps_gait)
@@ -196,6 +198,8 @@ def external_torque(
     led: ground.Ankle,
     acceleration: float,
     angle_is_free: bool,
+    *,
+    parts: ActuatorFunctions,
 ) -> float:
     """T_ex [N m]: what a free foot needs, equation (11), or what equation (1) leaves of the actuator on the ground.
 
@@ -206,8 +210,8 @@ def external_torque(
     # In the air the foot takes what its own motion needs; on the ground the shank leads, and the device gives what is
     # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
-    pressure_1, pressure_2 = held_pressures(plant, held, state)
-    driving = loaded(joint_torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
+    pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
+    driving = loaded(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
     net = net_torque(driving, way * friction, share.viscous_damping, state.angle, speed)
@@ -225,6 +229,8 @@ def reach_end(
     now: GaitNow,
     ahead: HeldChambers,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[WalkEnd, CarriedFoot]:
     """End of a step [s] without an event inside it; arguments as in ``end_walk``.
 
@@ -237,7 +243,7 @@ def reach_end(
     # The same for both ends of an event: the foot's direction changes little within a step.
     carried = carried_foot(leg, share, now, foot)
     torque = torque_with_carried(leg, walk.contact, now, timing.ground_angle, predicted, carried)
-    slid = end_free(plant, state, ahead, begun.free, torque, step)
+    slid = end_free(plant, state, ahead, begun.free, torque, step, parts=parts)
     moved = FreeEnd(
         torque=slid.torque,
         angle=slid.angle if free else begun.led.angle,
@@ -248,12 +254,19 @@ def reach_end(
 
 
 def depart_in_walk(
-    plant: PlantParameters, state: PlantState, begun: WalkStep, ended: WalkEnd, ahead: HeldChambers, step: float
+    plant: PlantParameters,
+    state: PlantState,
+    begun: WalkStep,
+    ended: WalkEnd,
+    ahead: HeldChambers,
+    step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[WalkEnd, HeldChambers]:
     """End and chambers of a step [s] inside which an event leads the foot elsewhere; else as they are."""
-    angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step)
+    angle, rate = depart_free(plant, state, ahead, begun.free, ended.motion, step, parts=parts)
     departs, slid = ended.motion.departs > 0.5, ended.motion
-    there = held_chambers(plant, angle)
+    there = held_chambers(plant, angle, parts=parts)
     held = HeldChambers(
         per_mass_1=there.per_mass_1 if departs else ahead.per_mass_1,
         per_mass_2=there.per_mass_2 if departs else ahead.per_mass_2,
@@ -282,6 +295,8 @@ def end_walk(
     carried: CarriedFoot,
     now: GaitNow,
     step: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[PlantState, WalkState]:
     """State at the end of the step [s], from ``state`` with the new gas and the angle of the begin.
 
@@ -290,7 +305,19 @@ def end_walk(
     free = ground.is_free(walk.contact, leg.keeps_gait)
     after = with_motion(state, ended.motion.angle, ended.motion.angular_velocity)
     acceleration = (after.angular_velocity - state.angular_velocity) / max(step, 1.0e-30)
-    given = external_torque(plant, leg, share, after, held, ended.torque, -carried.plate, begun.led, acceleration, free)
+    given = external_torque(
+        plant,
+        leg,
+        share,
+        after,
+        held,
+        ended.torque,
+        -carried.plate,
+        begun.led,
+        acceleration,
+        free,
+        parts=parts,
+    )
     landed = ground.landing(walk.contact, timing, now, after.angle, begun.offset, leg.keeps_gait)
     height = leg.toe_lever * (ended.foot.sine - now.sine_healthy_foot)
     turned = after.angle - state.angle

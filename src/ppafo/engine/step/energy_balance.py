@@ -1,11 +1,8 @@
 """Gas with an energy balance in a step."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from ppafo.engine.groups import Groups, given, handed, kept
 from ppafo.engine.program import Program
-from ppafo.engine.scheme import thermal_gas, warm_actuators
+from ppafo.engine.scheme import thermal_gas
 from ppafo.engine.scheme.thermal_gas import ThermalFlows, ThermalGas
 from ppafo.engine.step.lane import Lane
 from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
@@ -13,12 +10,6 @@ from ppafo.model.plant import PlantState, ThermalParameters, ThermalState
 IS_THERMAL = True
 HAS_TRUE_MASSES = True
 START = thermal_gas.masses_at_start
-IN_SHAPES: Mapping[Any, Any] = {
-    thermal_gas.chambers_at_begin: warm_actuators.chambers_at_begin,
-    thermal_gas.chambers_at_end: warm_actuators.chambers_at_end,
-    thermal_gas.after_motion: warm_actuators.after_motion,
-    thermal_gas.with_work: warm_actuators.with_work,
-}
 
 
 def groups(parts: Program) -> Groups:
@@ -34,7 +25,14 @@ def groups(parts: Program) -> Groups:
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """Set the first stage of the step: flows and pressures at its begin, and the pressures to which they lead."""
     lane.thermal_gas = thermal_gas.begin_thermal_gas(
-        lane.plant, lane.thermal, lane.state, lane.masses, next_angle, lane.flowing, length
+        lane.plant,
+        lane.thermal,
+        lane.state,
+        lane.masses,
+        next_angle,
+        lane.flowing,
+        length,
+        parts=parts.warm_functions,
     )
 
 
@@ -78,10 +76,10 @@ def add(parts: Program, lane: Lane) -> None:
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
     """The gas does its work up to where the joint came [rad], not to where the stages assumed it."""
-    return thermal_gas.after_motion(lane.plant, lane.thermal, state, assumed, reached)
+    return parts.warm_functions.after_motion(lane.plant, lane.thermal, state, assumed, reached)
 
 
 def work(parts: Program, lane: Lane) -> None:
     """Count what the gas did on shaft and walls; a locked joint whose chambers are rigid takes no work."""
     if not parts.is_locked or parts.actuator.gives:
-        lane.warmed = thermal_gas.with_work(lane.plant, lane.warmed, lane.state, lane.after)
+        lane.warmed = parts.warm_functions.with_work(lane.plant, lane.warmed, lane.state, lane.after)

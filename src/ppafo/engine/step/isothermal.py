@@ -1,8 +1,5 @@
 """Gas that keeps its temperature in a step: of a vane at rest or in motion, and of other actuators."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from ppafo.engine.groups import Groups, handed
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import pneumatics
@@ -15,7 +12,6 @@ from ppafo.model.plant import PlantState
 IS_THERMAL = False
 HAS_TRUE_MASSES = False
 START = None
-IN_SHAPES: Mapping[Any, Any] = {pneumatics.begin_moving_gas: begin_shaped_gas}
 
 
 def groups(parts: Program) -> Groups:
@@ -31,9 +27,17 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """Set the first stage of the step, of chambers that stand still or move, which run to ``next_angle`` [rad]."""
     if parts.keeps_volumes:
         lane.still_gas = pneumatics.begin_still_gas(lane.state, lane.held, lane.flowing, length)
+    elif parts.has_vane:
+        functions = parts.functions
+        is_held = parts.hands_chambers_on
+        held = lane.held if is_held else pneumatics.held_chambers(lane.plant, lane.state.angle, parts=functions)
+        lane.moving_gas = pneumatics.begin_moving_gas(
+            lane.plant, lane.state, held, next_angle, lane.flowing, length, parts=functions
+        )
     else:
-        held = lane.held if parts.hands_chambers_on else pneumatics.held_chambers(lane.plant, lane.state.angle)
-        lane.moving_gas = pneumatics.begin_moving_gas(lane.plant, lane.state, held, next_angle, lane.flowing, length)
+        lane.moving_gas = begin_shaped_gas(
+            lane.plant, lane.state, next_angle, lane.flowing, length, parts=parts.functions
+        )
 
 
 def moving(parts: Program, lane: Lane) -> MovingGas:
@@ -72,12 +76,12 @@ def change(parts: Program, lane: Lane, length: float) -> None:
 
 def error(parts: Program, lane: Lane, ahead: float, length: float) -> float:
     """Error of the pressures over what is allowed [-]; ``ahead`` is the angle [rad] to which the volumes run."""
-    return pneumatics.gas_error(lane.plant, still(parts, lane), lane.second, ahead, length)
+    return pneumatics.gas_error(lane.plant, still(parts, lane), lane.second, ahead, length, parts=parts.functions)
 
 
 def shift_error(parts: Program, lane: Lane, shift: float, ahead: float, length: float) -> float:
     """Error that a moving valve makes in a part of a step, over what is allowed [-]."""
-    return pneumatics.opening_error(lane.plant, still(parts, lane), shift, ahead, length)
+    return pneumatics.opening_error(lane.plant, still(parts, lane), shift, ahead, length, parts=parts.functions)
 
 
 def add(parts: Program, lane: Lane) -> None:

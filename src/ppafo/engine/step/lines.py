@@ -47,10 +47,18 @@ def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
             next_angle,
             lane.flowing,
             length,
+            parts=parts.warm_functions,
         )
     else:
         lane.fed_gas = supply_lines.begin_fed_gas(
-            lane.plant, lane.lines, lane.line_state, lane.state, next_angle, lane.flowing, length
+            lane.plant,
+            lane.lines,
+            lane.line_state,
+            lane.state,
+            next_angle,
+            lane.flowing,
+            length,
+            parts=parts.functions,
         )
 
 

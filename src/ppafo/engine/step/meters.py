@@ -6,7 +6,7 @@ from ppafo.engine.step.phases import present_pressures
 from ppafo.engine.step.sample import reference_at
 from ppafo.model.controlled import TORQUE, controlled
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import ThermalParameters, joint_torque
+from ppafo.model.plant import ThermalParameters
 from ppafo.signals.meter import (
     NO_ENERGY,
     SAME_LEVEL,
@@ -35,7 +35,7 @@ def make_sample(parts: Program, lane: Lane, moment: float, number: int, interval
         angular_velocity=lane.state.angular_velocity,
         pressure_1=pressure_1,
         pressure_2=pressure_2,
-        torque=joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2),
+        torque=parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2),
         command=lane.result.command,
         reference=wanted_at(parts, lane, time),
         temperature_1=temperature(lane.thermal, lane.state.mass_1, lane.masses.mass_1) if parts.is_thermal else 0.0,
@@ -116,7 +116,7 @@ def origin_of(parts: Program, lane: Lane) -> float:
     if parts.controlled == TORQUE:
         return 0.0
     pressure_1, pressure_2 = present_pressures(parts, lane)
-    torque = joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
+    torque = parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2)
     return float(controlled(lane.state.angle, pressure_1, pressure_2, torque))
 
 

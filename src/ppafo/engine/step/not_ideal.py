@@ -1,8 +1,5 @@
 """Gas that is not ideal in a step: its stages, and their errors, are those of an ideal one, on true masses."""
 
-from collections.abc import Mapping
-from typing import Any
-
 from ppafo.engine.groups import Groups, handed, kept
 from ppafo.engine.program import Program
 from ppafo.engine.scheme import pneumatics, real_gas
@@ -14,7 +11,6 @@ from ppafo.model.plant import PlantState, TrueMasses
 IS_THERMAL = False
 HAS_TRUE_MASSES = True
 START = real_gas.masses_at_start
-IN_SHAPES: Mapping[Any, Any] = {}
 
 ends, first_flows = isothermal.ends, isothermal.first_flows
 error, shift_error = isothermal.error, isothermal.shift_error
@@ -32,7 +28,9 @@ def groups(parts: Program) -> Groups:
 
 def begin(parts: Program, lane: Lane, next_angle: float, length: float) -> None:
     """Set the first stage of the step: flows and pressures at its begin, and the pressures to which they lead."""
-    lane.real_gas = real_gas.begin_real_gas(lane.plant, lane.state, lane.masses, next_angle, lane.flowing, length)
+    lane.real_gas = real_gas.begin_real_gas(
+        lane.plant, lane.state, lane.masses, next_angle, lane.flowing, length, parts=parts.functions
+    )
 
 
 def change(parts: Program, lane: Lane, length: float) -> None:
@@ -48,7 +46,7 @@ def add(parts: Program, lane: Lane) -> None:
 
 def move(parts: Program, lane: Lane, state: PlantState, assumed: float, reached: float) -> PlantState:
     """The gas contents at the angle [rad] that the vane reached."""
-    return real_gas.at_angle(lane.plant, state, lane.warmed, reached)
+    return real_gas.at_angle(lane.plant, state, lane.warmed, reached, parts=parts.functions)
 
 
 def work(parts: Program, lane: Lane) -> None:

@@ -12,8 +12,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme import motion, pneumatics
 from ppafo.engine.step import stated
 from ppafo.engine.step.lane import Lane, Now
-from ppafo.model.actuators.vane import chambers
-from ppafo.model.plant import PlantParameters, chamber_pressures
+from ppafo.model.plant import PlantParameters
 from ppafo.model.ports import at_valve, shown_signals
 
 # Beyond 1e6 rad/s or 1 t of gas a run is lost.
@@ -57,7 +56,7 @@ def command_of(parts: Program, lane: Lane, now: Now) -> float:
 
 def hold_chambers(parts: Program, lane: Lane) -> None:
     """Chamber factors (pressure per mass) before the first step; constant for a locked vane."""
-    lane.held = pneumatics.held_chambers(lane.plant, lane.state.angle)
+    lane.held = pneumatics.held_chambers(lane.plant, lane.state.angle, parts=parts.functions)
 
 
 def begin_step(parts: Program, lane: Lane) -> None:
@@ -92,7 +91,7 @@ def measure_part(parts: Program, lane: Lane, now: Now) -> None:
     if parts.is_adaptive and parts.angle is None:
         beginning = time + motion.SAME_INSTANT if parts.shank_jumps else time
         added = torque_of_leg(parts, lane, beginning, lane.state.angle)
-        lane.begun, until = motion.begin_part(lane.plant, lane.state, added, until)
+        lane.begun, until = motion.begin_part(lane.plant, lane.state, added, until, parts=parts.functions)
     lane.length = until
     lane.remaining = remaining
 
@@ -136,8 +135,8 @@ def plant_now(parts: Program, lane: Lane, now: Now) -> PlantParameters:
 def present_pressures(parts: Program, lane: Lane) -> tuple[float, float]:
     """Both pressures [Pa absolute] of the state."""
     if parts.hands_chambers_on:
-        return pneumatics.held_pressures(lane.plant, lane.held, lane.state)
-    return chamber_pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
+        return parts.functions.held_pressures(lane.plant, lane.held, lane.state)
+    return parts.actuator.pressures(lane.plant, lane.state.angle, lane.state.mass_1, lane.state.mass_2)
 
 
 def with_leak(
@@ -226,14 +225,16 @@ def slide(parts: Program, lane: Lane, now: Now) -> None:
     # Just before a jump that ends the part, as the next one begins just behind it.
     ending = end - motion.SAME_INSTANT if parts.shank_jumps else end
     added = torque_of_leg(parts, lane, ending, lane.begun.next_angle)
-    lane.slid, lane.moved = motion.slide_part(lane.plant, lane.fed, lane.begun, added, length)
+    lane.slid, lane.moved = motion.slide_part(lane.plant, lane.fed, lane.begun, added, length, parts=parts.functions)
 
 
 def depart(parts: Program, lane: Lane) -> None:
     """End of the part if the vane reverses or starts to move: rare."""
     parts.gas.add(parts, lane)
     length = length_of(parts, lane)
-    lane.moved = motion.depart_part(lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length)
+    lane.moved = motion.depart_part(
+        lane.plant, lane.fed, lane.begun, lane.slid, lane.moved, length, parts=parts.functions
+    )
 
 
 # The end.
@@ -310,7 +311,7 @@ def error_of(parts: Program, lane: Lane, now: Now) -> float:
 def rests(parts: Program, lane: Lane) -> bool:
     """True where a joint that is led stands still in a step, and its chambers are slow enough for a whole one."""
     room = lane.plant.atmospheric_pressure
-    still = chambers(lane.plant, lane.state.angle, room, room)
+    still = parts.actuator.chambers(lane.plant, lane.state.angle, room, room)
     # A stricter tolerance counts as a longer step, as where a run is planned.
     length = lane.timing.step / min(1.0, lane.timing.tolerance)
     stiffness = lane.thermal.heat_capacity_ratio if parts.is_thermal else 1.0
@@ -360,7 +361,7 @@ def sense_end(parts: Program, lane: Lane, now: Now, length: float, taken: bool) 
     A signal that is late by a fraction of a step is looked at by that much before its end.
     """
     angle = lane.after.angle
-    pressure_1, pressure_2 = chamber_pressures(lane.plant, angle, lane.after.mass_1, lane.after.mass_2)
+    pressure_1, pressure_2 = parts.actuator.pressures(lane.plant, angle, lane.after.mass_1, lane.after.mass_2)
     if "shown_signals" in parts.ports_with_laws:
         angle, pressure_1, pressure_2 = shown_signals(angle, pressure_1, pressure_2)
     look_at = (1.0 - lane.timing.signal_lag) * lane.timing.step

@@ -3,7 +3,6 @@
 from ppafo.engine.program import Program
 from ppafo.engine.step.lane import Lane, Now
 from ppafo.engine.step.phases import present_pressures
-from ppafo.model.plant import joint_torque
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import (
     Fault,
@@ -61,9 +60,9 @@ def vane(parts: Program, lane: Lane, now: Now) -> Measurement:
     else:
         angle, pressure_1, pressure_2 = present_signals(parts, lane)
     if parts.ideal_sensors:
-        torque = joint_torque(lane.plant, angle, pressure_1, pressure_2)
+        torque = parts.actuator.torque(lane.plant, angle, pressure_1, pressure_2)
         return Measurement(angle=angle, pressure_1=pressure_1, pressure_2=pressure_2, torque=torque)
-    return measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant, now.sample)
+    return measure(lane.sensors, angle, pressure_1, pressure_2, lane.plant, now.sample, parts=parts.functions)
 
 
 def present_signals(parts: Program, lane: Lane) -> tuple[float, float, float]:
@@ -97,7 +96,7 @@ def gait(parts: Program, lane: Lane) -> GaitMeasurement:
         angle=lane.state.angle,
         pressure_1=pressure_1,
         pressure_2=pressure_2,
-        torque=joint_torque(lane.plant, lane.state.angle, pressure_1, pressure_2),
+        torque=parts.actuator.torque(lane.plant, lane.state.angle, pressure_1, pressure_2),
         heel_force=lane.walk.heel_force,
         toe_force=lane.walk.toe_force,
     )
@@ -118,6 +117,7 @@ def measure_walk(parts: Program, lane: Lane, now: Now) -> None:
         lane.plant,
         now.step * lane.timing.step,
         now.sample,
+        parts=parts.functions,
     )
 
 
@@ -141,6 +141,7 @@ def late_gait(parts: Program, lane: Lane, now: Now) -> GaitMeasurement:
         lane.signal_history[3, place_of_late(parts, lane, now, sensors.pressure_1_fault)],
         lane.signal_history[4, place_of_late(parts, lane, now, sensors.pressure_2_fault)],
         lane.plant,
+        parts=parts.functions,
     )
 
 

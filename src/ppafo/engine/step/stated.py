@@ -4,7 +4,7 @@ from ppafo.engine.program import Program
 from ppafo.engine.scheme.pneumatics import SHORTEST
 from ppafo.engine.step.lane import Lane
 from ppafo.model.effects.kind import PlantSnapshot
-from ppafo.model.plant import PlantState, chamber_pressures
+from ppafo.model.plant import PlantState
 
 LARGEST = 1.0e300
 """A state beyond this, or one that is no number, is a failure."""
@@ -14,7 +14,7 @@ def moment(
     parts: Program, lane: Lane, state: PlantState, supplied: float, vented: float, command: float
 ) -> PlantSnapshot:
     """State of the plant that effects depend on, with mean flows [kg/s]."""
-    pressure_1, pressure_2 = chamber_pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
+    pressure_1, pressure_2 = parts.actuator.pressures(lane.plant, state.angle, state.mass_1, state.mass_2)
     return PlantSnapshot(
         angle=state.angle,
         angular_velocity=state.angular_velocity,

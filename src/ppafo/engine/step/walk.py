@@ -102,6 +102,7 @@ def begin(parts: Program, lane: Lane) -> None:
         lane.carried,
         lane.next_gait,
         length_of(parts, lane),
+        parts=parts.functions,
     )
 
 
@@ -112,7 +113,7 @@ def assumed_angle(parts: Program, lane: Lane) -> float:
 
 def hold_ahead(parts: Program, lane: Lane) -> None:
     """Set the chambers at the angle to which the volumes run."""
-    lane.ahead = held_chambers(lane.plant, assumed_angle(parts, lane))
+    lane.ahead = held_chambers(lane.plant, assumed_angle(parts, lane), parts=parts.functions)
 
 
 # Behind it.
@@ -132,6 +133,7 @@ def reach(parts: Program, lane: Lane) -> None:
         lane.next_gait,
         lane.ahead,
         length_of(parts, lane),
+        parts=parts.functions,
     )
 
 
@@ -139,7 +141,13 @@ def depart(parts: Program, lane: Lane) -> None:
     """End of a step in which the foot reverses or starts to move: rare."""
     parts.gas.add(parts, lane)
     lane.ended, lane.ahead = walking.depart_in_walk(
-        lane.plant, lane.fed, lane.walk_begun, lane.ended, lane.ahead, length_of(parts, lane)
+        lane.plant,
+        lane.fed,
+        lane.walk_begun,
+        lane.ended,
+        lane.ahead,
+        length_of(parts, lane),
+        parts=parts.functions,
     )
 
 
@@ -160,6 +168,7 @@ def end(parts: Program, lane: Lane, length: float) -> None:
         lane.carried,
         lane.next_gait,
         length,
+        parts=parts.functions,
     )
     if parts.takes_task_sequence:
         # A stride's marks: a scuff on the toe sensor, a forefoot on a stair's edge.

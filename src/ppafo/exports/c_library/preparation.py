@@ -392,7 +392,7 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     lane.result = LaneResult(0.0, NEVER_FAILED, 0.0)
     lane.pace = StepControl(lane.step)
     if program.gas.START is not None:
-        lane.masses = program.gas.START(lane.plant, lane.state)
+        lane.masses = program.gas.START(lane.plant, lane.state, parts=program.functions)
     lane.valve_state = parts.constant(program.valve.initial())
     if program.controller is not None:
         lane.controller_state = parts.constant(program.controller.initial)

@@ -283,11 +283,13 @@ def run_with(prepared: PreparedExperiment, numbers: Mapping[str, Any]) -> Run:
         if valve != base.program.valve or (valve.command_delay(given) > 0.0) != base.program.late_commands:
             moved = " or ".join(f"valve.{name}" for name in now if name in own and 0.0 in (now[name], before[name]))
             raise IdentificationError(
-                f"{said}: {moved} went to or from 0, another model of the valve; give a start and a lower bound above 0"
+                f"{said}: {moved} changed to or from 0, which is another model of the valve; give a start and a "
+                f"lower bound above 0"
             )
     if any(np.any(is_on != (effect in base.program.effects)) for effect, is_on in switches_of(device).items()):
         raise IdentificationError(
-            f"{said}: an effect went on or off, which is another model; start above 0 and give a lower bound above 0"
+            f"{said}: an effect was switched on or off by the fit, which is another model; give a start and a lower "
+            f"bound above 0"
         )
     planned, _ = plan_runs(scenario)
     # The engine allows a fraction of the supply pressure. Where that is fitted, the error in pascals must stay.

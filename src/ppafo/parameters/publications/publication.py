@@ -13,7 +13,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ScenarioError, first_twice
 
@@ -68,7 +69,7 @@ def read_publication(name_or_path: str | Path) -> tuple[PublicationFile, str]:
     read, file = read_model(FILE, PublicationFile, name_or_path)
     twice = first_twice(entry.id for entry in read.claims)
     if twice is not None:
-        raise ScenarioError(f"{file}: claims: '{twice}' is there twice; give each claim a name of its own")
+        raise ScenarioError(f"{file}: claims: '{twice}' appears twice; give each claim a different name")
     # What one field alone cannot say: these are rules between fields.
     for entry in read.claims:
         where = f"{file}: claims.{entry.id}"

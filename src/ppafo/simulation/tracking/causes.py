@@ -8,6 +8,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
@@ -24,6 +25,7 @@ from ppafo.simulation.tracking.remedies import (
     slower_loops,
     smaller_pair,
     speed_settings,
+    stiffened,
     stiffer_laws,
     torque_asked,
 )
@@ -33,13 +35,15 @@ _MOSTLY = 0.5
 """Share of the settled part that is most of it [-]."""
 _EDGE = 1.05
 """Command over the dead band up to which it counts as within the band [-]."""
+_EXPLAINED = 0.6
+"""Share of the squared error that one lag explains, from which it is told [-]."""
 _QUICKER = 1.3
 """Rate at an angle over the rate the gains are made for, from which it causes oscillation [-]."""
 
 
-def cause_of_task(case: Case) -> TrackingCause:
-    """First cause that applies to a task."""
-    return next(cause for find in _OF_TASK if (cause := find(case)) is not None)
+def causes_of_task(case: Case) -> tuple[TrackingCause, ...]:
+    """Causes that apply to a task, the surest first."""
+    return tuple(cause for find in _OF_TASK if (cause := find(case)) is not None)
 
 
 def _unless_oscillating(case: Case) -> TrackingCause | None:
@@ -76,9 +80,9 @@ def oscillation(case: Case) -> TrackingCause | None:
     if law is None:
         return TrackingCause("its controller is of yours", (), "give it smaller gains")
     angle = float(np.mean(case.recording["angle"][case.settled.samples]))
-    # The gains of a locked joint are those of its angle.
-    is_locked = scenario.motion.motion_kind.name == "locked"
-    quicker = 1.0 if is_locked else quicker_at(scenario.device, angle, scenario.controlled)
+    # Gains are those of where the joint is to be, where that is known.
+    is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
+    quicker = 1.0 if is_known else quicker_at(scenario.device, angle, scenario.controlled)
     if law.only_switches:
         return _steps_of_pair(case, law, quicker)
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]
@@ -152,6 +156,24 @@ def _fully_open_valve(case: Case) -> TrackingCause | None:
     return TrackingCause(text, sized_valves(case.scenario, (3.0, 10.0)), "take a larger valve or a slower reference")
 
 
+def _lag(case: Case) -> TrackingCause | None:
+    """The reference moves more quickly than the loop follows; by how much it is late, where that explains the error."""
+    scenario, samples = case.scenario, case.settled.samples
+    reference, value = (series[samples] for series in followed(case.recording))
+    slope, error = np.gradient(reference, case.recording.time[samples]), reference - value
+    squares = float(np.mean(slope**2))
+    if squares == 0.0 or case.settled.rests or case.only_switches:
+        return None
+    late = float(np.mean(slope * error)) / squares
+    text = "its reference moves more quickly than the loop follows"
+    if late > 0.0 and late**2 * squares >= _EXPLAINED * case.settled.error**2:
+        text = f"it is {1.0e3 * late:.3g} ms behind its reference"
+    remedies = [*stiffened(scenario, (2.0, 4.0)), *larger_gains(scenario, case.law, (2.0, 4.0))]
+    frequency = float(scenario.reference.settings.get("frequency", 0.0))
+    remedies += [remedy(scenario, {"reference.frequency": share * frequency}) for share in (0.7, 0.4, 0.2) if frequency]
+    return TrackingCause(text, tuple(remedies), "take larger gains, less delay or a slower reference")
+
+
 def gains_of_another_device(case: Case) -> TrackingCause | None:
     """A gain differs from the one the device asks for."""
     right = gain_of_device(case.scenario, case.law)
@@ -189,6 +211,7 @@ _OF_TASK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     oscillation,
     _fully_open_valve,
     gains_of_another_device,
+    _lag,
     _not_settled,
 )
 """Causes of a task, the surest first; the last one always applies."""

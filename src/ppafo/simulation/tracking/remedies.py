@@ -184,6 +184,17 @@ def stiffer_laws(
     return [remedy(scenario, numbers) for numbers in found]
 
 
+def stiffened(scenario: Scenario, factors: Iterable[float]) -> list[Remedy]:
+    """Remedies with the angle stiffness times each of some factors and the damping that belongs to it; none without."""
+    settings = scenario.controller.settings
+    names = [(name, power) for name, power in (("angle_stiffness", 1.0), ("angle_damping", 0.5)) if name in settings]
+    return [
+        remedy(scenario, {f"controller.{name}": float(settings[name]) * factor**power for name, power in names})
+        for factor in factors
+        if names
+    ]
+
+
 def dead_band(scenario: Scenario) -> float:
     """Dead band of the valve [-], 0 for a valve without."""
     return float(scenario.device.valve.settings.get("dead_band", 0.0))

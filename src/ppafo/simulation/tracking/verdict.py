@@ -11,8 +11,8 @@ from ppafo.metrics.metric import has_reference
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking.case import Case
-from ppafo.simulation.tracking.causes import cause_of_task
+from ppafo.simulation.tracking.case import Case, TrackingCause
+from ppafo.simulation.tracking.causes import causes_of_task
 from ppafo.simulation.tracking.load_causes import torque_beyond_reach
 from ppafo.simulation.tracking.remedies import Remedy, change_text
 from ppafo.simulation.tracking.rule import (
@@ -28,7 +28,7 @@ from ppafo.simulation.tracking.rule import (
     settled_walk,
     torque_limit,
 )
-from ppafo.simulation.tracking.walk_causes import cause_of_walk
+from ppafo.simulation.tracking.walk_causes import causes_of_walk
 from ppafo.units.shown import in_units, units_in_force
 
 if TYPE_CHECKING:
@@ -44,10 +44,10 @@ class Tracking:
 
     ``error`` and ``wanted`` are the RMS error of the settled part and the change wanted, ``missing`` the mean error,
     ``moved`` how far the value went, all in SI of what is ``controlled``. ``reversals`` are the command's ``per``
-    stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``tried`` what
-    did; ``span`` is the range of the error of an angle that swings, where neither it nor its command turns often, else
-    0; ``accepted`` is the reason that the scenario gives for a reference beyond reach, "" without one. The settled part
-    begins at ``since`` [s], 0 for a walk.
+    stride or second. ``cause`` says what hinders it, ``remedies`` what might help, the likeliest first, ``others`` what
+    else applies, less surely, ``tried`` what did help; ``span`` is the range of the error of an angle that swings where
+    neither it nor its command turns often, else 0; ``accepted`` is the reason that the scenario gives for a reference
+    beyond reach, "" without one. The settled part begins at ``since`` [s], 0 for a walk.
     """
 
     kind: Failure
@@ -61,6 +61,7 @@ class Tracking:
     cause: str
     advice: str
     remedies: tuple[Remedy, ...] = ()
+    others: tuple[TrackingCause, ...] = ()
     accepted: str = ""
     tried: str = ""
     at_rest: bool = True
@@ -137,16 +138,20 @@ def tracking_of(
 
     ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
     """
-    if not has_reference(recording) or len(recording) < _FEWEST_SAMPLES or scenario.controller.is_open_loop:
-        return None
     is_task = scenario.follows_reference
-    settled = settled_task(scenario, recording) if is_task else settled_walk(recording)
+    if (
+        len(recording) < _FEWEST_SAMPLES
+        or scenario.controller.is_open_loop
+        or (is_task and not has_reference(recording))
+    ):
+        return None
+    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
+    settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)
     if settled is None:
         return None
     duration = float(np.ptp(recording.time[[0, -1]]))
     counted = settled.reversals * max(duration, 1.0) if is_noisy(scenario) else reversals
     turning = counted / most_reversals(scenario, law, duration, stride_time)
-    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
     if is_task:
         failure = failure_of_task(settled, turning, law is not None and law.only_switches)
     else:
@@ -158,7 +163,7 @@ def tracking_of(
         case = case._replace(failure=failure)
     if failure is None:
         return None
-    cause = cause_of_task(case) if is_task else cause_of_walk(case)
+    cause, *others = causes_of_task(case) if is_task else causes_of_walk(case)
     return Tracking(
         kind=failure,
         controlled=scenario.controlled,
@@ -171,6 +176,7 @@ def tracking_of(
         cause=cause.text,
         advice=cause.advice,
         remedies=cause.remedies,
+        others=tuple(other for other in others if other.remedies),
         accepted=scenario.beyond_reach if cause.is_beyond_reach else "",
         at_rest=settled.rests,
         since=settled.start,

@@ -18,6 +18,9 @@ def test_a_peak_torque_above_the_limit_of_the_controller_is_said() -> None:
         "controller.peak_torque = 9 N m: the request is limited by controller.largest_torque = 5 N m"
     )
     assert safety_remarks(walk(load_walk("proportional", [peak, "controller.largest_torque=9 N m"]), minutes=0.1)) == []
+    law = ["device.valve=proportional", "controller.kind=event_proportional", "controller.vent_time=0.15 s"]
+    (said,) = safety_remarks(walk(load_walk("off", [*law, peak]), minutes=0.1))
+    assert said.endswith("largest_torque = 5 N m; the actuator gives no more at this supply")
 
 
 @pytest.mark.long

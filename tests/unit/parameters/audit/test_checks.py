@@ -157,7 +157,7 @@ def test_a_set_with_almost_nothing_in_it_has_nothing_to_say_but_what_is_missing(
     assert (finding.id, finding.severity) == ("missing-values", "warning")
     with pytest.raises(ParameterError) as caught:
         build_device(replace(BASE, numbers={}, texts={}))
-    refused = str(caught.value).partition("a device needs ")[2].partition(": missing here")[0].split(", ")
+    refused = str(caught.value).partition("the device lacks ")[2].partition("; ")[0].split(", ")
     assert all(path in finding.paragraph for path in refused)
     assert "valves.solenoid.area" in finding.paragraph
 

@@ -6,10 +6,9 @@ where the toes would not clear the ground.
 
 from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements, WalkedDevice
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.control.walking.assistance import ASSISTANCE_QUANTITIES
 from ppafo.model.catalog import VALVES
 from ppafo.model.shut_off import SHUT_OFF
-from ppafo.parameters.declaration import ACTUATOR, ORIFICE
+from ppafo.parameters.declaration import ACTUATOR, ORIFICE, SPECIES_PATH
 from ppafo.parameters.parts import Part
 from ppafo.units.shown import written_text
 from ppafo.walking.loading import load_walk
@@ -20,8 +19,6 @@ _REQUESTS = (1.0, 1.3, 1.7)
 """Torque requested of a torque controller over the torque wanted, in turn: it lags behind its reference."""
 _ABOVE = 1.1
 """Limit of a pair over the torque that is wanted: it vents the chamber from its limit on."""
-_LIMIT = next(quantity.default or 0.0 for quantity in ASSISTANCE_QUANTITIES if quantity.name == "largest_torque")
-"""Largest torque [N m] that a controller of walking requests by default."""
 _MINUTES = 0.15
 """Minutes of the walks that are compared at a constant supply: a few strides after those that settle."""
 _DORSIFLEXION = 0.9
@@ -48,10 +45,11 @@ def few_strides(requirements: DesignRequirements, valve: Part, actuator: Part) -
     """
     common = _common_overrides(requirements, valve, actuator)
     strides: list[WalkedDevice] = []
+    own_limit = float(load_walk(WALKS[valve.kind]).controller.settings["largest_torque"])
     for request in _requests(requirements, valve, actuator):
-        for lift in _lifts(request, requirements, valve, actuator):
+        for lift in _lifts(request, own_limit, requirements, valve, actuator):
             peak = (f"controller.peak_torque={request:.4g} N m",) if valve.kind == _PROPORTIONAL else ()
-            limit = (f"controller.largest_torque={request:.4g} N m",) if request > _LIMIT else ()
+            limit = (f"controller.largest_torque={request:.4g} N m",) if request > own_limit else ()
             tried = _strides_of(valve, actuator, (*common, *peak, *limit, *lift))
             if tried is None:
                 break
@@ -76,6 +74,7 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(requirements),
+        *((f"{SPECIES_PATH}={requirements.gas}",) if requirements.gas else ()),
         f"supply.pressure={written_text(requirements.pressure, 'Pa_a')}",
         f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),
@@ -92,16 +91,18 @@ def _requests(requirements: DesignRequirements, valve: Part, actuator: Part) -> 
     return list(dict.fromkeys(min(factor * requirements.torque, held) for factor in _REQUESTS))
 
 
-def _lifts(request: float, requirements: DesignRequirements, valve: Part, actuator: Part) -> list[tuple[str, ...]]:
+def _lifts(
+    request: float, own_limit: float, requirements: DesignRequirements, valve: Part, actuator: Part
+) -> list[tuple[str, ...]]:
     """Return overrides of the lift in the swing: the walk's own, then one that begins at toe-off, with all torque.
 
-    A pair of solenoid valves has its own alone.
+    ``own_limit`` [N m] is the limit of the walk itself. A pair of solenoid valves has its own alone.
     """
     if valve.kind != _PROPORTIONAL:
         return [()]
     held = actuator.values["torque_constant"] * _DORSIFLEXION * (requirements.pressure - STANDARD_ATMOSPHERE)
     # The limit as its override has it, with four digits.
-    torque = min(held, max(float(f"{request:.4g}"), _LIMIT))
+    torque = min(held, max(float(f"{request:.4g}"), own_limit))
     return [(), (f"controller.swing_peak_torque={torque:.4g} N m", *_EARLY_LIFT)]
 
 

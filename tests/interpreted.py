@@ -1,8 +1,7 @@
 """A composed text as Python runs it, with what compiled code gives where Python would raise.
 
-It is the last resort for what is no program of a device: an episode of an environment, a bench. Of programs Python runs
-the functions themselves (``interpreter.py``). The bits are those of every compiler, the time is some hundred times
-theirs. Arrays are handed over as memory views, whose elements are Python's own numbers.
+Tests need no compiler then: the package itself runs functions, not their text (``ppafo/engine/interpreter.py``). Arrays
+are handed over as memory views, whose elements are Python's own numbers.
 """
 
 import ast
@@ -17,9 +16,20 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.entries import entry_types
-from ppafo.engine.in_python import MATH, power, quotient, whole_part
+from ppafo.engine.in_python import MATH, quotient, whole_part
+from ppafo.engine.loading import compiled
 from ppafo.engine.plain_python import parse_module, place_in, refusal
 from ppafo.model.declaration import PlainFunction
+
+
+def load_source(source: str) -> ModuleType:
+    """The module of a composed text: compiled, or where no compiler works as Python runs it."""
+    return compiled(source) or interpreted(source)
+
+
+def power(base: float, exponent: float) -> float:
+    """A power as the C library has it: NaN for a root of a negative number, where Python's is complex."""
+    return float(MATH.pow(base, exponent))
 
 
 @lru_cache(maxsize=64)
