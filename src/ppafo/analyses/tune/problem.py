@@ -258,11 +258,18 @@ def list_tunings() -> tuple[str, ...]:
 
 @checked
 def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Problem:
-    """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
+    """Load a tuning problem.
 
-    ``overrides`` change the scenario. StudyError for anything that is not usable.
+    Arguments:
+        tuning: name of a tuning, a .toml file, or data laid out as such a file
+        overrides: changes of the scenario, as texts or a dictionary
+        plugins: modules of your own, files or names, whose objects files may name
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Returns:
+        the Problem, checked
+
+    Raises:
+        StudyError: a tuning that cannot be used
 
     >>> import ppafo
     >>> print(ppafo.load_tuning("pid-gains"))
