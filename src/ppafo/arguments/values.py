@@ -19,7 +19,7 @@ _LONGEST = 60
 _SEVERAL = ", or several"
 
 
-class NotLoaded:
+class _NotLoaded:
     """A class that an annotation names and its module does not load: its objects are known by the name of theirs.
 
     Help of a command loads no such module; who passes an object of the class has loaded it.
@@ -39,11 +39,11 @@ class _AnnotationNames(dict[str, Any]):
 
     def __missing__(self, name: str) -> Any:
         """Return a name of Python, or a class in the place of one that is not loaded."""
-        return getattr(builtins, name) if hasattr(builtins, name) else type(name, (NotLoaded,), {})
+        return getattr(builtins, name) if hasattr(builtins, name) else type(name, (_NotLoaded,), {})
 
 
 def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.Parameter]:
-    """Return the parameters by name, each with what its annotation says; a class that is not loaded is a ``NotLoaded``.
+    """Return the parameters by name, each with what its annotation says; a class not loaded is a ``_NotLoaded``.
 
     A parameter without an annotation has the empty one of ``inspect``, as a function of somebody else may.
     """
@@ -54,7 +54,7 @@ def annotated_parameters(function: Callable[..., Any]) -> Mapping[str, inspect.P
 
 
 def _annotations(function: Callable[..., Any]) -> Mapping[str, Any]:
-    """Return the annotations of a function by name; a class that is not loaded is a ``NotLoaded``."""
+    """Return the annotations of a function by name; a class that is not loaded is a ``_NotLoaded``."""
     names = _AnnotationNames(vars(sys.modules[function.__module__]))
     return typing.get_type_hints(function, localns=names, include_extras=True)
 
@@ -257,7 +257,7 @@ def _among(allowed: tuple[Any, ...], value: Any) -> Any:
 
 
 def _instance(kind: type, value: Any) -> Any:
-    is_named = issubclass(kind, NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
+    is_named = issubclass(kind, _NotLoaded) and any(base.__name__ == kind.__name__ for base in type(value).__mro__)
     if not is_named and not isinstance(value, kind):
         raise ValueError
     return value

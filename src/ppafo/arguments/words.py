@@ -102,7 +102,7 @@ def fraction(text: str) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class NumberRange:
+class _NumberRange:
     """Numbers from ``lowest`` or ``above`` to ``highest``, in a unit."""
 
     lowest: float = -math.inf
@@ -124,9 +124,9 @@ class NumberRange:
         return ", ".join(end for end, is_there in ends if is_there)
 
 
-ANY = NumberRange()
-ABOVE_ZERO = NumberRange(above=0.0)
-FROM_ZERO = NumberRange(lowest=0.0)
+ANY = _NumberRange()
+ABOVE_ZERO = _NumberRange(above=0.0)
+FROM_ZERO = _NumberRange(lowest=0.0)
 
 
 class NumberWithUnit(float):
@@ -151,7 +151,7 @@ def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
     return units
 
 
-def quantity(si_unit: str, allowed: NumberRange = ANY) -> Callable[[str], float]:
+def quantity(si_unit: str, allowed: _NumberRange = ANY) -> Callable[[str], float]:
     """Return what turns a text with a unit, such as ``10 min``, into a number in SI; ArgumentError for others.
 
     A number alone is refused with examples, and one outside the range.
@@ -264,7 +264,7 @@ def taken_whole(least: int) -> Callable[[Any], int]:
     return take
 
 
-def taken_number(allowed: NumberRange = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
+def taken_number(allowed: _NumberRange = ANY, read: Callable[[str], float] | None = None) -> Callable[[Any], float]:
     """Return what takes a finite number in a range, also of NumPy, or a text that ``read`` reads."""
 
     def take(value: Any) -> float:
@@ -372,7 +372,7 @@ def taken_point(value: Any) -> float | str:
     return taken_number()(value)
 
 
-def _quantity_word(metavar: str, si_unit: str, allowed: NumberRange = ANY) -> Word:
+def _quantity_word(metavar: str, si_unit: str, allowed: _NumberRange = ANY) -> Word:
     """Return the word of a quantity: a text with its unit, and in Python a number in SI as well."""
     read = quantity(si_unit, allowed)
     shown = {"Pa_a": "Pa (absolute)"}.get(si_unit, si_unit)
@@ -400,7 +400,7 @@ def fraction_word(help_text: str = "") -> Word:
     return Word(
         "FRACTION",
         fraction,
-        taken_number(NumberRange(0.0, highest=1.0), fraction),
+        taken_number(_NumberRange(0.0, highest=1.0), fraction),
         "a number from 0 to 1, or a percentage such as '95%'",
         help=help_text,
     )
@@ -420,7 +420,7 @@ Mass = Annotated[float, _quantity_word("MASS", "kg", ABOVE_ZERO)]
 Length = Annotated[float, _quantity_word("LENGTH", "m", ABOVE_ZERO)]
 Time = Annotated[float, _quantity_word("TIME", "s")]
 Duration = Annotated[float, _quantity_word("TIME", "s", FROM_ZERO)]
-Patience = Annotated[float, _quantity_word("TIME", "s", NumberRange(above=0.0, highest=3600.0))]
+Patience = Annotated[float, _quantity_word("TIME", "s", _NumberRange(above=0.0, highest=3600.0))]
 Torque = Annotated[float, _quantity_word("TORQUE", "N m", ABOVE_ZERO)]
 Pressure = Annotated[float, _quantity_word("PRESSURE", "Pa_a", ABOVE_ZERO)]
 Flow = Annotated[float, _quantity_word("FLOW", "kg/s", ABOVE_ZERO)]

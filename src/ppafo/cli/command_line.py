@@ -37,7 +37,7 @@ OUT = "out"
 """The parameter of a verb that writes its folder or file itself; every other command has ``--out DIR``."""
 
 
-class Verb(Protocol):
+class _Verb(Protocol):
     """A function whose signature is the arguments of a command, and whose result is what the command says."""
 
     __module__: str
@@ -63,12 +63,12 @@ class Command:
     listed: str = ""
     default_folder: str = ""
     first_line: str = ""
-    found: Verb | None = None
+    found: _Verb | None = None
     """The verb itself, of another package, in place of where it is."""
 
-    def function(self) -> Verb:
+    def function(self) -> _Verb:
         """Load and return the verb."""
-        verb: Verb = self.found or kind_at(self.verb)
+        verb: _Verb = self.found or kind_at(self.verb)
         return verb
 
     @property
@@ -103,7 +103,7 @@ _PARAMETER = re.compile(r"(\w+): (.*)")
 
 
 @dataclass(frozen=True, slots=True)
-class OptionType:
+class _OptionType:
     """Option type: how an annotation turns the text of a parameter into its value."""
 
     word: Word
@@ -112,7 +112,7 @@ class OptionType:
     choices: tuple[str, ...] | None = None
 
 
-def reading_of(annotation: Any) -> OptionType:
+def reading_of(annotation: Any) -> _OptionType:
     """Return how the text of a parameter with an annotation is read."""
     word, is_repeated = None, False
     while True:
@@ -126,14 +126,14 @@ def reading_of(annotation: Any) -> OptionType:
         elif isinstance(origin, type) and issubclass(origin, Iterable):
             is_repeated, annotation = True, inner[0]
         elif origin is typing.Literal:
-            return OptionType(word or Word("|".join(inner)), choices=inner)
+            return _OptionType(word or Word("|".join(inner)), choices=inner)
         else:
             is_flag = annotation is bool
             word = word or _PLAIN.get(annotation, Word("TEXT"))
-            return OptionType(word, is_flag, is_repeated or word.is_repeated)
+            return _OptionType(word, is_flag, is_repeated or word.is_repeated)
 
 
-def parameters_of(verb: Verb) -> Iterator[tuple[inspect.Parameter, OptionType]]:
+def parameters_of(verb: _Verb) -> Iterator[tuple[inspect.Parameter, _OptionType]]:
     """Return each parameter that words of the line fill, with how its text is read."""
     for name, parameter in annotated_parameters(verb).items():
         if name not in (PROGRESS, PLUGINS):
@@ -152,7 +152,7 @@ def argparse_reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return reader
 
 
-def option_of(parameter: inspect.Parameter, reading: OptionType) -> str:
+def option_of(parameter: inspect.Parameter, reading: _OptionType) -> str:
     """Return the option that fills a parameter, empty where its place in the line does; a flag has no place."""
     if reading.word.option or not (reading.is_flag or parameter.kind is inspect.Parameter.KEYWORD_ONLY):
         return reading.word.option
@@ -205,7 +205,7 @@ def add_parameters(parser: argparse.ArgumentParser, command: Command, is_listing
 def _add_parameter(
     parser: argparse.ArgumentParser,
     parameter: inspect.Parameter,
-    reading: OptionType,
+    reading: _OptionType,
     help_text: str,
     may_be_missing: bool,
     is_listing: bool,

@@ -14,7 +14,7 @@ _FOLDER = resources.files("ppafo") / "examples"
 
 
 @dataclass(frozen=True, slots=True)
-class Example:
+class _Example:
     """Example of the documentation: its title, the page that explains it, and its commands in order."""
 
     summary: str
@@ -26,10 +26,12 @@ class Example:
         return {"summary": self.summary, "page": self.page, "commands": list(self.commands)}
 
 
-def load_examples() -> dict[str, Example]:
+def load_examples() -> dict[str, _Example]:
     """Return the examples of the package by name."""
     content = tomllib.loads((_FOLDER / "catalogue.toml").read_text(encoding="utf-8"))
-    return {name: Example(entry["summary"], entry["page"], tuple(entry["commands"])) for name, entry in content.items()}
+    return {
+        name: _Example(entry["summary"], entry["page"], tuple(entry["commands"])) for name, entry in content.items()
+    }
 
 
 def example_files(name: str) -> dict[PurePosixPath, bytes]:

@@ -1,6 +1,5 @@
 """``ppafo simulate SCENARIO``: runs a scenario and writes a result folder, with a report that simulates."""
 
-import sys
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -51,10 +50,9 @@ def simulate(
 def _run(chosen: "Configured", folder: Path, check: bool) -> CommandOutput:
     from ppafo.running import gains, tried
     from ppafo.simulation.simulate import simulate
-    from ppafo.simulation.tracking.pair_step import coarse_pair
+    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 
-    if coarse := coarse_pair(chosen):
-        print(f"ppafo: {coarse}", file=sys.stderr, flush=True)
+    tell_coarse_pairs([chosen])
     result = simulate(chosen)
     in_force, verdict = gains(chosen), tried(chosen, result.tracking)
     # A run that diverged has no result to repeat; its exit code says so already.

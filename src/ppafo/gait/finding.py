@@ -124,7 +124,7 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
                 panels=partial(gait_panels, gait, imported),
                 name="gait",
                 caption=_CAPTION,
-                size=(7.0, 1.7),
+                size=(5.4, 1.6),
                 title=f"{gait.name}: {gait.body_mass:.4g} kg{speed}, stride {gait.stride_time:.3g} s",
                 is_detail=True,
             ),

@@ -34,7 +34,7 @@ from ppafo.walking.wearer import draw_builds
 
 
 @dataclass(frozen=True, slots=True)
-class WalkEpisodes:
+class _WalkEpisodes:
     """Episodes of a walk, ``commanded`` from outside; ``randomise`` draws another wearer with another gait for each."""
 
     base: Scenario
@@ -62,7 +62,7 @@ class WalkEpisodes:
         return self.base
 
 
-def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> WalkEpisodes:
+def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> _WalkEpisodes:
     """Return the episodes of a walk of some length [s]; the profile of its controller is the requested torque.
 
     ScenarioError for a walk with a task sequence or a bottle, or whose controller has no profile.
@@ -84,7 +84,7 @@ def walk_episodes(configuration: Scenario, randomise: bool, seconds: float) -> W
     program, clock = episode_program(batch)
     plain = EpisodeStarts(batch.parameters, batch.states, np.array([numbers(goal)]).T)
     # Nothing is recorded between two samples: an agent sees what is observed.
-    return WalkEpisodes(configuration, commanded, program, replace(clock, record_every=0), randomise, plain)
+    return _WalkEpisodes(configuration, commanded, program, replace(clock, record_every=0), randomise, plain)
 
 
 FLAWED_SENSORS = (
@@ -198,7 +198,7 @@ def _scenario(file: str | Path, words: Sequence[str], duration: float | None) ->
 
 def _walk_episodes(
     file: str | Path, words: Sequence[str], varied: Ranges, settings: EnvironmentSettings
-) -> WalkEpisodes:
+) -> _WalkEpisodes:
     if varied:
         raise ScenarioError(f"vary: {', '.join(varied)}: a walk varies its wearer and gait only; omit vary")
     walk, duration = load_walk(file, words), settings.duration
@@ -207,7 +207,7 @@ def _walk_episodes(
 
 
 _EPISODES: Mapping[
-    str, Callable[[str | Path, Sequence[str], Ranges, EnvironmentSettings], ScenarioEpisodes | WalkEpisodes]
+    str, Callable[[str | Path, Sequence[str], Ranges, EnvironmentSettings], ScenarioEpisodes | _WalkEpisodes]
 ] = {
     "torque": _torque_episodes,
     "angle": _angle_episodes,

@@ -20,7 +20,7 @@ NOT_YET = -1.0
 
 
 @dataclass(frozen=True, slots=True)
-class StrideQuantity:
+class _StrideQuantity:
     """A quantity of every stride: unit, meaning, and the running total in the record whose gain it is."""
 
     unit: str
@@ -28,18 +28,18 @@ class StrideQuantity:
     total: str
 
 
-PER_STRIDE: dict[str, StrideQuantity] = {
-    "gas": StrideQuantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
-    "positive_push_off_work": StrideQuantity(
+PER_STRIDE: dict[str, _StrideQuantity] = {
+    "gas": _StrideQuantity("kg", "gas taken from the supply in one stride", "state.supplied_mass"),
+    "positive_push_off_work": _StrideQuantity(
         "J", "positive work of T_ex while the foot rolls over the toes", "walk.positive_push_off_work"
     ),
-    "net_push_off_work": StrideQuantity(
+    "net_push_off_work": _StrideQuantity(
         "J", "net work of T_ex while the foot rolls over the toes", "walk.net_push_off_work"
     ),
-    "toe_clearance": StrideQuantity(
+    "toe_clearance": _StrideQuantity(
         "m", "lowest toe height in mid-swing, relative to the healthy gait", "walk.clearances"
     ),
-    "toe_landing": StrideQuantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
+    "toe_landing": _StrideQuantity("-", "1 where the toes met the ground before the heel", "walk.toe_landings"),
 }
 
 

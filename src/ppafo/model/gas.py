@@ -14,7 +14,7 @@ from ppafo.model.elementary import power
 
 
 @dataclass(frozen=True, slots=True)
-class Species:
+class _Species:
     """A gas as data: molar mass [kg/mol] and heat capacity ratio [-] near room temperature."""
 
     name: str
@@ -25,13 +25,15 @@ class Species:
 
 _WEBBOOK = "NIST Chemistry WebBook, SRD 69, at 298 K and 1 bar"
 
-SPECIES: dict[str, Species] = {
+SPECIES: dict[str, _Species] = {
     species.name: species
     for species in (
-        Species("CO2", MOLAR_MASSES["CO2"], 1.3, "the paper, p. 3, after equation (3); WebBook: 0.04401 kg/mol, 1.294"),
-        Species("air", MOLAR_MASSES["air"], 1.4, _WEBBOOK),
-        Species("N2", MOLAR_MASSES["N2"], 1.401, _WEBBOOK),
-        Species("He", MOLAR_MASSES["He"], 1.667, _WEBBOOK),
+        _Species(
+            "CO2", MOLAR_MASSES["CO2"], 1.3, "the paper, p. 3, after equation (3); WebBook: 0.04401 kg/mol, 1.294"
+        ),
+        _Species("air", MOLAR_MASSES["air"], 1.4, _WEBBOOK),
+        _Species("N2", MOLAR_MASSES["N2"], 1.401, _WEBBOOK),
+        _Species("He", MOLAR_MASSES["He"], 1.667, _WEBBOOK),
     )
 }
 

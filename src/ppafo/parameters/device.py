@@ -20,13 +20,13 @@ VANE = "vane"
 """The kind of actuator that is the paper's; see the catalogue of actuators."""
 
 
-class Holding(Protocol):
+class _Holding(Protocol):
     """A section of a device or scenario that shows numbers of its fields ``HELD``, mappings or objects, as its own."""
 
     HELD: ClassVar[tuple[str, ...]]
 
 
-def held_in(section: Holding, name: str) -> str | None:
+def held_in(section: _Holding, name: str) -> str | None:
     """Return which field of ``HELD`` has a number; None where none has it."""
     for field_name in section.HELD:
         holder = getattr(section, field_name)
@@ -35,7 +35,7 @@ def held_in(section: Holding, name: str) -> str | None:
     return None
 
 
-def held(section: Holding, name: str) -> Any:
+def held(section: _Holding, name: str) -> Any:
     """Return a number of one of the fields of ``HELD``, for ``__getattr__``; AttributeError where none has it."""
     # A copy asks for names that begin so, and for the fields themselves, before there are any.
     if not name.startswith("_") and name not in section.HELD:

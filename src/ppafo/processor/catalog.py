@@ -21,7 +21,7 @@ _SAID_OUTPUTS = "simio info counter\nmd simulated_outputs 4"
 
 
 @final
-class MspdebugSimulator:
+class _MspdebugSimulator:
     """mspdebug's simulator of an MSP430 with an image in it."""
 
     def __init__(self, target: Target, image: Image) -> None:
@@ -123,7 +123,7 @@ MSP430F2013 = Target(
     tools=("make", "clang", "ld.lld", "mspdebug"),
     packages="make, clang, lld and mspdebug",
     counted="cycles",
-    simulator=MspdebugSimulator,
+    simulator=_MspdebugSimulator,
 )
 
 

@@ -48,7 +48,7 @@ class PythonProcessor:
         return command, self.state.sound
 
 
-class SimulatedController:
+class _SimulatedController:
     """The simulated processor as a controller of a scenario; it keeps the decision of every sample."""
 
     def __init__(self, simulator: ProcessorSimulator, converter: Converter) -> None:
@@ -107,7 +107,7 @@ def run_on_processor(scenario: Scenario, target: str = TARGETS[0]) -> ProcessorR
     scenario = integer_form(scenario)
     fixed = fixed_point_controller(scenario)
     with processor_simulator(firmware(scenario, target), target_of(target)) as (simulator, image):
-        law = SimulatedController(simulator, fixed.converter)
+        law = _SimulatedController(simulator, fixed.converter)
         fixed_point_kind = simulate(scenario.controlled_by(law))
         cost = cost_of(target_of(target), image, simulator.stack(), law.decisions)
     in_lanes = simulate(scenario)

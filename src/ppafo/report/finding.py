@@ -114,7 +114,7 @@ class Section:
     name: str = ""
     caption: str = ""
     across: int = 1
-    size: tuple[float, float] = (6.6, 2.9)
+    size: tuple[float, float] = (5.2, 2.6)
     title: str = ""
     note: str = ""
     code: str = ""

@@ -2,15 +2,16 @@
 
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ppafo.report.kind import Kind
-from ppafo.report.style import BLUE, VERMILION, house_style, mark_kind
+from ppafo.report.style import BLUE, DASHES, VERMILION, house_style, mark_kind
 from ppafo.signals import RecordingKind
+from ppafo.units import without_exponent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,6 +58,26 @@ _LINE = 0.17
 """Inches of a line of the note."""
 _LETTERS, _FEWEST_LETTERS, _KIND = 11.0, 24, 1.0
 """Letters of a title on an inch, the fewest on a line, and inches that its kind of numbers takes beside it."""
+_ENTRY, _ENTRY_LETTERS = 0.53, 14.5
+"""Inches of an entry of a legend without its name, and letters of names on an inch."""
+_ROW, _ABOVE = 13.0, 6.0
+"""Points of a row of a legend, and from the axes to a title."""
+_LABEL_LETTERS, _AXIS_ROOM = 13.0, 0.55
+"""Letters of a label on an inch of its axis, and inches of the height of a panel that its axis does not have."""
+_DASHED_SHAPES = ("line", "bars")
+"""Shapes that have the dashes of their colours beside others."""
+_TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
+"""Points of a title, and the fraction of them that it has at least."""
+_TITLE_LINE = 0.2
+"""Inches of a line of the title."""
+_OF_LEGEND: Mapping[str, Any] = {
+    "borderaxespad": 0.1,
+    "handlelength": 2.2,
+    "columnspacing": 1.2,
+    "labelspacing": 0.2,
+    "borderpad": 0.2,
+}
+"""Words of Matplotlib for a legend above the panels."""
 _AREA = {"alpha": 0.15, "linewidth": 0}
 """Words of Matplotlib for a band, unless it has its own."""
 
@@ -66,12 +87,12 @@ def _line(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
 
 
 def _reach(axes: "Axes", mark: Mark, x: Any, y: Any) -> None:
-    axes.errorbar(x, y, xerr=mark.to, fmt="o", color=mark.colour, label=mark.label, **mark.style)
+    axes.errorbar(x, y, xerr=mark.to, color=mark.colour, label=mark.label, **{"fmt": "o", **mark.style})
 
 
 def _bars(axes: "Axes", mark: Mark, x: Any, _y: Any) -> None:
     axes.stairs(mark.y, x, fill=True, color=mark.colour, alpha=0.35)
-    axes.stairs(mark.y, x, color=mark.colour, label=mark.label, linewidth=1.2)
+    axes.stairs(mark.y, x, color=mark.colour, label=mark.label, **{"linewidth": 1.2, **mark.style})
 
 
 SHAPES: "Mapping[str, Callable[[Axes, Mark, Any, Any], object]]" = {
@@ -110,7 +131,7 @@ or upright), ``text`` (its name, written there), ``map`` and ``points`` (coloure
 def draw_panels(
     panels: Sequence[Panel],
     across: int = 1,
-    size: tuple[float, float] = (6.6, 2.9),
+    size: tuple[float, float] = (5.2, 2.6),
     title: str = "",
     note: str = "",
     kind: RecordingKind = "simulated",
@@ -127,14 +148,20 @@ def draw_panels(
     # About 15 letters of this size go on an inch.
     notes = textwrap.wrap(note, round(15.0 * size[0] * across))
     below = _LINE * len(notes)
-    width, height = size[0] * across + 0.3, size[1] * sum(heights) + 0.4 + below
+    width = size[0] * across + 0.3
+    # Beside the title stands what kind of numbers these are.
+    lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
+    shared = next((panel for panel in panels if panel.legend == "figure"), None)
+    names, rows_of_names = (0, 0) if shared is None else _legend_rows(shared, "", width if title else width - _KIND)
+    rows_of_names = 0 if shared is None else max(1, rows_of_names)
+    # A title makes its own room.
+    above = _LINE * rows_of_names if title else max(_TOP, _LINE * rows_of_names)
+    height = size[1] * sum(heights) + 0.4 + below + _LINE * rows_of_names
     with house_style():
-        # A legend above all panels makes the room in which the kind stands beside it.
-        above = 0.0 if any(panel.legend == "figure" for panel in panels) else _TOP
         rect = (0.0, below / height, 1.0, 1.0 - (above + below) / height)
         figure = Figure(figsize=(width, height), layout=ConstrainedLayoutEngine(w_pad=0.1, h_pad=0.08, rect=rect))
         grid = list(figure.subplots(rows, across, squeeze=False, height_ratios=heights).flat)
-        drawn = [_DrawnPanel(axes, panel, _draw(axes, panel)) for axes, panel in zip(grid, panels, strict=False)]
+        drawn = [_DrawnPanel(axes, panel, _draw(axes, panel, size)) for axes, panel in zip(grid, panels, strict=False)]
         for axes in grid[len(panels) :]:
             axes.set_axis_off()
         for upper, lower, panel, other in zip(grid, grid[across:], panels, panels[across:], strict=False):
@@ -142,11 +169,13 @@ def draw_panels(
                 upper.sharex(lower)
                 upper.tick_params(labelbottom=False)
                 upper.set_xlabel("")
-        _share_scales(figure, drawn)
+        _share_scales(figure, drawn, size[1])
+        if names:
+            handles = next(each.axes for each in drawn if each.panel is shared).get_legend_handles_labels()
+            place = (0.002, 1.0 - (_TITLE_LINE * len(lines) + 0.08) / height)
+            figure.legend(*handles, loc="upper left", bbox_to_anchor=place, ncols=names, **_OF_LEGEND)
         # Names and messages come from files: a dollar sign in them begins no formula.
         if title:
-            # Beside it stands what kind of numbers these are.
-            lines = textwrap.wrap(title, max(_FEWEST_LETTERS, round(_LETTERS * (width - _KIND))))
             figure.suptitle("\n".join(lines), x=0.01, ha="left", fontsize=11, parse_math=False)
         if notes:
             figure.text(
@@ -156,32 +185,80 @@ def draw_panels(
         return figure
 
 
-def _draw(axes: "Axes", panel: Panel) -> Any:
-    """Draw a panel, and return what has colours that stand for numbers."""
+def _told_apart(marks: Sequence[Mark]) -> list[Mark]:
+    """Return marks with the dashes of their colours where lines of several colours would be one in grey."""
+    plain = [mark for mark in marks if mark.shape in _DASHED_SHAPES and "linestyle" not in mark.style]
+    if len({mark.colour for mark in plain}) < 2:
+        return list(marks)
+    dashed = {id(mark): {**mark.style, "linestyle": DASHES.get(mark.colour, "-")} for mark in plain}
+    return [replace(mark, style=dashed.get(id(mark), mark.style)) for mark in marks]
+
+
+def _legend_rows(panel: Panel, title: str, width: float) -> tuple[int, int]:
+    """Return entries of a legend side by side on so many inches, and its rows above those on which the title stands."""
+    names = [mark.label for mark in panel.marks if mark.label and mark.shape != "text"]
+    widths = [_ENTRY + len(name) / _ENTRY_LETTERS for name in dict.fromkeys(names)]
+    beside = len(title) / _LETTERS if title else 0.0
+    if sum(widths) + beside <= width:
+        return len(widths), 0
+    for rows in range(1, len(widths)):
+        # A legend is filled column by column.
+        if sum(max(widths[first : first + rows]) for first in range(0, len(widths), rows)) <= width:
+            return -(-len(widths) // rows), rows
+    return 1, len(widths)
+
+
+def _plain_ticks(axes: "Axes") -> None:
+    """Write the ticks of logarithmic axes as plain numbers, not as powers."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    for axis in (axes.xaxis, axes.yaxis):
+        if axis.get_scale() == "log":
+            axis.set_major_formatter(FuncFormatter(lambda value, _: without_exponent(value, ".6g")))
+            axis.set_minor_formatter(NullFormatter())
+
+
+def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
+    """Draw a panel of a size [inches], and return what has colours that stand for numbers."""
     if not panel.marks:
         axes.set_axis_off()
         return None
     mapped = None
-    for mark in panel.marks:
+    for mark in _told_apart(panel.marks):
         shown = SHAPES[mark.shape](axes, mark, panel.x.values(mark.x), panel.y.values(mark.y))
         mapped = shown if mark.shape in ("map", "points") else mapped
-    axes.set_xlabel(panel.x.axis)
-    axes.set_ylabel(panel.y.axis if panel.title or not panel.shares_x else "")
-    axes.set_title(panel.title or (panel.y.axis if panel.shares_x else ""))
+    title = panel.title or (panel.y.axis if panel.shares_x else "")
+    pad = _ABOVE
+    axes.set_xlabel(_wrapped(panel.x.axis, size[0]))
+    axes.set_ylabel(_wrapped(panel.y.axis, size[1] * panel.tall) if panel.title or not panel.shares_x else "")
     # A text carries its words itself.
     if panel.legend and any(mark.label for mark in panel.marks if mark.shape != "text"):
         if panel.legend == "above":
-            # Above the axes, out of the way of the data.
-            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, borderaxespad=0.1, handlelength=1.6)
-        elif panel.legend == "figure":
-            names = axes.get_legend_handles_labels()
-            axes.figure.legend(*names, loc="outside upper left", ncols=3, columnspacing=1.4, handlelength=1.4)
-        else:
-            axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=1.2)
+            # Above the axes, out of the way of the data; where there is no room beside the title, below that.
+            across, rows = _legend_rows(panel, title, size[0] - _AXIS_ROOM)
+            pad += _ROW * rows + (_ABOVE if rows else 0.0)
+            axes.legend(
+                loc="lower right" if rows == 0 else "lower left",
+                bbox_to_anchor=(1.0, 1.0) if rows == 0 else (0.0, 1.0),
+                ncols=across,
+                **_OF_LEGEND,
+            )
+        elif panel.legend == "inside":
+            axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
+    # A long title is smaller before it is cut off at the next panel.
+    room = _LETTERS * (size[0] - _AXIS_ROOM)
+    axes.set_title(title, pad=pad, fontsize=_TITLE_SIZE * min(1.0, max(_SMALLEST_TITLE, room / max(1, len(title)))))
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)
+    _plain_ticks(axes)
     return mapped
+
+
+def _wrapped(label: str, length: float) -> str:
+    """Return the label of an axis in a panel of a length [inches], on two lines where it is longer than the axis."""
+    letters = max(_FEWEST_LETTERS // 2, round(_LABEL_LETTERS * (length - _AXIS_ROOM)))
+    return "\n".join(textwrap.wrap(label, letters, break_on_hyphens=False))
 
 
 class _DrawnPanel(NamedTuple):
@@ -192,8 +269,8 @@ class _DrawnPanel(NamedTuple):
     coloured: Any
 
 
-def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel]) -> None:
-    """Give panels that follow each other with one scale the same limits and one bar."""
+def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel], height: float) -> None:
+    """Give panels of a height [inches] that follow each other with one scale the same limits and one bar."""
     for scale, group in groupby(drawn, key=lambda each: each.panel.scale):
         members = list(group)
         if scale is None:
@@ -206,4 +283,4 @@ def _share_scales(figure: "Figure", drawn: Sequence[_DrawnPanel]) -> None:
             for member in members:
                 member.coloured.set_clim(lowest, highest)
         bar = figure.colorbar(members[0].coloured, ax=[member.axes for member in members], pad=0.02)
-        bar.set_label(scale.axis)
+        bar.set_label(_wrapped(scale.axis, height))

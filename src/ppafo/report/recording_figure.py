@@ -19,6 +19,7 @@ from ppafo.report.style import (
     GREY,
     ORANGE,
     REFERENCE,
+    REFERENCE_2,
     DrawingStyle,
     look_of_valve,
     render_figure,
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FIGURE_FORMATS = ("png", "svg", "pdf")
-_SIZE = (6.9, 1.6)
+_SIZE = (5.4, 1.5)
 """Inches of a panel with its title."""
 _HEADROOM = 0.06
 """Air above and below what is drawn, as a fraction of the axis."""
@@ -67,7 +68,7 @@ _QUANTITIES = (
             "pressure_1": ("chamber 1", CHAMBER_1),
             "pressure_2": ("chamber 2", CHAMBER_2),
             "reference_pressure_1": ("reference, chamber 1", REFERENCE),
-            "reference_pressure_2": ("reference, chamber 2", REFERENCE),
+            "reference_pressure_2": ("reference, chamber 2", REFERENCE_2),
         },
         smallest_span=5.0 * PASCALS_PER_PSI,
     ),

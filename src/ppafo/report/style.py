@@ -23,6 +23,18 @@ PURPLE = "#A33F77"
 """Colours that people with any kind of colour vision can tell apart (Okabe and Ito, 2008)."""
 COLOURS = (BLUE, VERMILION, GREEN, ORANGE, BLACK, GREY)
 """The order in which lines of one kind take colours."""
+DASHES = MappingProxyType(
+    {
+        VERMILION: (0, (6, 1.5, 1.2, 1.5)),
+        GREEN: (0, (3.5, 1.3)),
+        ORANGE: (0, (1.2, 1.2)),
+        PURPLE: (0, (5, 2)),
+        GREY: (0, (6, 1.2, 1.2, 1.2, 1.2, 1.2)),
+    }
+)
+"""Dashes of a colour beside lines of other colours, as half of these colours are one grey; others are solid."""
+MARKERS = MappingProxyType({VERMILION: "s", GREEN: "^", ORANGE: "D", PURPLE: "v", BLACK: "P", GREY: "X"})
+"""Marker of a colour beside others, a circle of one that is not named."""
 
 
 class DrawingStyle(NamedTuple):
@@ -36,8 +48,10 @@ class DrawingStyle(NamedTuple):
 PROPORTIONAL = DrawingStyle(BLUE)
 SOLENOID = DrawingStyle(VERMILION, marker="s")
 CHAMBER_1 = DrawingStyle(GREEN, marker="^")
-CHAMBER_2 = DrawingStyle(PURPLE, marker="v")
+CHAMBER_2 = DrawingStyle(PURPLE, line="-.", marker="v")
 REFERENCE = DrawingStyle(BLACK, line="--")
+REFERENCE_2 = DrawingStyle(BLACK, line=":")
+"""Style of what is wanted of a second quantity in the same panel."""
 EXPERIMENT = DrawingStyle(GREY, marker=".")
 """Style of measurements, from a bench or from the simulated test bench."""
 ACTUAL = DrawingStyle(BLUE)
@@ -73,6 +87,9 @@ _SETTINGS: Any = MappingProxyType(
         "axes.spines.right": False,
         "axes.grid": True,
         "axes.axisbelow": True,
+        # Numbers that stand for themselves: no offset and no power of ten beside an axis.
+        "axes.formatter.useoffset": False,
+        "axes.formatter.limits": (-5, 7),
         "grid.color": "#e3e3e3",
         "grid.linewidth": 0.7,
         "xtick.color": GREY,

@@ -387,7 +387,7 @@ def _device_table(request: ExperimentRequest) -> dict[str, str]:
 
 
 @dataclass(frozen=True, slots=True)
-class BenchExperiment:
+class _BenchExperiment:
     """An experiment: name, what is done, and the function that does it."""
 
     name: str
@@ -395,19 +395,19 @@ class BenchExperiment:
     record: Callable[[ExperimentRequest], ExperimentResult]
 
 
-EXPERIMENTS: dict[str, BenchExperiment] = {
+EXPERIMENTS: dict[str, _BenchExperiment] = {
     experiment.name: experiment
     for experiment in (
-        BenchExperiment(
+        _BenchExperiment(
             "static-torque", "torque on a scale over pressure, three times up and down", record_static_torque
         ),
-        BenchExperiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
-        BenchExperiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
-        BenchExperiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
-        BenchExperiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", record_steady_leak),
-        BenchExperiment("valve-map", "flow of the valve over its command, up and down", record_valve_map),
-        BenchExperiment("step-response", "figure 7: valve opened fully, vane from stop to stop", record_step_response),
-        BenchExperiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
+        _BenchExperiment("free-decay", "angle after an impulse, chambers open to the room", record_free_decay),
+        _BenchExperiment("open-valve-flow", "flow of the open valve at many pressures", record_open_valve),
+        _BenchExperiment("vane-leak", "pressures of plugged chambers as gas leaks across the vane", record_vane_leak),
+        _BenchExperiment("vane-leak-steady", "flow that maintains the pressure in chamber 1", record_steady_leak),
+        _BenchExperiment("valve-map", "flow of the valve over its command, up and down", record_valve_map),
+        _BenchExperiment("step-response", "figure 7: valve opened fully, vane from stop to stop", record_step_response),
+        _BenchExperiment("torque-task", "figure 8: torque ramp and hold under control", record_torque_task),
     )
 }
 
@@ -497,7 +497,7 @@ def record(
     return RigRecording(outcome.recording, outcome.device, truth)
 
 
-def find_experiment(name: str) -> BenchExperiment:
+def find_experiment(name: str) -> _BenchExperiment:
     """Return the experiment of this name. ParameterError where there is none."""
     if name not in EXPERIMENTS:
         hint = nearest_name(name, EXPERIMENTS)

@@ -86,7 +86,7 @@ def place_at(address: str | Path) -> Place:
         system, root = url_to_fs(text)
     except (ValueError, ImportError, OSError) as error:
         raise DataError(f"{text}: cannot be opened: {' '.join(str(error).split())}") from error
-    return RemoteFolder(text.rstrip("/"), system, str(root).rstrip("/"))
+    return _RemoteFolder(text.rstrip("/"), system, str(root).rstrip("/"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ class DiskFolder:
 
 
 @dataclass(frozen=True, slots=True)
-class RemoteFolder:
+class _RemoteFolder:
     """A folder at an address that fsspec knows, such as an object store."""
 
     address: str

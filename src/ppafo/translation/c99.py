@@ -110,7 +110,7 @@ def member_name(kind: Row, name: str) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class CTerms:
+class _CTerms:
     """Writes terms; ``type_name`` gives the name of a type in C, ``name`` a local name.
 
     ``places`` has names for the first places of some arrays, ``functions`` other names of functions; ``made`` is told
@@ -506,7 +506,7 @@ class _Body:
         self.writer = writer
         of_all, own = writer.places, f"{function.source}."
         of_one = {key.removeprefix(own): names for key, names in of_all.items() if key.startswith(own)}
-        self.terms = CTerms(writer.type_name, self.name, {**of_all, **of_one}, writer.functions, writer.made.add)
+        self.terms = _CTerms(writer.type_name, self.name, {**of_all, **of_one}, writer.functions, writer.made.add)
         self.scopes = scopes
         self.kinds: dict[str, Type] = dict(function.parameters) | scopes.types
         self.written: dict[str, str] = {}

@@ -72,7 +72,7 @@ _BEYOND_STOP = math.radians(5.0)
 """Angle by which a gait may go beyond a stop [rad]: no better is the zero of most recordings known."""
 
 
-class Contradiction(NamedTuple):
+class _Contradiction(NamedTuple):
     """A path, whether its number contradicts another one, in all runs or in each (runs,), and why in one of them."""
 
     path: str
@@ -125,7 +125,7 @@ def check_no_bottle(scenario: Scenario) -> None:
         )
 
 
-def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
+def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield every pair of numbers that could contradict each other, with whether they do."""
     yield from _of_stops(scenario)
     wearer = walk_of(scenario).wearer
@@ -134,13 +134,13 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
     for pair in PAIRS:
         if pair.path in numbers and pair.other in numbers:
             number, other = numbers[pair.path], numbers[pair.other]
-            yield Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
+            yield _Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return
     settings, valve = scenario.controller.settings, scenario.device.valve.kind
     fitting = " or ".join(sorted(kind.name for kind in WALKING_CONTROLLERS.values() if kind.only_switches))
-    yield Contradiction(
+    yield _Contradiction(
         "controller.kind",
         valve != "proportional" and not law_of(scenario).only_switches,
         lambda _run: (
@@ -155,26 +155,26 @@ def _contradictions(scenario: Scenario) -> Iterator[Contradiction]:
         yield from _of_pressures(scenario)
     if "peak_time" in settings:
         peak, fall = settings["peak_time"], settings["fall_time"]
-        yield Contradiction(
+        yield _Contradiction(
             "controller.peak_time",
             peak + fall > 1.0,
             lambda run: f"with controller.fall_time {at(fall, run):g} the torque would end after the stride",
         )
 
 
-def _of_stops(scenario: Scenario) -> Iterator[Contradiction]:
+def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield the ankle angles of the gait against the stops of the device."""
     gait, actuator = walk_of(scenario).gait, scenario.device.actuator
     angles = gait.ankle_angle.values_at(_PHASES)
     low, high = float(np.min(angles)), float(np.max(angles))
     needed = f"the gait needs {math.degrees(low):.0f} to {math.degrees(high):.0f} deg"
     highest, lowest = _OF_DEVICE
-    yield Contradiction(
+    yield _Contradiction(
         highest,
         actuator.angle_max < high - _BEYOND_STOP,
         lambda run: f"{needed}, this joint ends at {_text(actuator.angle_max, run, 'rad')}",
     )
-    yield Contradiction(
+    yield _Contradiction(
         lowest,
         actuator.angle_min > low + _BEYOND_STOP,
         lambda run: f"{needed}, this joint begins at {_text(actuator.angle_min, run, 'rad')}",
@@ -188,11 +188,11 @@ def _reason(pair: Pair, other: Any, run: int) -> str:
     return f"must be {pair.relation} {pair.other}, which is {value}"
 
 
-def _of_times(scenario: Scenario) -> Iterator[Contradiction]:
+def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield the times of a controller against those of the gait, the valve and its own samples."""
     settings, period = scenario.controller.settings, scenario.controller.period
     stride, first_stride = walk_of(scenario).gait.stride_time, settings["first_stride_time"]
-    yield Contradiction(
+    yield _Contradiction(
         "controller.first_stride_time",
         np.logical_or(first_stride <= 0.5 * stride, first_stride >= 2.0 * stride),
         lambda run: (
@@ -202,32 +202,32 @@ def _of_times(scenario: Scenario) -> Iterator[Contradiction]:
     # A valve that has not moved yet neither fills nor vents, and would be taken for one that fails.
     dead_time = venting_valve(scenario.device.valve).command_delay(valve_settings(scenario.device.valve))
     for name in ("fill_time", "vent_time"):
-        yield Contradiction(
+        yield _Contradiction(
             f"controller.{name}",
             settings[name] <= dead_time,
             lambda run: f"must be longer than the dead time of the valve, which is {_text(dead_time, run, 's')}",
         )
-    yield Contradiction(
+    yield _Contradiction(
         "controller.frozen_time",
         settings["frozen_time"] <= 2.0 * period,
         lambda run: f"must be longer than two sample periods of the controller, {_text(period, run, 's')} each",
     )
 
 
-def _of_swing(scenario: Scenario) -> Iterator[Contradiction]:
+def _of_swing(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield the angle of the swing against what sensor and device reach, and a gait without a force to see."""
     settings, actuator = scenario.controller.settings, scenario.device.actuator
     lowest = larger(settings["lowest_angle"], actuator.angle_min)
     highest = smaller(settings["highest_angle"], actuator.angle_max)
     swing, gait = settings["swing_angle"], walk_of(scenario).gait
-    yield Contradiction(
+    yield _Contradiction(
         "controller.swing_angle",
         np.logical_or(swing <= lowest, swing >= highest),
         lambda run: (
             f"lies outside the range of sensor and device, {_text(lowest, run, 'rad')} to {_text(highest, run, 'rad')}"
         ),
     )
-    yield Contradiction(
+    yield _Contradiction(
         "controller.kind",
         gait.vertical_force is None,
         lambda _run: (
@@ -237,18 +237,18 @@ def _of_swing(scenario: Scenario) -> Iterator[Contradiction]:
     )
 
 
-def _of_pressures(scenario: Scenario) -> Iterator[Contradiction]:
+def _of_pressures(scenario: Scenario) -> Iterator[_Contradiction]:
     """Yield the pressures of a controller against the atmosphere, the supply and what a moving foot makes of it."""
     settings, supply = scenario.controller.settings, scenario.device.supply
     atmosphere, filled = supply.atmospheric_pressure, settings["filled_pressure"]
     lower_supply = smaller(supply.pressure, supply.dorsiflexion_pressure)
     compressed = larger(supply.pressure, supply.dorsiflexion_pressure) * COMPRESSION
-    yield Contradiction(
+    yield _Contradiction(
         "controller.lowest_pressure",
         settings["lowest_pressure"] >= atmosphere,
         lambda run: f"must be below the atmosphere, which is {_text(atmosphere, run, 'Pa_a')}",
     )
-    yield Contradiction(
+    yield _Contradiction(
         "controller.filled_pressure",
         np.logical_or(filled <= atmosphere, filled >= lower_supply),
         lambda run: (
@@ -256,7 +256,7 @@ def _of_pressures(scenario: Scenario) -> Iterator[Contradiction]:
             f"{_text(atmosphere, run, 'Pa_a')} and {_text(lower_supply, run, 'Pa_a')}"
         ),
     )
-    yield Contradiction(
+    yield _Contradiction(
         "controller.highest_pressure",
         settings["highest_pressure"] <= compressed,
         lambda run: f"must be above {_text(compressed, run, 'Pa_a')}: a moving foot compresses the gas in a chamber",

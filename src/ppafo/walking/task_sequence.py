@@ -407,7 +407,7 @@ def _title(segment: TaskSegment) -> str:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class PhaseOverTime:
+class _PhaseOverTime:
     """Phase [turns], strides per second [Hz] and stride over the recorded one [-] at many times."""
 
     turns: Floats
@@ -415,7 +415,7 @@ class PhaseOverTime:
     stride: Floats
 
 
-def pace_in_time(sequence: TimedSequence, time: Floats) -> PhaseOverTime:
+def pace_in_time(sequence: TimedSequence, time: Floats) -> _PhaseOverTime:
     """Pace of one wearer in a task sequence at times [s]; the same polynomials as ``model.gait``, for arrays."""
     table = np.array([leaves(part) for part in sequence.parts], dtype=np.float64)
     row = table[np.searchsorted(table[:, 0], time, side="right") - 1].T
@@ -423,7 +423,7 @@ def pace_in_time(sequence: TimedSequence, time: Floats) -> PhaseOverTime:
     fraction = np.minimum((time - start) / length, 1.0)
     value = fraction**3 * (10.0 + fraction * (6.0 * fraction - 15.0))
     integral = fraction**4 * (2.5 + fraction * (fraction - 3.0))
-    return PhaseOverTime(
+    return _PhaseOverTime(
         turns + frequency * (time - start) + frequency_gain * length * integral,
         frequency + frequency_gain * value,
         stride + stride_gain * value,

@@ -69,6 +69,17 @@ def test_the_time_expected_is_that_of_what_this_computer_has_compiled_by_length(
     assert 5.0 < estimate_seconds("y" * 40_000, [], 2.5e-4) < 20.0
 
 
+def test_the_time_expected_is_that_of_the_program_with_the_most_lines_in_common(tmp_path: Path) -> None:
+    bladder, vane = ["step", "volume of a table"], ["step", "torque"]
+    for name, lines, seconds in (("a", bladder, "20.0"), ("b", vane, "2.0"), ("c", vane, "2.0")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "program.py").write_text("\n".join(lines))
+        (tmp_path / name / "seconds.txt").write_text(seconds)
+    kept = sorted(tmp_path.iterdir())
+    assert estimate_seconds("\n".join(bladder), kept, 1.0) == pytest.approx(20.0)
+    assert estimate_seconds("\n".join(vane), kept, 1.0) == pytest.approx(2.0)
+
+
 def test_models_that_are_needed_together_are_compiled_side_by_side_with_one_message(
     fresh_cache: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

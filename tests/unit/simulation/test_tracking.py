@@ -87,14 +87,34 @@ def test_a_pair_too_coarse_for_its_reference_is_told_before_the_run(changes: lis
 
 
 def test_the_area_offered_before_the_run_makes_a_pair_fine_enough(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
+    caplog: pytest.LogCaptureFixture, tmp_path: Path
 ) -> None:
     command = ["simulate", "torque-task-solenoid", "--set", "run.duration=0.1 s", "--out", str(tmp_path / "run")]
     assert main(command) == 0
-    offered = re.search(r"`valve.area = ([^`]*)`", capsys.readouterr().err)
+    offered = re.search(r"`valve.area = ([^`]*)`", caplog.text)
     assert offered is not None
+    caplog.clear()
     assert main([*command, "--set", f"valve.area={offered[1]}"]) == 0
-    assert capsys.readouterr().err == ""
+    assert "pair of valves" not in caplog.text
+
+
+def test_a_search_and_a_walk_tell_of_a_pair_too_coarse_before_they_run(caplog: pytest.LogCaptureFixture) -> None:
+    found = ppafo.find("torque-task-solenoid", vary="reference.level=2..6 N m", such_that="rms_error >= 0 N m", grid=3)
+    assert found.found.runs > 0
+    assert caplog.text.count("the pair of valves changes the torque by 2.19 N m") == 1
+    walk = load_scenario("solenoid")
+    assert "0.32 times the 5 N m wanted" in coarse_pair(walk)
+
+
+def test_a_walk_whose_pair_takes_the_torque_beyond_its_limit_is_told_with_a_valve_that_keeps_to_it() -> None:
+    changes = ["valve.area=60 mm^2", "supply.pressure=90 psi_g", "run.duration=6 s"]
+    scenario = load_scenario("solenoid", changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert verdict.kind == "overshoots"
+    offered = re.search(r"with `valve.area = ([^`]*)` it does, as a further run shows", verdict.sentence)
+    assert offered is not None
+    assert simulate("solenoid", [f"valve.area={offered[1]}", *changes[1:]]).tracking is None
 
 
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:

@@ -85,10 +85,14 @@ def test_the_mean_stride_shows_both_walks_and_the_healthy_gait() -> None:
     counted = [f"{walked.metrics['counted_strides'].value:.0f}" for walked in (pair.with_device, pair.without_device)]
     named = f"with the device, mean of {counted[0]}"
     assert [line.get_label() for line in angle.lines if not str(line.get_label()).startswith("_")] == [
+        "toe-off",
         named,
         f"without, mean of {counted[1]}",
         "healthy gait",
     ]
+    # Printed in grey the two walks differ by their dashes.
+    dashes = {str(line.get_label()): line.get_linestyle() for line in angle.lines}
+    assert dashes[named] != dashes[f"without, mean of {counted[1]}"]
     flexion = next(line for line in angle.lines if line.get_label() == named).get_ydata()
     np.testing.assert_allclose(flexion, 90.0 - np.degrees(pair.with_device.averages["angle"].mean))
     curve = next(line for line in torque.lines if line.get_label() == named).get_ydata()
@@ -189,5 +193,5 @@ def test_the_mean_stride_says_how_many_strides_it_is_the_mean_of() -> None:
     figure = walk_figure({"with the device": failing})
     assert " ".join(texts(figure)[0].split()).endswith(f", {failing.helped.size} strides")
     legend = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert legend[:2] == ["stance", f"with the device, mean of {counted}"]
+    assert legend[:2] == ["toe-off", f"with the device, mean of {counted}"]
     assert "band: standard deviation" in legend

@@ -156,7 +156,7 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
             name="change",
             caption="Change against the baseline in each draw; the dashed line is the nominal device.",
             across=2,
-            size=(3.5, 2.7),
+            size=(3.0, 2.5),
             is_detail=True,
         ),
     )

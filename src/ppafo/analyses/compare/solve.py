@@ -11,6 +11,7 @@ from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import simulate_many
+from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.studies.declaration import DEFAULT_SEED
 from ppafo.studies.draws import (
     CONFIDENCE,
@@ -109,6 +110,7 @@ def compared(
     for task, texts in overrides.items():
         for configuration in configurations:
             scenarios[task, configuration.name] = with_overrides(configuration.scenario, texts)
+    tell_coarse_pairs(scenarios.values())
     metrics = compared_metrics(scenarios.values())
     distributions = Uncertainty(()) if study is None or not study.paths else uncertainty_of(study)
     uncertainty = distributions.with_noise_of(scenarios.values())

@@ -31,6 +31,7 @@ def design(
     minutes: Minutes | None = None,
     toes: Length | None = None,
     catalogue: FileOrName | None = None,
+    bottle: FileOrName | None = None,
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[Sizing] | Finding[WearerSizing]:
@@ -49,6 +50,8 @@ def design(
         minutes: minutes of walking on one bottle
         toes: lowest height of the toes in mid-swing; default: '1 cm', or the healthy gait's own where that is less
         catalogue: a .toml file with parts of your own; default: the catalogue of the package
+        bottle: name or file of the bottle, as of 'walk', whose gas feeds the device; default: the lightest of the
+            catalogue
         plugins: modules of your own, files or names, whose objects files may name
         progress: called with every count of a long computation
 
@@ -74,6 +77,7 @@ def design(
     from ppafo.arguments.words import units_given
     from ppafo.errors import StudyError
     from ppafo.parameters.parts.catalogue import DEFAULT
+    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 
     wished = {"mass": mass, "torque": torque, "pressure": pressure, "minutes": minutes}
     report = progress or report_nothing
@@ -86,10 +90,12 @@ def design(
             raise StudyError(f"for a wearer give {', '.join(missing)} too, for example {FOR_A_WEARER}")
         requirements = DesignRequirements(mass, stature, float(torque), float(pressure), 60.0 * minutes, toes)
         with shown_in(units_given({"Pa_a": pressure, "N m": torque})):
-            return wearer.finding_of(size_for_wearer(requirements, report, DEFAULT if catalogue is None else catalogue))
-    of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue}
+            parts = DEFAULT if catalogue is None else catalogue
+            return wearer.finding_of(size_for_wearer(requirements, report, parts, bottle))
+    of_a_wearer = {**wished, "stature": stature, "toes": toes, "catalogue": catalogue, "bottle": bottle}
     named = [f"--{name}" for name, value in of_a_wearer.items() if value is not None]
     if named:
         raise StudyError(f"{', '.join(named)}: the design file states what is wanted; give one or the other")
     chosen = load_design(problem) if isinstance(problem, str | Path) else problem
+    tell_coarse_pairs([chosen.scenario])
     return profile.finding_of(size_for_profile(chosen, threads, report))

@@ -83,7 +83,7 @@ class FindProgress:
         return float(values[met[0]]), float(values[met[0] - 1]) if met[0] else None
 
 
-class SearchedRange(NamedTuple):
+class _SearchedRange(NamedTuple):
     """The path that is varied, and the low and the high end [SI] between which it is."""
 
     path: VariedPath
@@ -91,7 +91,7 @@ class SearchedRange(NamedTuple):
     high: float
 
 
-def range_of(text: str, base: Scenario) -> SearchedRange:
+def range_of(text: str, base: Scenario) -> _SearchedRange:
     """Return the range of a text ``PATH=LOW..HIGH`` for a scenario; StudyError for any other text."""
     parts = _RANGE.fullmatch(text)
     if parts is None:
@@ -106,7 +106,7 @@ def range_of(text: str, base: Scenario) -> SearchedRange:
         low, high, path = path.level(lower), path.level(parts[3]), given_in(path, [parts[3]])
     if not low < high:
         raise StudyError(f"'{one_line(text)}': the low end must be below the high end")
-    return SearchedRange(path, low, high)
+    return _SearchedRange(path, low, high)
 
 
 def condition_of(text: str, base: Scenario, path: str) -> MetricLimit:
@@ -227,7 +227,7 @@ def outermost(
     )
 
 
-def _check_has_metric(search: FindProgress, base: Scenario, searched: SearchedRange) -> None:
+def _check_has_metric(search: FindProgress, base: Scenario, searched: _SearchedRange) -> None:
     """Refuse a search in which no run has the metric of the condition."""
     if np.isfinite(search.judged).any():
         return

@@ -299,7 +299,7 @@ def _figures(identification: Identification) -> list[Section]:
         label = measurement.label
         panels = partial(trajectory_panels, measurement, model)
         name, caption = f"trajectory-fit-{label}", f"{label} and the fit."
-        figures.append(Section(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(7.0, 2.0)))
+        figures.append(Section(name=name, caption=caption, is_detail=True, panels=panels, title=label, size=(5.4, 1.9)))
     first = {result.procedure: result for result in reversed(identification.results)}
     if {"static-torque", "free-decay"} <= first.keys():
         draw = partial(figure_3, first["static-torque"], first["free-decay"])

@@ -132,7 +132,7 @@ def finding_of(model: LinearModel) -> Finding[LinearModel]:
     """Return a linear model in words, tables and panels."""
     when = "in its steady state" if model.time is None else f"at {model.time:g} s"
     steps, caption = partial(steps_panels, model), _STEPS_CAPTION
-    far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(4.4, 3.4))
+    far = Section("How far it holds", panels=steps, name="steps", caption=caption, across=2, size=(3.0, 2.8))
     return Finding(
         name="linearise",
         kicker="Linear model",
@@ -217,7 +217,7 @@ def _poles(model: LinearModel) -> Section:
         panels=partial(frequency_panels, model),
         name="frequency-response" if responds else "",
         caption=_FREQUENCY_CAPTION,
-        size=(7.0, 2.4),
+        size=(5.4, 2.2),
     )
 
 

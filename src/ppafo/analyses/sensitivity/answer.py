@@ -13,7 +13,7 @@ from ppafo.report.finding import Column, Finding, Section
 from ppafo.report.kind import Kind, of_metric
 from ppafo.report.panels import Mark, Panel
 from ppafo.report.setting_names import label_of
-from ppafo.report.style import BLUE, COLOURS, ORANGE
+from ppafo.report.style import COLOURS, GREY, MARKERS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,34 +26,38 @@ _MAXIMUM_LINES = 5
 """Values whose indices are drawn over the size of the sample."""
 _TITLES = {"total": "total", "first": "first order", "shapley": "Shapley effect"}
 _CAPTION = (
-    "Left: the indices with their bands. Right: the largest of them, in the colours of their names, from growing "
-    "parts of the sample: whether they have converged."
+    "Left: the indices with their bands, {filled} filled{open}. Right: the largest of them, in the colours and markers "
+    "of their rows, from growing parts of the sample: whether they have converged."
 )
 
 
 def finding_of(influences: Influences) -> Finding[Influences]:
     """Return the indices in words, a table and two panels for each metric."""
     settings, method = influences.settings, METHODS[influences.method]
-    said = (
+    said = [
         f"{influences.study}: {influences.method}, {settings.samples:,} {method.sizes_label}, {influences.runs:,} runs "
         f"of {len(influences.paths)} uncertain values; bands with {100.0 * settings.confidence:g} % confidence",
         f"{influences.failed:,} runs failed; up to {100.0 * settings.maximum_failed:g} % are allowed, and every "
         f"{method.block_label} with a failed run is left out",
-    )
+    ]
+    if influences.not_following:
+        said.append(f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too")
     figure = Section(
         "Indices and their convergence",
         panels=partial(_panels, influences),
         name="sensitivity",
-        caption=_CAPTION,
+        caption=_CAPTION.format(
+            filled=_TITLES[method.shown[0]], open="".join(f", {_TITLES[name]} open" for name in method.shown[1:])
+        ),
         across=2,
-        size=(4.8, max(2.9, 0.9 + _INCHES_OF_A_BAR * len(influences.paths))),
+        size=(3.0, max(2.5, 0.9 + _INCHES_OF_A_BAR * len(influences.paths))),
         is_detail=True,
     )
     return Finding(
         name="sensitivity",
         kicker="Sensitivity",
         title=f"What matters in {influences.study}",
-        said=said,
+        said=tuple(said),
         parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
         found=influences,
     )
@@ -117,33 +121,33 @@ def remarks(influences: Influences, metric: OfMetric) -> list[str]:
     return said
 
 
+def _colour_of(rank: int) -> str:
+    """Return the colour of a value by its rank, grey of those whose indices are not drawn over the sample."""
+    return COLOURS[rank] if rank < _MAXIMUM_LINES else GREY
+
+
 def _bars(influences: Influences, metric: OfMetric) -> Panel:
-    """Return the indices with their bands; the names of the largest have the colours of the panel beside."""
+    """Return the indices with their bands, a row and a colour a value, markers of the second index open."""
     shown, indices = METHODS[influences.method].shown, metric.indices
     labels = [label_of(path) for path in influences.paths]
-    order = np.argsort(indices.values[shown[0]])
-    places = np.arange(order.size)
-    marks = [
-        Mark(
-            "reach",
-            indices.values[name][order],
-            places + shift,
-            indices.bands[name][order],
-            _TITLES[name],
-            colour,
-            {"markersize": 5, "elinewidth": 1.4},
-        )
-        for name, colour, shift in zip(shown, (BLUE, ORANGE), (0.14, -0.14), strict=False)
-    ]
+    order = np.argsort(-indices.values[shown[0]])
+    places = np.arange(order.size)[::-1]
+    marks = []
+    for name, filled, shift in zip(shown, ("full", "none"), (0.14, -0.14), strict=False):
+        look = {"markersize": 5, "elinewidth": 1.4, "fillstyle": filled}
+        for rank, row in enumerate(order):
+            colour = _colour_of(rank)
+            place, style = places[rank] + shift, {**look, "fmt": MARKERS.get(colour, "o")}
+            marks.append(
+                Mark("reach", [indices.values[name][row]], [place], [indices.bands[name][row]], "", colour, style)
+            )
 
     def name_values(axes: "Axes") -> None:
         axes.set_yticks(places, [labels[row] for row in order])
-        for label, colour in zip(reversed(axes.get_yticklabels()), COLOURS[:_MAXIMUM_LINES], strict=False):
-            label.set_color(colour)
         axes.axvline(0.0, color="#9a9a9a", linewidth=0.8)
 
     fraction = Kind("Fraction of the variance")
-    return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="inside", then=name_values)
+    return Panel(fraction, Kind(), marks, of_metric(metric.metric).words, legend="", then=name_values)
 
 
 def _course(influences: Influences, metric: OfMetric) -> Panel:
@@ -152,10 +156,11 @@ def _course(influences: Influences, metric: OfMetric) -> Panel:
     name, sizes = method.shown[0], [step.blocks for step in metric.settling]
     order = np.argsort(-metric.indices.values[name])[:_MAXIMUM_LINES]
     marks = []
-    for colour, row in zip(COLOURS, order, strict=False):
+    for rank, row in enumerate(order):
+        colour = _colour_of(rank)
         values = np.array([step.indices[name][row] for step in metric.settling])
         bands = np.array([step.bands[name][row] for step in metric.settling])
-        line = {"marker": "o", "markersize": 3.5, "linewidth": 1.2}
+        line = {"marker": MARKERS.get(colour, "o"), "markersize": 3.5, "linewidth": 1.2}
         marks.append(Mark("line", sizes, values, colour=colour, style=line))
         marks.append(Mark("band", sizes, np.stack([values - bands, values + bands]), colour=colour))
     title = f"{_TITLES[name][:1].upper()}{_TITLES[name][1:]}, {order.size} largest"

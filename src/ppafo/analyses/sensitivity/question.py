@@ -63,8 +63,9 @@ def sensitivity(
     from ppafo.analyses.sensitivity.methods import METHODS
     from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, SensitivitySettings, analyse
     from ppafo.errors import StudyError, nearest_name
+    from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
     from ppafo.studies.draws import drawn_in
-    from ppafo.study.runs import RunCounter, Runs
+    from ppafo.study.runs import RunCounter, Runs, with_companions
 
     if method is not None and method not in METHODS:
         raise StudyError(
@@ -79,6 +80,7 @@ def sensitivity(
     count = DEFAULT_SAMPLES[by.name] if samples is None else samples
     settings = SensitivitySettings(count, chosen.sample.seed if seed is None else seed, confidence, maximum_failed)
     tally = RunCounter(count * by.block_rows(len(used.drawn)), progress)
-    runs = Runs(base.scenario, requested, tally, used.gauge, threads)
+    tell_coarse_pairs([base.scenario])
+    runs = Runs(base.scenario, with_companions(requested, base.scenario), tally, used.gauge, threads)
     with shown_in(chosen.shown_for(base.scenario)):
-        return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}"))
+        return finding_of(analyse(runs, used, by, settings, f"{chosen.name}, {base.name}", base.scenario, requested))

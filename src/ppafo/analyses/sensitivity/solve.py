@@ -5,7 +5,7 @@ would be the survivors'. Otherwise every block (base point or order) with such a
 since the formulas need whole blocks, and counted; the indices then hold for values with which the model runs.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from ppafo.analyses.sensitivity.methods import EvaluatedBlocks, Indices, Method, changes
 from ppafo.errors import StudyError
 from ppafo.linear_algebra import on_one_thread
+from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
 from ppafo.studies.draws import CONFIDENCE, Uncertainty, check_fraction
 from ppafo.studies.sampling import NOISE
-from ppafo.study.runs import Runs
+from ppafo.study.runs import Runs, tracking_violation
 
 _ENDS = (0.05, 0.95)
 """Fractions between which a value goes for the change of a metric."""
@@ -82,7 +83,10 @@ class OfMetric:
 
 @dataclass(frozen=True, slots=True)
 class Influences:
-    """Indices of some metrics with regard to some paths; ``runs`` were made, ``failed`` of them failed."""
+    """Indices of some metrics with regard to some paths.
+
+    ``runs`` were made, ``failed`` of them failed, and ``not_following`` completed without following their reference.
+    """
 
     study: str
     method: str
@@ -90,6 +94,7 @@ class Influences:
     paths: list[str]
     runs: int
     failed: int
+    not_following: int
     policy: str
     metrics: list[OfMetric]
 
@@ -99,9 +104,19 @@ _POLICY = "above the maximum fraction refused; below, every block with a failed 
 
 @on_one_thread
 def analyse(
-    runs: Runs, uncertainty: Uncertainty, method: Method, settings: SensitivitySettings, study: str = ""
+    runs: Runs,
+    uncertainty: Uncertainty,
+    method: Method,
+    settings: SensitivitySettings,
+    study: str = "",
+    scenario: Scenario | None = None,
+    metrics: Sequence[str] = (),
 ) -> Influences:
-    """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures."""
+    """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures.
+
+    ``scenario`` is whose runs they are, None for a model, and ``metrics`` those of the runs that are asked for, () for
+    all.
+    """
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(
             f"sensitivity: the indices of {method.name} need independent values, but the study has "
@@ -121,7 +136,8 @@ def analyse(
     design = method.design(uncertainty, settings.samples, settings.seed)
     columns = uncertainty.columns(design)
     rows = runs.run(columns)
-    runs.check(rows, settings.maximum_failed, "sensitivity", runs.metrics)
+    asked = tuple(metrics) or runs.metrics
+    runs.check(rows, settings.maximum_failed, "sensitivity", asked)
     ends = np.array([number.distribution.values(np.array(_ENDS)) for number in uncertainty.drawn]).T
     # A seed has no order: from its 5 to its 95 % quantile nothing changes.
     ends[:, [path == NOISE for path in uncertainty.paths]] = np.nan
@@ -131,7 +147,7 @@ def analyse(
     whole = EvaluatedBlocks(
         fractions=design, inputs=inputs, values=np.empty(0), blocks=blocks, ends=ends, seed=settings.seed
     )
-    metrics = [_of_metric(name, rows[name], whole, method, settings) for name in runs.metrics]
+    off = 0 if scenario is None else np.count_nonzero(tracking_violation(rows, scenario, columns, uncertainty.gauge))
     return Influences(
         study=study,
         method=method.name,
@@ -139,8 +155,9 @@ def analyse(
         paths=list(uncertainty.paths),
         runs=runs.count,
         failed=runs.failures,
+        not_following=int(off),
         policy=_POLICY,
-        metrics=metrics,
+        metrics=[_of_metric(name, rows[name], whole, method, settings) for name in asked],
     )
 
 

@@ -28,9 +28,9 @@ MOST_METRICS = 9
 """Metrics that are drawn."""
 MAXIMUM_DRAWN = 4_000_000
 """Runs from which a figure is drawn, spread evenly over all; the numbers beside it are from all of them."""
-_COLUMNS = 3
+_COLUMNS = 2
 """Panels side by side."""
-_PANEL, _COMPARED_PANEL = (3.5, 2.7), (2.6, 2.3)
+_PANEL, _COMPARED_PANEL = (2.9, 2.4), (2.7, 2.3)
 """Width and height of a panel [inches], and of one of a row that compares configurations."""
 _HISTOGRAM_BINS = 60
 """Bins of a histogram at most."""
@@ -270,5 +270,5 @@ def _band(results: StudyResults, channel: str, names: Sequence[str]) -> Panel:
             marks.append(Mark("line", table["time"][own], table["q0.5"][own], label=name, colour=colour))
     kind = of_channel(channel, CHANNELS[channel].unit)
     percentages = ", ".join(f"{100.0 * fraction:g}" for fraction in fractions)
-    title = f"{kind.words}: {percentages} % of runs below"
+    title = f"{percentages} % of runs below"
     return Panel(TIME, kind, marks, then=lambda axes: axes.set_title(title, fontsize=9))

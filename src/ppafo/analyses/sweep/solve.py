@@ -31,6 +31,7 @@ from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
 from ppafo.signals.recording import CHANNELS
+from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
 from ppafo.storage.files import temporary_folder
 from ppafo.storage.parquet import TableColumn, encode_texts, matrix_of, parquet_bytes, table_of
 from ppafo.storage.places import place_at
@@ -251,6 +252,7 @@ def sweep(
         check_scheduler(scheduler)
     kept = temporary_folder("ppafo-study") if out is None else None
     location = place_at(kept.name if kept is not None else str(out))
+    tell_coarse_pairs(configuration.scenario for configuration in chosen.configurations)
     store = StudyStore.claim(chosen, location, agreed, threads)
     _work(ChunkTask(chosen, location.address, threads), store, scheduler, progress)
     results = StudyResults(location, read_manifest(location), {}, kept)

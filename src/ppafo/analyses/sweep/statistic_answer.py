@@ -108,7 +108,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
                 name="trace",
                 caption=_CAPTION,
                 across=2,
-                size=(4.1, 3.3),
+                size=(3.0, 2.7),
             ),
         ),
         found=estimated,

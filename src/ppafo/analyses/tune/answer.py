@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 # Figures of a tuning: the task before and after, the course of the search, and the gains between their bounds.
 
 _COMMAND, _GAS = Kind("Valve command"), Kind("Gas supplied", "kg", "gas mass")
+_DECADE = 10.0
 _BEYOND = 0.05
 """Fraction of the range between the bounds by which gains before the tuning are shown outside at most."""
 
@@ -84,7 +85,8 @@ def _cost_panel(before: GainResult, starts: Sequence[SearchStart]) -> Panel:
     marks.append(Mark("level", y=before.objective, colour=GREY, style=dashed))
 
     def scale(axes: "Axes") -> None:
-        if axes.dataLim.ymin > 0.0:
+        # Below a decade a logarithmic axis has no tick that reads as a number.
+        if axes.dataLim.ymax > _DECADE * axes.dataLim.ymin > 0.0:
             axes.set_yscale("log")
 
     return Panel(Kind("Generation"), Kind(), marks, "Objective, best so far; dashed: before", then=scale)
@@ -106,7 +108,7 @@ def _bounds_panel(problem: Problem, after: GainResult, starts: Sequence[SearchSt
     marks = (
         *(Mark("line", [0.0, 1.0], [row, row], colour=GREY, style={"linewidth": 1.0}) for row in rows),
         Mark("line", ends, np.tile(rows, len(starts)), colour=GREY, style=ticks),
-        Mark("line", before, rows, label="before", colour=VERMILION, style=dots),
+        Mark("line", before, rows, label="before", colour=VERMILION, style={**dots, "marker": "s"}),
         Mark("line", found, rows, label="after", colour=BLUE, style=dots),
     )
 
@@ -120,7 +122,7 @@ def _bounds_panel(problem: Problem, after: GainResult, starts: Sequence[SearchSt
 
 _DIFFERENT = 0.1
 """Fraction of the way between the bounds from which on two starts are said to have ended in different places."""
-_SEARCH_CAPTION = "Left: the best objective so far in each start. Right: where the gains lie between their bounds."
+_SEARCH_CAPTION = "Above: the best objective so far in each start. Below: where the gains lie between their bounds."
 
 
 @in_units(lambda problem, *_: problem.scenario.device.shown)
@@ -155,7 +157,7 @@ def finding_of(
                 panels=partial(task_panels, before, after),
                 name="task",
                 caption="The nominal device.",
-                size=(6.9, 2.1),
+                size=(5.4, 1.9),
             ),
             Section(
                 "The search",
@@ -163,8 +165,7 @@ def finding_of(
                 panels=partial(search_panels, problem, before, after, starts),
                 name="search",
                 caption=_SEARCH_CAPTION,
-                across=2,
-                size=(4.4, max(2.6, 0.9 + 0.4 * len(problem.searched))),
+                size=(5.4, max(2.2, 0.9 + 0.3 * len(problem.searched))),
             ),
             Section("To use the gains", code=_command(tuned)),
         ),

@@ -53,7 +53,7 @@ class CandidateMetrics:
 
 
 @dataclass(frozen=True, slots=True)
-class CandidateScores:
+class _CandidateScores:
     """Objective, violation of the constraints, share by which tracking exceeds its limits, failures: (candidates,)."""
 
     objective: Floats
@@ -75,7 +75,7 @@ def bad_ends(values: Floats, spread: Spread | None, is_high: bool) -> Floats:
     return values[:, 0] if spread is None else spread.bad_end(values, is_high)
 
 
-def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> CandidateScores:
+def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float]) -> _CandidateScores:
     """Return objective and violation of candidates; ``scales`` are the sizes of the goals by metric [SI]."""
     failing = runs.without_value
     # Candidates with failed runs are ranked by how many fail: 0 keeps nan out of the sums meanwhile.
@@ -89,7 +89,7 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
         violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
     # A loop that does not follow its reference breaks a constraint that nobody has to write.
-    return CandidateScores(objective, violation, np.maximum(0.0, bad_ends(runs.off, spread, True)), failing)
+    return _CandidateScores(objective, violation, np.maximum(0.0, bad_ends(runs.off, spread, True)), failing)
 
 
 Costs = Callable[[Floats], Floats]

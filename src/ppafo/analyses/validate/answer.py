@@ -150,7 +150,7 @@ def _part(name: str, agreement: RecordingAgreement) -> Section:
         caption=f"Dots: {kind}. Lines: the model on the recorded inputs. Below each: the residual, measured - "
         "model, the limit of its RMS value dashed where it is in range.",
         across=across,
-        size=(7.6 / across, 2.1),
+        size=(6.0 / across, 1.9),
     )
 
 

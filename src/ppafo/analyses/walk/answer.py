@@ -47,7 +47,7 @@ from ppafo.walking.walk import WalkComparison
 
 _OVER_TIME = (
     "Gas, toes and phases over the whole walk. The strip at the bottom shows where the controller helps, only lifts "
-    "the foot, pauses or has stopped. A red line is where there is less help, a dashed one where something fails."
+    "the foot, pauses or has stopped. A solid line is where there is less help, a dashed one where something fails."
 )
 _TORQUE = Kind("", "N m", "torque", ".3g")
 _FAR_ABOVE = 2.0

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextvars import ContextVar, copy_context
+from itertools import islice
 from pathlib import Path
 
 from ppafo.documents.regular_file import read_regular_file
@@ -20,8 +21,8 @@ SECONDS_FILE = "seconds.txt"
 """The file of a kept program that says how long it took to compile [s]."""
 _LONGEST = 3600.0
 """Seconds above which no program was ever compiled: the file is damaged."""
-# Programs whose times are read for an estimate: a median of more says no more, and each costs two files.
-_MAXIMUM_ASKED = 20
+# Programs whose times are read for an estimate: each costs two files, some milliseconds.
+_MAXIMUM_ASKED = 40
 _models: ContextVar[int] = ContextVar("models that are compiled together", default=0)
 
 
@@ -79,18 +80,20 @@ def processor_seconds() -> float:
 
 
 def estimate_seconds(source: str, kept: Iterable[Path], usual: float) -> float:
-    """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took."""
+    """Return about how long [s] a source takes to compile, from how long the kept programs of this computer took.
+
+    Programs with the most lines in common say it, each by its seconds per byte: with another actuator or valve a text
+    of the same length may take several times as long.
+    """
     import statistics
 
-    rates = []
-    for folder in kept:
+    lines = set(source.splitlines())
+    rates: dict[int, list[float]] = {}
+    for folder in islice(kept, _MAXIMUM_ASKED):
         # A file that another process has removed, emptied or damaged says nothing.
         with contextlib.suppress(OSError, ValueError, StopIteration):
             seconds = float(read_regular_file(folder / SECONDS_FILE))
-            size = next(folder.glob("*.py")).stat().st_size
-            # Seconds per byte of text: programs of one kind differ in length more than in difficulty.
-            if 0.0 < seconds < _LONGEST and size > 0:
-                rates.append(seconds / size)
-        if len(rates) == _MAXIMUM_ASKED:
-            break
-    return len(source) * (statistics.median(rates) if rates else usual)
+            text = read_regular_file(next(folder.glob("*.py"))).decode()
+            if 0.0 < seconds < _LONGEST and text:
+                rates.setdefault(len(lines.intersection(text.splitlines())), []).append(seconds / len(text))
+    return len(source) * (statistics.median(rates[max(rates)]) if rates else usual)

@@ -279,7 +279,7 @@ class Port(Protocol):
 
 
 @final
-class UdpPort:
+class _UdpPort:
     """A UDP socket that talks to one other: the one that it was given, or the first that sends it a good packet."""
 
     is_stream = False
@@ -328,7 +328,7 @@ class UdpPort:
 
 
 @final
-class SerialPort:
+class _SerialPort:
     """A port to a processor on a serial line, by pyserial."""
 
     is_stream = True
@@ -396,7 +396,7 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
             if address and Path(address).exists() and not _is_terminal(address):
                 why = "not a serial port"
             raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {why}") from error
-        return SerialPort(device)
+        return _SerialPort(device)
     raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
 
 
@@ -422,7 +422,7 @@ def _is_terminal(address: str) -> bool:
         os.close(file)
 
 
-def _open_udp(text: str, place: str, listens: bool) -> UdpPort:
+def _open_udp(text: str, place: str, listens: bool) -> _UdpPort:
     host, _, number = place.rpartition(":")
     if not host or not number.isascii() or not number.isdigit() or not 0 < int(number) <= _HIGHEST_PORT:
         raise ScenarioError(f"--port {one_line(text)}: must be udp:HOST:PORT with a port from 1 to {_HIGHEST_PORT}")
@@ -433,7 +433,7 @@ def _open_udp(text: str, place: str, listens: bool) -> UdpPort:
         own = socket.socket(family, kind, protocol)
         if listens:
             own.bind(address)
-        return UdpPort(own, None if listens else address)
+        return _UdpPort(own, None if listens else address)
     except (OSError, UnicodeError) as error:
         if own is not None:
             own.close()

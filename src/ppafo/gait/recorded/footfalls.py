@@ -222,7 +222,7 @@ strides of one healthy walk differ by 0.03."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Cycle:
+class _Cycle:
     """Three times the same cycle, its ``period`` [s], and what its ends differ by as a share of the ranges."""
 
     walk: Mapping[str, Signal]
@@ -230,7 +230,7 @@ class Cycle:
     misfit: float
 
 
-def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
+def wrap_cycle(walk: Mapping[str, Signal]) -> _Cycle | None:
     """Return a record of one cycle three times over, None where its start and end are not the same motion."""
     start = max(walk[name].time[0] for name in REQUIRED)
     end = min(walk[name].time[-1] for name in REQUIRED)
@@ -260,7 +260,7 @@ def wrap_cycle(walk: Mapping[str, Signal]) -> Cycle | None:
         slack = 1.0 / signal.rate
         if signal.time[0] <= start + slack and signal.time[-1] >= start + period - slack:
             wrapped[name] = _repeat(signal, (start, float(end)), period, name in LOADS)
-    return Cycle(wrapped, period, float(misfits[best]))
+    return _Cycle(wrapped, period, float(misfits[best]))
 
 
 def _repeat(signal: Signal, span: tuple[float, float], period: float, is_load: bool) -> Signal:

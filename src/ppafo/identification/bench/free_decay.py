@@ -72,7 +72,7 @@ class Slowing(NamedTuple):
         return self.damping_rate * speed + self.deceleration * (1.0 + grip)
 
 
-class DecayCurve(NamedTuple):
+class _DecayCurve(NamedTuple):
     """Times [s], angle swept [rad] and speed [rad/s] from the start to standstill."""
 
     time: Floats
@@ -80,7 +80,7 @@ class DecayCurve(NamedTuple):
     speed: Floats
 
 
-def course_to_standstill(speed: float, slowing: Slowing) -> DecayCurve:
+def course_to_standstill(speed: float, slowing: Slowing) -> _DecayCurve:
     """Return the course from a speed [rad/s] to standstill, of dt = -dw / deceleration by Gauss's rule over w."""
     # Cubed, for the slowing near standstill, where a seal grips, needs the shortest steps.
     speeds = speed * np.linspace(1.0, 0.0, _STEPS + 1) ** 3
@@ -91,10 +91,10 @@ def course_to_standstill(speed: float, slowing: Slowing) -> DecayCurve:
     decelerations = np.maximum(decelerations, _SLOWEST * float(decelerations.max()) + 1e-300)
     times = half * ((1.0 / decelerations) @ _WEIGHTS)
     swept = half * ((nodes / decelerations) @ _WEIGHTS)
-    return DecayCurve(np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds)
+    return _DecayCurve(np.concatenate(([0.0], np.cumsum(times))), np.concatenate(([0.0], np.cumsum(swept))), speeds)
 
 
-def course(times: Floats, speed: float, slowing: Slowing) -> DecayCurve:
+def course(times: Floats, speed: float, slowing: Slowing) -> _DecayCurve:
     """Return the course at times [s] after a start at a speed [rad/s]; after standstill the vane stays."""
     from scipy.interpolate import CubicHermiteSpline
 
@@ -102,7 +102,7 @@ def course(times: Floats, speed: float, slowing: Slowing) -> DecayCurve:
     rising = np.concatenate(([True], np.diff(known.time) > 0.0))
     inside = np.minimum(times, known.time[-1])
     angle = CubicHermiteSpline(known.time[rising], known.swept[rising], known.speed[rising])
-    return DecayCurve(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
+    return _DecayCurve(times, np.asarray(angle(inside)), np.asarray(angle.derivative()(inside)))
 
 
 _RISE, _RISE_VELOCITY, _INERTIA, _GAIN = "rise of the friction near standstill", "its velocity", "inertia", "gain"

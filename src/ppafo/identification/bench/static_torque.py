@@ -124,7 +124,7 @@ def static_torque(
     )
 
 
-def _weighted(readings: "Sweeps") -> PooledReadings:
+def _weighted(readings: "_Sweeps") -> PooledReadings:
     """Return the loads over their noise, in groups whose own numbers are compared with those of all."""
     pressure = readings.pressure
     middle = 0.5 * float(pressure.max() + pressure.min())
@@ -136,7 +136,7 @@ def _weighted(readings: "Sweeps") -> PooledReadings:
     return PooledReadings(readings.weight * readings.torque, sensors, readings.recordings, groups)
 
 
-def _reported(readings: "Sweeps") -> tuple[ReportedNumber, ...]:
+def _reported(readings: "_Sweeps") -> tuple[ReportedNumber, ...]:
     """Return the numbers to report; a zero of the scale may be an answer."""
     names = readings.names
     return (
@@ -151,7 +151,7 @@ def _reported(readings: "Sweeps") -> tuple[ReportedNumber, ...]:
     )
 
 
-def _marks(readings: "Sweeps", slope: float, zero: float) -> list[Mark]:
+def _marks(readings: "_Sweeps", slope: float, zero: float) -> list[Mark]:
     """Return both branches over the pressure, and the line without friction of a slope and a zero."""
     branches = {"rising": readings.branch > 0.0, "falling": readings.branch < 0.0}
     # Of an actuator that slides at constant pressure the branches are its two ways.
@@ -182,7 +182,7 @@ class _Rough(NamedTuple):
     size: float
 
 
-def _straight_line(readings: "Sweeps", files: str) -> _Rough:
+def _straight_line(readings: "_Sweeps", files: str) -> _Rough:
     """Return first guesses; IdentificationError, with the names of the files, for signs that no device has."""
     columns = (readings.pressure, np.ones_like(readings.pressure), -readings.branch)
     design = np.stack(columns, axis=1)
@@ -206,7 +206,7 @@ def _straight_line(readings: "Sweeps", files: str) -> _Rough:
 
 
 @dataclass(frozen=True, slots=True)
-class LoadNames:
+class _LoadNames:
     """Unknowns of a load in one unit, by path, unit and word: the slope, and static or kinetic friction.
 
     Only what a set has a place for has a path of a set.
@@ -224,12 +224,12 @@ class LoadNames:
     is_in_motion: bool = False
 
 
-def names_of(load: str, slides: bool) -> LoadNames:
+def names_of(load: str, slides: bool) -> _LoadNames:
     """Return what the numbers of a torque or a force are called, of an actuator that slides or is held."""
     word, key = ("friction in motion", "dynamic") if slides else ("static friction", "static")
     if load == _FORCE:
         growth = "static_torque.friction_per_pressure"
-        return LoadNames(
+        return _LoadNames(
             load,
             "N",
             "area",
@@ -241,13 +241,13 @@ def names_of(load: str, slides: bool) -> LoadNames:
             is_in_motion=slides,
         )
     growth, slope = f"effects.seal_friction.{key}_per_pressure", "actuator.torque_constant"
-    return LoadNames(
+    return _LoadNames(
         load, "N m", "torque constant", slope, "m^3", word, f"friction.{key}_torque", growth, is_in_motion=slides
     )
 
 
 @dataclass(frozen=True, slots=True)
-class Sweeps:
+class _Sweeps:
     """Readings of both branches: pressure difference [Pa], load [N m or N], branch (+1, -1).
 
     ``weight`` is one over the noise of each, 1 for a usual reading: the mean of many samples has less. ``recordings``
@@ -261,7 +261,7 @@ class Sweeps:
     recordings: list[str]
     files: Labels
     repetitions: int
-    names: LoadNames
+    names: _LoadNames
 
 
 def slides(sources: tuple[RecordingSource, ...]) -> bool:
@@ -286,7 +286,7 @@ def _swept(source: RecordingSource, name: str) -> float:
     return abs(float(np.sum((direction[1:] * np.diff(source.recording[name]))[within]))) / sweeps
 
 
-def readings_of(sources: tuple[RecordingSource, ...]) -> Sweeps:
+def readings_of(sources: tuple[RecordingSource, ...]) -> _Sweeps:
     """Return the readings of all recordings; IdentificationError where they cannot separate slope from friction."""
     is_force = bool(sources) and all(_FORCE in one.recording and _TORQUE not in one.recording for one in sources)
     load = _FORCE if is_force else _TORQUE
@@ -345,8 +345,8 @@ def _one_a_stroke(
     pressure: Floats,
     torque: Floats,
     direction: Floats,
-    names: LoadNames,
-) -> Sweeps:
+    names: _LoadNames,
+) -> _Sweeps:
     """Return one reading for the samples of a stroke; ``used`` says which samples of all recordings the others are."""
     # A repetition of a recording is one cluster; so is a recording without repetitions.
     parts = [(number, one.recording) for number, one in enumerate(sources)]
@@ -365,7 +365,7 @@ def _one_a_stroke(
     if repetitions > _MOST_REPETITIONS:
         labels = [label for label, is_used in zip(recordings_of(sources), used.tolist(), strict=True) if is_used]
     recordings = [labels[one] for one in first.tolist()]
-    return Sweeps(pressure, torque, direction[first], weight, recordings, files[first], repetitions, names)
+    return _Sweeps(pressure, torque, direction[first], weight, recordings, files[first], repetitions, names)
 
 
 def _runs(pressure: Floats, labels: NDArray[np.float64]) -> Labels:

@@ -45,7 +45,7 @@ _GAIN, _PLAY, _SATURATION = "valve_map.gain", "effects.spool_play.width", "valve
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sweep:
+class _Sweep:
     """Readings of a valve, each (readings,): command [-], flow [kg/s], pressures [Pa, absolute].
 
     ``branch`` is 1 where the command rises, -1 where it falls. ``commands`` has the command of each recording, in which
@@ -125,9 +125,9 @@ def valve_map(
     )
 
 
-def _sweep_of(sources: tuple[RecordingSource, ...], flow: Floats) -> Sweep:
+def _sweep_of(sources: tuple[RecordingSource, ...], flow: Floats) -> _Sweep:
     command, upstream, downstream = (pool(sources, name) for name in CHANNELS if name != "mass_flow")
-    return Sweep(
+    return _Sweep(
         commands=tuple(source.recording["command"] for source in sources),
         command=command,
         flow=flow,
@@ -137,7 +137,7 @@ def _sweep_of(sources: tuple[RecordingSource, ...], flow: Floats) -> Sweep:
     )
 
 
-def _sought(sources: tuple[RecordingSource, ...], sweep: Sweep, areas: Floats, band: str) -> tuple[FitVariable, ...]:
+def _sought(sources: tuple[RecordingSource, ...], sweep: _Sweep, areas: Floats, band: str) -> tuple[FitVariable, ...]:
     """Return what is sought, with first guesses from the effective areas [m^2] of the readings; ``band`` is a path."""
     size, largest, highest = np.abs(sweep.command), float(np.abs(areas).max()), sweep.highest_command
     half = float(size[np.abs(areas) > _HALF_OPEN * largest].min())
@@ -158,7 +158,7 @@ def _sought(sources: tuple[RecordingSource, ...], sweep: Sweep, areas: Floats, b
     )
 
 
-def _readings(sources: tuple[RecordingSource, ...], sweep: Sweep) -> PooledReadings:
+def _readings(sources: tuple[RecordingSource, ...], sweep: _Sweep) -> PooledReadings:
     """Return the flow to fit, in groups whose own numbers are compared with those of all."""
     groups = (
         np.where(sweep.branch < 0.0, "falling commands", "rising commands").tolist(),
@@ -168,7 +168,7 @@ def _readings(sources: tuple[RecordingSource, ...], sweep: Sweep) -> PooledReadi
     return PooledReadings(sweep.flow, ["mass_flow"] * sweep.flow.size, recordings_of(sources), groups)
 
 
-def _reported(sweep: Sweep, band: str, saturation: float) -> list[ReportedNumber]:
+def _reported(sweep: _Sweep, band: str, saturation: float) -> list[ReportedNumber]:
     """Return the numbers to report: a saturation [-] below the highest command, a play where the command turned."""
     reported = [
         ReportedNumber(band, "", "Command below which nothing flows, in both directions", _SMALL_COMMAND),
@@ -181,7 +181,7 @@ def _reported(sweep: Sweep, band: str, saturation: float) -> list[ReportedNumber
     return reported
 
 
-def _marks(sweep: Sweep, model: Floats) -> list[Mark]:
+def _marks(sweep: _Sweep, model: Floats) -> list[Mark]:
     """Return readings and fitted curve over the command, the rising and the falling ones apart."""
     marks = []
     for role, sign in (("rising", 1.0), ("falling", -1.0)):
@@ -222,7 +222,7 @@ def _check_recordings(sources: tuple[RecordingSource, ...]) -> None:
             )
 
 
-def _areas(sources: tuple[RecordingSource, ...], sweep: Sweep, gas: GasAt) -> Floats:
+def _areas(sources: tuple[RecordingSource, ...], sweep: _Sweep, gas: GasAt) -> Floats:
     """Return the effective area [m^2] of each reading; IdentificationError for readings that cannot say it.
 
     It is the flow over what the pressures would let pass, so that a supply that sags is no valve that saturates.

@@ -128,7 +128,7 @@ def _size(opening: Opening, discharge_coefficient: float | None) -> ReportedNumb
     return ReportedNumber("vane_leak.effective_area", "m^2", "Effective area Cd A of the leak")
 
 
-class ClosedChambers(NamedTuple):
+class _ClosedChambers(NamedTuple):
     """Two closed chambers: time [s], pressures [Pa] of the fuller and the other, which is the fuller."""
 
     time: Floats
@@ -162,7 +162,7 @@ class ClosedChambers(NamedTuple):
         return 1 if self.room == 0 else 0
 
 
-def closed_chambers(source: RecordingSource, start: float | None, end: float | None) -> ClosedChambers:
+def closed_chambers(source: RecordingSource, start: float | None, end: float | None) -> _ClosedChambers:
     """Return the chambers of a recording between its start and equal pressures.
 
     IdentificationError where too few samples are left.
@@ -192,7 +192,7 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
     time = part.time[:last] - part.time[0]
-    return ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller)
+    return _ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller)
 
 
 _POINTS = 400
@@ -234,10 +234,10 @@ def _at_end(time: Floats, values: Floats, end: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class LeakDecay:
+class _LeakDecay:
     """The closed chambers of one recording, with the names of the numbers that are sought of it alone."""
 
-    chambers: ClosedChambers
+    chambers: _ClosedChambers
     number: int
 
     @property
@@ -296,13 +296,13 @@ class LeakDecay:
 
 
 @dataclass(frozen=True, slots=True)
-class DecayLaw:
+class _DecayLaw:
     """The pressures of all decays as one leak makes them, out of a chamber of a volume [m^3] or of 1 m^3."""
 
     opening: Opening
     paths: Paths
     volume: float
-    decays: tuple[LeakDecay, ...]
+    decays: tuple[_LeakDecay, ...]
 
     @property
     def longest(self) -> float:
@@ -318,7 +318,7 @@ class DecayLaw:
         relaxed = self.longest / _RELAXED * math.exp(at[_RELAXATION])
         return np.concatenate([part for decay in self.decays for part in self._pressures(decay, at, rate, relaxed)])
 
-    def _pressures(self, decay: LeakDecay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
+    def _pressures(self, decay: _LeakDecay, at: Values, rate: float, relaxed: float) -> Iterator[Floats]:
         chambers = decay.chambers
         first, second = (at[decay.start_of(sensor)] for sensor in decay.sensors)
         ratio = at[_RATIO] if chambers.room is None else 0.0 if chambers.room == 1 else math.inf
@@ -332,7 +332,7 @@ class DecayLaw:
 
 def _decaying_leak(
     sources: tuple[RecordingSource, ...],
-    closed: tuple[ClosedChambers, ...],
+    closed: tuple[_ClosedChambers, ...],
     opening: Opening,
     size: ReportedNumber,
     volumes: tuple[float | None, float | None],
@@ -347,8 +347,8 @@ def _decaying_leak(
     if volume is None:
         size, opening = _over_volume(size, chamber), replace(opening, known=1.0)
     paths, reported, start, alone = _sought(size, volume is not None, closed, opening, volume or 1.0)
-    decays = tuple(LeakDecay(chambers, number) for number, chambers in enumerate(closed, start=1))
-    law = DecayLaw(opening, paths, volume or 1.0, decays)
+    decays = tuple(_LeakDecay(chambers, number) for number, chambers in enumerate(closed, start=1))
+    law = _DecayLaw(opening, paths, volume or 1.0, decays)
     numbers = (
         *paths.sought(start, alone),
         *_ratio(closed, volume, other_volume, volume_deviation),
@@ -394,7 +394,7 @@ def _over_volume(size: ReportedNumber, fuller: int) -> ReportedNumber:
 
 
 def _ratio(
-    closed: tuple[ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
+    closed: tuple[_ClosedChambers, ...], volume: float | None, other: float | None, deviation: float
 ) -> tuple[FitVariable, ...]:
     """Return the ratio of the volumes [m^3], each known to the relative deviation or sought; none beside a room."""
     changes = [chambers.changes for chambers in closed if chambers.room is None]
@@ -405,7 +405,7 @@ def _ratio(
     return (sought(_RATIO, max(float(np.mean([rise / fall for fall, rise in changes])), 1.0e-3), 1.0e-6),)
 
 
-def _readings(sources: tuple[RecordingSource, ...], decays: tuple[LeakDecay, ...]) -> PooledReadings:
+def _readings(sources: tuple[RecordingSource, ...], decays: tuple[_LeakDecay, ...]) -> PooledReadings:
     """Return the fitted pressures with their sensors and recordings, early and late falls apart."""
     series = [(sensor, values, decay) for decay in decays for sensor, values in decay.fitted]
     return PooledReadings(
@@ -419,7 +419,7 @@ def _readings(sources: tuple[RecordingSource, ...], decays: tuple[LeakDecay, ...
 def _sought(
     size: ReportedNumber,
     has_volume: bool,
-    closed: tuple[ClosedChambers, ...],
+    closed: tuple[_ClosedChambers, ...],
     opening: Opening,
     emptied: float,
 ) -> tuple[Paths, tuple[ReportedNumber, ...], OpeningSizes, OpeningSizes]:
@@ -444,7 +444,7 @@ def _beside(has_volume: bool) -> ReportedNumber:
     return ReportedNumber("vane_leak.coefficient_over_volume", "kg/(s Pa^2 m^3)", f"{text}, over the volume")
 
 
-def _rough_size(closed: tuple[ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
+def _rough_size(closed: tuple[_ClosedChambers, ...], opening: Opening, unit: OpeningSizes, rate: float) -> float:
     """Return how many times a ``unit`` of the opening makes the first pressure fall as it does on average; above 0."""
     found = []
     for item in closed:

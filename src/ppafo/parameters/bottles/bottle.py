@@ -39,6 +39,7 @@ from ppafo.parameters.declaration import is_within, limits_text
 from ppafo.parameters.overrides import Forms, other_forms, override_set, read_overrides
 from ppafo.parameters.parameter_set import Entry, TextEntry
 from ppafo.parameters.parts import Part, load_catalogue
+from ppafo.parameters.parts.catalogue import Figure
 from ppafo.units import format_quantity, split_quantity, to_si
 from ppafo.units.shown import shown_text
 
@@ -424,3 +425,31 @@ def _check_content(bottle: Bottle, file: str) -> None:
             f"{file}: the full bottle has {has} at {temperature:g} K, but its regulator "
             f"needs {needs}, the sum of regulator.set_pressure and regulator.pressure_margin; lower one of them"
         )
+
+
+def bottle_part(name_or_path: str | Path) -> tuple[Part, str]:
+    """Return a bottle as a part with the masses of gas and empty bottle, and the name of its fluid.
+
+    A bottle file says nothing of the empty mass: it is what has the heat capacity of the wall.
+    """
+    bottle = load_bottle(name_or_path)
+    if is_of_catalogue(name_or_path):
+        return load_catalogue(Path(name_or_path).parent).part("bottles", Path(name_or_path).name), bottle.fluid.name
+    if str(name_or_path) in bottle_parts() and str(name_or_path) not in FILE.names():
+        return bottle_parts()[str(name_or_path)], bottle.fluid.name
+    empty = bottle.wall.wall_heat_capacity / _WALL
+    source = "heat capacity of its wall, at 885 J/(kg K)"
+    figure = Figure(value=1000.0 * empty, unit="g", origin="assumed", source=source)
+    part = Part(
+        name=bottle.name,
+        group="bottles",
+        kind="",
+        maker="",
+        model=bottle.title,
+        document="",
+        note="",
+        figures={"empty_mass": figure},
+        values={"content": bottle.mass, "empty_mass": empty},
+        unknown=(),
+    )
+    return part, bottle.fluid.name

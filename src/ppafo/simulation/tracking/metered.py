@@ -56,9 +56,13 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
     with np.errstate(divide="ignore", invalid="ignore"):
         if not scenario.follows_reference:
             error, requested, peak = (numbers[name] for name in _OF_WALK)
-            settled = _settled(wanted=requested, error=error, peak=peak)
-            excess = excess_of_walk(settled, turning, torque_limit(scenario.controller.settings))
-            return np.where(np.isfinite(error) & (requested > 0.0), excess, np.nan)
+            wanted = np.nan_to_num(requested, nan=np.inf)
+            settled = _settled(wanted=wanted, error=np.nan_to_num(error), peak=peak)
+            limit = torque_limit(scenario.controller.settings)
+            # A law that requests no torque is judged by the peak alone.
+            excess = excess_of_walk(settled, turning, limit)
+            known = (np.isfinite(error) & (requested > 0.0)) | (np.isnan(error) & np.isfinite(peak) & (limit > 0.0))
+            return np.where(known, excess, np.nan)
         settled = _settled_task(scenario, {name.removeprefix("settled_"): row for name, row in numbers.items()}, least)
         law = scenario.law
         found = excess_of_task(settled, law is not None and law.only_switches)

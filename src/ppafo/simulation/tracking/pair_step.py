@@ -1,5 +1,8 @@
 """Step of a pair of on/off valves: the change during its dead time, which is known before a run."""
 
+import logging
+from collections.abc import Iterable
+
 from ppafo.control.kind import ControllerKind
 from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
 from ppafo.simulation.gains import terms_of
@@ -8,8 +11,10 @@ from ppafo.simulation.profiles import profile_bounds
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE
 from ppafo.simulation.tracking.remedies import change_text, smaller_pair
-from ppafo.simulation.tracking.rule import smallest_change
+from ppafo.simulation.tracking.rule import smallest_change, torque_limit
 from ppafo.units.shown import in_units
+
+logger = logging.getLogger("ppafo")
 
 _LARGEST_STEP = 0.25
 """Step of a pair over the wanted change above which it is told before a run [-]."""
@@ -22,23 +27,36 @@ def pair_step(scenario: Scenario, law: ControllerKind) -> tuple[float, float]:
     return rate * late, late
 
 
+def tell_coarse_pairs(scenarios: Iterable[Scenario]) -> None:
+    """Log the warnings of pairs that are too coarse, before their runs; each once."""
+    for text in dict.fromkeys(map(coarse_pair, scenarios)):
+        if text:
+            logger.warning("ppafo: %s", text)
+
+
+def _wanted(scenario: Scenario) -> float:
+    """Largest change of a torque or a pressure that is wanted, in SI."""
+    kind, start = CONTROLLED[scenario.controlled], 0.0
+    if kind.name != TORQUE:
+        start = float(kind.value(0.0, scenario.initial.pressure_1, scenario.initial.pressure_2, 0.0))
+    extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
+    return max(extent, smallest_change(scenario))
+
+
 @in_units(lambda scenario: scenario.device.shown)
 def coarse_pair(scenario: Scenario) -> str:
     """Warning of a pair whose step exceeds a quarter of the wanted change of a torque or a pressure; "" without one.
 
-    A walk has no reference before its run, and of an angle the step is the joint's as much as the pair's: neither is
-    looked at.
+    Of a walk the largest torque of its controller is wanted. Of an angle the step is the joint's as much as the pair's:
+    it is not looked at.
     """
     law, kind = scenario.law, CONTROLLED[scenario.controlled]
-    is_pair = "switching_interval" in scenario.device.valve.settings
-    if law is None or not is_pair or not scenario.follows_reference or kind.name == ANGLE:
+    limit = 0.0 if scenario.follows_reference else torque_limit(scenario.controller.settings)
+    is_asked = scenario.follows_reference or limit > 0.0
+    if law is None or not is_asked or kind.name == ANGLE or "switching_interval" not in scenario.device.valve.settings:
         return ""
-    start = 0.0
-    if kind.name != TORQUE:
-        start = float(kind.value(0.0, scenario.initial.pressure_1, scenario.initial.pressure_2, 0.0))
-    extent = max(abs(float(bound) - start) for bound in profile_bounds(scenario.reference))
+    wanted = limit or _wanted(scenario)
     step, late = pair_step(scenario, law)
-    wanted = max(extent, smallest_change(scenario))
     share = step / wanted
     if share <= _LARGEST_STEP:
         return ""

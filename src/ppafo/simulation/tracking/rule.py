@@ -7,14 +7,14 @@ samples count in which its controller requests a torque, and errors are a share 
 
 import math
 from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.control.kind import ControllerKind
 from ppafo.metrics.command import asked_samples, command_reversals
-from ppafo.metrics.metric import Floats, extent, followed, hold_start
+from ppafo.metrics.metric import Floats, extent, followed, has_reference, hold_start
 from ppafo.metrics.settled import is_long_enough
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, reversals
 from ppafo.metrics.tracking import SUSTAINED
@@ -129,8 +129,15 @@ def _turns_of_reference(scenario: Scenario, duration: float) -> float:
     return float(reversals(values, OSCILLATION_THRESHOLD * (highest - lowest))) if highest > lowest else 0.0
 
 
-def settled_walk(recording: Recording) -> SettledPart | None:
-    """Settled part of a walk: the samples with a requested torque; None where none is requested."""
+def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
+    """Settled part of a walk: the samples with a requested torque; None where none is requested.
+
+    A law that requests none but opens its valves up to a torque ``limit`` [N m] has a peak alone, 0 for no limit.
+    """
+    if not has_reference(recording):
+        peak = float(np.max(np.abs(recording["torque"])))
+        numbers: dict[str, Any] = dict.fromkeys(("duration", "error", "missing", "swing", "turns", "moved"), 0.0)
+        return SettledPart(slice(None), wanted=limit, peak=peak, rests=False, **numbers) if limit > 0.0 else None
     asked = asked_samples(recording)
     reference, value = (series[asked] for series in followed(recording))
     wanted = float(np.sqrt(np.mean(reference**2))) if reference.size else 0.0

@@ -138,16 +138,20 @@ def tracking_of(
 
     ``stride_time`` [s] is the duration of a stride of a walk, 0 for a task.
     """
-    if not has_reference(recording) or len(recording) < _FEWEST_SAMPLES or scenario.controller.is_open_loop:
-        return None
     is_task = scenario.follows_reference
-    settled = settled_task(scenario, recording) if is_task else settled_walk(recording)
+    if (
+        len(recording) < _FEWEST_SAMPLES
+        or scenario.controller.is_open_loop
+        or (is_task and not has_reference(recording))
+    ):
+        return None
+    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
+    settled = settled_task(scenario, recording) if is_task else settled_walk(recording, limit)
     if settled is None:
         return None
     duration = float(np.ptp(recording.time[[0, -1]]))
     counted = settled.reversals * max(duration, 1.0) if is_noisy(scenario) else reversals
     turning = counted / most_reversals(scenario, law, duration, stride_time)
-    limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
     if is_task:
         failure = failure_of_task(settled, turning, law is not None and law.only_switches)
     else:

@@ -5,11 +5,12 @@ from collections.abc import Callable
 import numpy as np
 
 from ppafo.metrics.metric import followed
+from ppafo.metrics.switching import SHUT
 from ppafo.parameters.reach import static_torque, supply_for, torque_reach
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation
-from ppafo.simulation.tracking.remedies import level_text, remedy, sized_valves
+from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
 
 _OFTEN = 0.1
 """Share of the time with a request that is often [-]."""
@@ -25,6 +26,8 @@ def causes_of_walk(case: Case) -> tuple[TrackingCause, ...]:
 def _request_beyond_reach(case: Case) -> TrackingCause | None:
     """The controller of a walk often requests more torque than the actuator gives at the angle of that moment."""
     scenario, samples = case.scenario, case.settled.samples
+    if case.failure == "overshoots":
+        return None
     device, torque = scenario.device, static_torque(scenario.device)
     reference, angle = followed(case.recording)[0][samples], case.recording["angle"][samples]
     places = np.unique(np.linspace(0, angle.size - 1, _ANGLES_OF_WALK).astype(np.intp))
@@ -83,12 +86,27 @@ def _speed_of_gait(case: Case) -> TrackingCause:
 
 
 def _oscillation_of_walk(case: Case) -> TrackingCause | None:
-    return oscillation(case) if case.oscillates else None
+    """Gains that make a walk oscillate, or a pair whose step takes its torque beyond the limit."""
+    return oscillation(case) if case.oscillates or (case.failure == "overshoots" and case.only_switches) else None
+
+
+def _dead_band_of_walk(case: Case) -> TrackingCause | None:
+    """The command of a walk stays within the dead band of its valve often, over which its law does not jump."""
+    scenario = case.scenario
+    band = dead_band(scenario) - float(scenario.controller.settings.get("dead_band", 0.0))
+    command = np.abs(case.recording["command"][case.settled.samples])
+    share = float(np.mean((command > SHUT) & (command <= band)))
+    if share <= _OFTEN or case.failure == "overshoots":
+        return None
+    text = f"its command stays within `valve.dead_band = {band:.2g}` for {100.0 * share:.0f} % of the time"
+    advice = "take a valve without a dead band, or a law that opens beyond it"
+    return TrackingCause(text, tuple(larger_gains(scenario, case.law, (2.0, 4.0, 8.0))), advice)
 
 
 _OF_WALK: tuple[Callable[[Case], TrackingCause | None], ...] = (
     _request_beyond_reach,
     _oscillation_of_walk,
+    _dead_band_of_walk,
     _valve_of_walk,
     gains_of_another_device,
     _speed_of_gait,

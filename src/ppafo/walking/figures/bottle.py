@@ -64,7 +64,7 @@ def bottle_figure(result: WalkResult) -> "Figure":
             ),
             panel(Kind("Left in the bottle", "kg", "gas mass"), left, largest=supply.supply.mass),
         ],
-        size=(8.1, 1.75),
+        size=(5.6, 1.6),
         title=f"{result.scenario.name} on {supply.supply.bottle.name}",
         note=f"End: {supply.ending.message}.",
         kind=recording.kind,

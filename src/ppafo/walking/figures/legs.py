@@ -68,7 +68,7 @@ _VIEW = (-0.62, 0.62, -0.12, 0.78)
 _TICK = 0.35
 """Distance of the marks on the ground [m]."""
 
-_CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1.colour), ("pressure_2", "dorsiflexion", CHAMBER_2.colour))
+_CHAMBERS = (("pressure_1", "plantarflexion", CHAMBER_1), ("pressure_2", "dorsiflexion", CHAMBER_2))
 """Channel, name and colour of each chamber."""
 
 _VALVE = {0: ("closed", "#ffffff"), 1: ("plantarflexion", "#8fbfe0"), -1: ("dorsiflexion", "#f0b48a")}
@@ -76,7 +76,7 @@ _VENTED = ("vented", "#e4e4e4")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Legs:
+class _Legs:
     """Postures of one walk and of the healthy gait at the same instants, and their running phases [strides]."""
 
     turns: Floats
@@ -84,7 +84,7 @@ class Legs:
     healthy: Posture
 
 
-def legs_of(result: WalkResult, turns: Floats) -> Legs:
+def legs_of(result: WalkResult, turns: Floats) -> _Legs:
     """Return the legs of a walk at running phases [strides], counted from the start of the recording."""
     configuration, recording = result.scenario, result.recording
     gait = walk_of(configuration).gait
@@ -94,7 +94,7 @@ def legs_of(result: WalkResult, turns: Floats) -> Legs:
     shank, angle, healthy = (
         np.interp(times, recording.time, recording[name]) for name in ("shank_angle", "angle", "healthy_angle")
     )
-    return Legs(turns, path.posture(turns, shank, angle), path.posture(turns, shank, healthy))
+    return _Legs(turns, path.posture(turns, shank, angle), path.posture(turns, shank, healthy))
 
 
 def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
@@ -113,7 +113,7 @@ def last_phases(result: WalkResult, strides: int, per_stride: int) -> Floats:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class LegArtists:
+class _LegArtists:
     """The lines of one leg: shank, and the foot as a wedge of ankle, heel and toes."""
 
     shank: "Line2D"
@@ -129,7 +129,7 @@ class LegArtists:
         self.joint.set_data([knee[0], ankle[0]], [knee[1], ankle[1]])
 
 
-def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> LegArtists:
+def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False) -> _LegArtists:
     """Add the lines of one leg to an axes, of a line width [points]; ``place`` puts them somewhere."""
     from matplotlib.patches import Polygon
 
@@ -146,7 +146,7 @@ def leg_artists(axes: "Axes", colour: str, width: float, is_ghost: bool = False)
     axes.add_patch(foot)
     size = 0.0 if is_ghost else 1.6 * width
     (joint,) = axes.plot([], [], "o", color="white", markeredgecolor=colour, markersize=size, zorder=3.5)
-    return LegArtists(shank, foot, joint)
+    return _LegArtists(shank, foot, joint)
 
 
 def draw_ground(axes: "Axes", left: float, right: float) -> None:
@@ -155,7 +155,7 @@ def draw_ground(axes: "Axes", left: float, right: float) -> None:
     axes.fill_between([left, right], [-0.25, -0.25], [0.0, 0.0], color="#f1f1f1", linewidth=0.0, zorder=0)
 
 
-def drags(legs: Legs, index: int) -> bool:
+def drags(legs: _Legs, index: int) -> bool:
     """Return whether the toes are more than 1 cm below the ground."""
     return bool(legs.worn.toe[index, 1] < DRAG_LIMIT)
 
@@ -201,7 +201,7 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class StateBand:
+class _StateBand:
     """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
 
     name: str
@@ -215,34 +215,34 @@ def _is(value: float) -> Callable[[Floats], NDArray[np.bool_]]:
 
 
 _FREE, _DORSI, _PLANTAR = "#e4e4e4", "#f0b48a", "#8fbfe0"
-_ROWS: Mapping[str, tuple[str, tuple[StateBand, ...]]] = {
+_ROWS: Mapping[str, tuple[str, tuple[_StateBand, ...]]] = {
     "Controller": (
         "controller_phase",
         (
-            StateBand("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
-            StateBand("4 free motion", "4 free", _FREE, _is(2.0)),
-            StateBand("2 push-off", "2 push", _PLANTAR, _is(3.0)),
-            StateBand("3 swing", "3 swing", _DORSI, _is(0.0)),
+            _StateBand("1 heel strike", "1 heel", "#f6d5bd", _is(1.0)),
+            _StateBand("4 free motion", "4 free", _FREE, _is(2.0)),
+            _StateBand("2 push-off", "2 push", _PLANTAR, _is(3.0)),
+            _StateBand("3 swing", "3 swing", _DORSI, _is(0.0)),
         ),
     ),
     "Foot": (
         "contact",
         (
-            StateBand("on the heel", "heel", "#cfe3c9", _is(1.0)),
-            StateBand("flat", "flat", "#9fcf94", _is(2.0)),
-            StateBand("on the toes", "toes", "#63ad59", _is(3.0)),
-            StateBand("in the air", "air", "#f3f3f3", _is(0.0)),
+            _StateBand("on the heel", "heel", "#cfe3c9", _is(1.0)),
+            _StateBand("flat", "flat", "#9fcf94", _is(2.0)),
+            _StateBand("on the toes", "toes", "#63ad59", _is(3.0)),
+            _StateBand("in the air", "air", "#f3f3f3", _is(0.0)),
         ),
     ),
     "Valve": (
         "command",
         (
-            StateBand("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
-            StateBand("closed", "closed", "#ffffff", _is(0.0)),
-            StateBand(
+            _StateBand("vented", "vented", _FREE, lambda command: command > VENTS_ABOVE),
+            _StateBand("closed", "closed", "#ffffff", _is(0.0)),
+            _StateBand(
                 "plantarflexion", "plantar", _PLANTAR, lambda command: (command > 0.0) & (command <= VENTS_ABOVE)
             ),
-            StateBand("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
+            _StateBand("dorsiflexion", "dorsi", _DORSI, lambda command: command < 0.0),
         ),
     ),
 }
@@ -268,7 +268,7 @@ def strip_figure(result: WalkResult) -> "Figure":
         return figure
 
 
-def _shares(result: WalkResult, channel: str, states: tuple[StateBand, ...]) -> Floats:
+def _shares(result: WalkResult, channel: str, states: tuple[_StateBand, ...]) -> Floats:
     """Fraction of the strides with help in each state at ``PHASES``, shape (states, phases); 0 if nothing is known."""
     chosen = settled(result.helped)
     if channel not in result.recording or not chosen.any():
@@ -279,7 +279,7 @@ def _shares(result: WalkResult, channel: str, states: tuple[StateBand, ...]) -> 
     return np.array([np.mean(state.holds(values), axis=0) for state in states])
 
 
-def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[StateBand, ...]) -> None:
+def _band(axes: "Axes", label: str, fractions: Floats, states: tuple[_StateBand, ...]) -> None:
     below = np.zeros(PHASES.size)
     for state, fraction in zip(states, fractions, strict=True):
         axes.fill_between(_PERCENT, below, below + fraction, color=state.colour, linewidth=0.0, step="mid")
@@ -326,9 +326,10 @@ def _legs(axes: "Axes", result: WalkResult) -> None:
 
 def _pressures(axes: "Axes", result: WalkResult) -> None:
     atmosphere = result.scenario.device.supply.atmospheric_pressure
-    for channel, name, colour in _CHAMBERS:
+    for channel, name, look in _CHAMBERS:
         if channel in result.averages:
-            axes.plot(_PERCENT, display_values(result.averages[channel].mean, "pressure"), color=colour, label=name)
+            mean = display_values(result.averages[channel].mean, "pressure")
+            axes.plot(_PERCENT, mean, color=look.colour, linestyle=look.line, label=name)
     axes.axhline(display_value(atmosphere, "pressure"), color=GREY, linewidth=0.8)
     axes.set_ylabel(f"Chambers\n({axis_unit('pressure')})", rotation=0, ha="right", va="center")
     axes.yaxis.set_label_coords(-0.045, 0.5)
@@ -341,7 +342,7 @@ class _Scene:
     """Panel with a leg that walks through it."""
 
     axes: "Axes"
-    legs: Legs
+    legs: _Legs
     artists: tuple[Any, Any]
     ticks: Any
     colour: str
@@ -420,10 +421,11 @@ def _stage(comparison: WalkComparison, turns: np.ndarray) -> "tuple[Figure, list
     worn, configuration = comparison.with_device, comparison.with_device.scenario
     fine = np.linspace(turns[0], turns[-1], 400)
     atmosphere = configuration.device.supply.atmospheric_pressure
-    for channel, name, colour in _CHAMBERS:
+    for channel, name, look in _CHAMBERS:
         times = fine * walk_of(configuration).gait.stride_time
         pressures = np.interp(times, worn.recording.time, worn.recording[channel])
-        traces.plot(fine - turns[0], display_values(pressures, "pressure"), color=colour, linewidth=1.3, label=name)
+        shown = display_values(pressures, "pressure")
+        traces.plot(fine - turns[0], shown, color=look.colour, linestyle=look.line, linewidth=1.3, label=name)
     traces.set_xlim(0.0, turns[-1] - turns[0])
     least = display_value(atmosphere + 10.0 * PASCALS_PER_PSI, "pressure")
     traces.set_ylim(top=max(least, traces.get_ylim()[1]))

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from ppafo.gait.gait import clinical_angle
 from ppafo.metrics import Metric
 from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
-from ppafo.report.style import BLACK, BLUE, GREY, VERMILION
+from ppafo.report.style import BLACK, BLUE, DASHES, GREY, VERMILION
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.simulation.scenario import Scenario
@@ -22,10 +22,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WITH, WITHOUT, HEALTHY = BLUE, VERMILION, BLACK
-STANCE = "#f1f1f1"
 STRIDE = Kind("Stride", "1", "fraction")
 ANGLE = Kind("Ankle angle, 0 neutral, dorsiflexion positive", "rad", "angle")
-PRESSURE = Kind("Chamber pressures, gauge; solid: plantarflexion, dashed: dorsiflexion", "Pa_d", "pressure change")
+PRESSURE = Kind("Gauge pressures; dashed: dorsiflexion chamber", "Pa_d", "pressure change")
 TOES = Kind("Toe height above ground; below -1 the toes drag", "m", "body length")
 _CHANNELS = {
     ANGLE: ("angle",),
@@ -37,7 +36,7 @@ _CHANNELS = {
 """Panels from top to bottom, and the channels in each of them that are drawn for every walk."""
 
 
-class MeanStrideData(Protocol):
+class _MeanStrideData(Protocol):
     """A walk as its figure of the mean stride needs it."""
 
     @property
@@ -57,7 +56,7 @@ class MeanStrideData(Protocol):
         """Numbers of the whole walk."""
 
 
-def walk_figure(walks: Mapping[str, MeanStrideData]) -> "Figure":
+def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
     """Return the mean stride of one or two walks of the same wearer by name, and the healthy gait beside them."""
     first = next(iter(walks.values()))
     gait = walk_of(first.scenario).gait
@@ -65,8 +64,8 @@ def walk_figure(walks: Mapping[str, MeanStrideData]) -> "Figure":
     healthy = {ANGLE: (ankle, gait.ankle_angle.deviation), TOES: (healthy_toe_height(first.scenario), 0.0)}
     panels: list[Panel] = []
     for kind, channels in _CHANNELS.items():
-        filled = {"alpha": 1.0, "zorder": 0}
-        marks = [Mark("span", (0.0, gait.stance_share), label="stance", colour=STANCE, style=filled)]
+        thin = {"linewidth": 0.8, "linestyle": "-."}
+        marks = [Mark("at", gait.stance_share, label="toe-off", colour=GREY, style=thin)]
         if kind is not PRESSURE:
             marks.append(Mark("level", y=0.0, colour=GREY, style={"linewidth": 0.8}))
         for (name, result), colour in zip(walks.items(), (WITH, WITHOUT), strict=False):
@@ -75,39 +74,30 @@ def walk_figure(walks: Mapping[str, MeanStrideData]) -> "Figure":
                 continue
             label = f"{name}, mean of {result.metrics['counted_strides'].value:.0f}"
             atmosphere = result.scenario.device.supply.atmospheric_pressure
-            for channel, style in zip(channels, ("-", (0, (4, 2))), strict=False):
+            for channel, dashes in zip(channels, _dashes_of(colour), strict=False):
                 curves = result.averages[channel]
                 mean = curves.mean - atmosphere if kind is PRESSURE else curves.mean
                 mean = clinical_angle(mean) if kind is ANGLE else mean
                 marks.append(_band(mean, curves.deviation, colour, 0.2))
-                marks.append(Mark("line", PHASES, mean, label=label, colour=colour, style={"linestyle": style}))
+                marks.append(Mark("line", PHASES, mean, label=label, colour=colour, style={"linestyle": dashes}))
         if kind in healthy:
             mean, deviation = healthy[kind]
             look = {"linewidth": 1.2, "linestyle": (0, (1, 1.2))}
             marks.append(Mark("line", PHASES, mean, label="healthy gait", colour=HEALTHY, style=look))
             marks.append(replace(_band(mean, deviation, GREY, 0.15), label="band: standard deviation"))
         panels.append(Panel(STRIDE, kind, marks, legend="", then=_whole_stride, shares_x=True))
-    figure = draw_panels(
+    panels[0] = replace(panels[0], legend="figure")
+    return draw_panels(
         panels,
-        size=(7.1, 1.7),
+        size=(5.4, 1.5),
         title=f"{first.scenario.name}: {gait.name}, {first.metrics['strides'].value:.0f} strides",
         kind=first.recording.kind,
     )
-    # Between title and panels: a name with its number of strides is too long to stand beside the title of a panel.
-    names, below = figure.axes[0].get_legend_handles_labels(), 0.29 + 0.17 * figure.get_suptitle().count("\n")
-    place = (0.008, 1.0 - below / figure.get_figheight())
-    figure.legend(
-        *names,
-        loc="upper left",
-        bbox_to_anchor=place,
-        ncols=3,
-        borderaxespad=0.0,
-        labelspacing=0.2,
-        handlelength=1.8,
-        frameon=False,
-        fontsize=9,
-    )
-    return figure
+
+
+def _dashes_of(colour: str) -> tuple[Any, Any]:
+    """Return the line of a walk in a panel of two chambers: of the first its own, of the second dashed."""
+    return DASHES.get(colour, "-"), (0, (4, 2))
 
 
 def _band(mean: Floats, deviation: Floats | float, colour: str, alpha: float) -> Mark:

@@ -36,7 +36,7 @@ def population_figure(population: Population) -> "Figure":
     return draw_panels(
         panels,
         across=3,
-        size=(3.2, 2.6),
+        size=(2.2, 2.2),
         title=f"{population.scenario.name}: {population.count} wearers, {population.minutes:.3g} min each",
         note="lines: 5th, 50th and 95th percentiles; dot: the wearer of the configuration",
     )

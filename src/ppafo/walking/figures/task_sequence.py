@@ -22,12 +22,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _PHASES = {
-    LANDING: ("landing", "#f6d5bd"),
-    MID_STANCE: ("mid-stance", "#e4e4e4"),
+    LANDING: ("landing", "#f3c9a6"),
+    MID_STANCE: ("mid-stance", "#ececec"),
     PUSH_OFF: ("push-off", "#8fbfe0"),
-    SWING: ("swing", "#f0b48a"),
+    SWING: ("swing", "#cf8146"),
 }
-"""Name and colour of each phase in the strip under the torque."""
+"""Name and colour of each phase in the strip under the torque; they differ in grey too."""
 _SHADED, _LESS_HELP = "#f3f3f3", "#cc3311"
 _NARROWEST = 0.045
 """Fraction of the task sequence below which the name of a segment stands upright."""
@@ -43,8 +43,9 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     """Return a task sequence over time with the device (and without it); needs a recording of at least two samples."""
     recording, time = worn.recording, worn.recording.time
     walks = {WITHOUT: bare.recording, WITH: worn.recording}
+    names = {WITHOUT: "without the device", WITH: "with it"}
     angles = [
-        Mark("line", walk.time, clinical_angle(walk["angle"]), colour=colour, style=THIN)
+        Mark("line", walk.time, clinical_angle(walk["angle"]), label=names[colour], colour=colour, style=THIN)
         for colour, walk in walks.items()
     ]
     toes = [Mark("line", walk.time, walk["toe_height"], colour=colour, style=THIN) for colour, walk in walks.items()]
@@ -72,9 +73,9 @@ def task_sequence_figure(worn: WalkResult, bare: WalkResult) -> "Figure":
     sequence = walk_of(worn.scenario).task_sequence
     return draw_panels(
         panels,
-        size=(9.1, 1.45),
+        size=(5.8, 1.45),
         title=f"{worn.scenario.name}, task sequence {'' if sequence is None else sequence.name}",
-        note="blue: with the device; orange: without it; red line: the controller helps less",
+        note="upright line: the controller helps less",
         kind=recording.kind,
     )
 

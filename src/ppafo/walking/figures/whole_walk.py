@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _LEVELS = {
-    HELPS: ("help", "#cfe3c9"),
-    LIFTS: ("lift", "#e6e2a8"),
-    PAUSED: ("pause", "#f3d27a"),
-    STOPPED: ("stop", "#e08a8a"),
+    HELPS: ("help", "#f0f6ee"),
+    LIFTS: ("lift only", "#e6e2a8"),
+    PAUSED: ("pause", "#e3bb63"),
+    STOPPED: ("stop", "#c07777"),
 }
-"""Name and colour of each level of help."""
+"""Name and colour of each level of help, darker the less there is, so that they differ in grey too."""
 _PHASES = ("swing", "heel", "free", "push")
 """Names of the phases, whose numbers count from 0."""
 _NAMED_STRETCH = 0.06
@@ -61,7 +61,7 @@ def whole_walk_figure(result: WalkResult) -> "Figure":
     if "safe_state" in recording:
         panels.append(_level_panel(recording, axis))
     title = f"{result.scenario.name}: the whole walk"
-    figure = draw_panels(panels, size=(9.1, 1.5), title=title, kind=recording.kind)
+    figure = draw_panels(panels, size=(5.6, 1.5), title=title, kind=recording.kind)
     # Panels that share an axis take the limits of the one below when they are joined, so limits come last.
     figure.axes[0].set_xlim(0.0, float(axis.values(end)))
     return figure

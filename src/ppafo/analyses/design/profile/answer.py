@@ -281,7 +281,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 name="profile",
                 caption=_CAPTION,
                 across=2,
-                size=(4.5, 3.3),
+                size=(3.0, 2.7),
                 is_detail=True,
             ),
             finding.Section(
@@ -289,7 +289,7 @@ def finding_of(sizing: Sizing) -> Finding[Sizing]:
                 panels=partial(_torque_panels, sizing),
                 name="torque",
                 caption="The prescribed torque and the suggestion's.",
-                size=(9.0, 3.0),
+                size=(5.8, 2.5),
                 is_detail=True,
             ),
             *parts_to_check(sizing.doubtful),

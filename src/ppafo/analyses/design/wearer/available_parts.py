@@ -12,11 +12,12 @@ from ppafo.parameters.parts.catalogue import rated_pressure
 
 @dataclass(frozen=True, slots=True)
 class AvailableParts:
-    """Parts available for a device, by group, and the user's catalogue file, if any."""
+    """Parts available for a device, by group, the user's catalogue file, if any, and the name of a chosen bottle."""
 
     groups: Mapping[str, Mapping[str, Part]]
     own_groups: frozenset[str]
     file: str
+    chosen_bottle: str = ""
 
     @property
     def bottles(self) -> list[Part]:
@@ -30,6 +31,8 @@ class AvailableParts:
 
     def bottle_name(self, bottle: Part) -> str:
         """Return what ``--bottle`` takes for a bottle."""
+        if self.chosen_bottle:
+            return self.chosen_bottle
         return f"{self.file}/{bottle.name}" if "bottles" in self.own_groups else bottle.name
 
     def pairs(self, pressure: float) -> list[tuple[Part, Part]]:

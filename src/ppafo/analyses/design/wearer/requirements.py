@@ -39,7 +39,8 @@ TORQUE, MASS, CLEARANCE = Kind("", "N m", "torque", ".3g"), Kind("", "kg", "part
 class DesignRequirements:
     """Design requirements: body mass [kg], stature [m] or None, torque [N m], supply [Pa absolute], time [s].
 
-    ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted.
+    ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted. ``gas``
+    is the species that the device is fed with, empty for that of the walk.
     """
 
     mass: float
@@ -49,6 +50,7 @@ class DesignRequirements:
     seconds: float
     toes: float | None = None
     usual_toes: float = TOES
+    gas: str = ""
 
     @property
     def height(self) -> float:

@@ -24,6 +24,7 @@ from ppafo.analyses.design.wearer.requirements import (
 )
 from ppafo.analyses.design.wearer.strides import SHUT_OFF_PARTS, few_strides, of_wearer
 from ppafo.analyses.endurance.solve import endurance_of_walk
+from ppafo.parameters.bottles.bottle import bottle_part
 from ppafo.parameters.parts import Part
 from ppafo.parameters.parts.catalogue import DEFAULT
 from ppafo.progress import Progress, Report
@@ -36,14 +37,26 @@ _PROCESSOR, _CELL = "msp430g2553", "ncr18650b"
 """The processor and the cells of the battery, unless the catalogue is one's own."""
 
 
-def size_for_wearer(requirements: DesignRequirements, report: Report, catalogue: str | Path = DEFAULT) -> WearerSizing:
+def size_for_wearer(
+    requirements: DesignRequirements,
+    report: Report,
+    catalogue: str | Path = DEFAULT,
+    bottle: str | Path | None = None,
+) -> WearerSizing:
     """Return the lightest device that meets the requirements, or the alternatives; ``catalogue`` is a name or a file.
 
-    ``report`` is told of each walk. Raises StudyError for impossible requirements, ParameterError for a bad catalogue.
+    ``bottle``, a name or a file, takes the place of those of the catalogue; the device is fed with its gas. ``report``
+    is told of each walk. Raises StudyError for impossible requirements, ParameterError for a bad catalogue or bottle.
     """
     check_requirements(requirements)
-    shelf = shelf_of(catalogue)
-    healthy = healthy_metrics(load_walk(next(iter(WALKS.values())), of_wearer(requirements)))["lowest_toes"].value
+    shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), of_wearer(requirements))
+    if bottle is not None:
+        part, species = bottle_part(bottle)
+        groups = {**shelf.groups, "bottles": {part.name: part}}
+        shelf = replace(shelf, groups=groups, chosen_bottle=str(bottle))
+        if species != walking.device.gas.species:
+            requirements = replace(requirements, gas=species)
+    healthy = healthy_metrics(walking)["lowest_toes"].value
     # What the healthy gait itself does not do is not asked of a device, unless somebody does.
     requirements = replace(requirements, usual_toes=shown_clearance(min(TOES, healthy)))
     pairs = shelf.pairs(requirements.pressure)

@@ -8,7 +8,7 @@ from ppafo.analyses.design.wearer.requirements import WALKS, DesignRequirements,
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.model.catalog import VALVES
 from ppafo.model.shut_off import SHUT_OFF
-from ppafo.parameters.declaration import ACTUATOR, ORIFICE
+from ppafo.parameters.declaration import ACTUATOR, ORIFICE, SPECIES_PATH
 from ppafo.parameters.parts import Part
 from ppafo.units.shown import written_text
 from ppafo.walking.loading import load_walk
@@ -74,6 +74,7 @@ def _common_overrides(requirements: DesignRequirements, valve: Part, actuator: P
     numbers = {**valve.model_numbers, **{f"actuator.{name}": actuator.values[name] for name in _OF_ACTUATOR}}
     return (
         *of_wearer(requirements),
+        *((f"{SPECIES_PATH}={requirements.gas}",) if requirements.gas else ()),
         f"supply.pressure={written_text(requirements.pressure, 'Pa_a')}",
         f"supply.dorsiflexion_pressure={written_text(dorsiflexion, 'Pa_a')}",
         *(f"{path}={written_text(number, units[path.partition('.')[2]])}" for path, number in numbers.items()),

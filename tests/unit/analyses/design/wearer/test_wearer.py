@@ -21,6 +21,7 @@ from ppafo.analyses.design.wearer.requirements import DesignRequirements, SizedD
 from ppafo.analyses.design.wearer.strides import few_strides
 from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, StudyError
+from ppafo.parameters.bottles.bottle import bottle_part
 from ppafo.parameters.parts import load_catalogue
 from ppafo.parameters.parts.catalogue import Catalogue
 from ppafo.progress import report_nothing
@@ -147,6 +148,29 @@ def test_a_pressure_that_wastes_gas_is_answered_with_less_pressure_and_that_is_g
     asked = replace(requirements, pressure=101325.0 + float(words[2]) * PSI)
     strides = few_strides(asked, valve, actuator)
     assert lightest_on_bottle(asked, strides, shelf, report_nothing) is not None
+
+
+@pytest.mark.long
+def test_a_bottle_of_compressed_air_feeds_the_device_with_air() -> None:
+    part, species = bottle_part("air-48ci-3000psi")
+    assert species == "air"
+    assert part.full_mass == pytest.approx(1.13 + 0.188, abs=0.01)
+    assert part.doubtful == ("empty_mass",)
+    whole = shelf_of("parts")
+    assert bottle_part("co2-3_5oz") == (whole.groups["bottles"]["co2-3_5oz"], "CO2")
+    valve, actuator = whole.groups["valves"]["enfield-ls-v05s"], whole.groups["actuators"]["smc-crb2bw40-90d"]
+    requirements = DesignRequirements(72.5, 1.75, 1.2, 101325.0 + 50.0 * PSI, 12.0, 0.001, gas="air")
+    shelf = replace(whole, groups={**whole.groups, "bottles": {part.name: part}}, chosen_bottle=part.name)
+    tried = few_strides(requirements, valve, actuator)
+    assert "gas.species=air" in tried[0].overrides
+    found = lightest_on_bottle(requirements, tried, shelf, report_nothing)
+    assert found is not None
+    assert found.walked.scenario.device.gas.species == "air"
+
+
+def test_a_bottle_that_is_none_is_refused_before_any_walk() -> None:
+    with pytest.raises(ppafo.ParameterError, match="there is no bottle 'air-48ci-300psi', did you mean"):
+        ppafo.design(mass=72.5, stature=1.75, torque=2.5, pressure=4.5e5, minutes=1.0, bottle="air-48ci-300psi")
 
 
 def test_the_limit_of_the_controller_follows_the_wish_and_a_stature_that_is_assumed_is_said() -> None:
