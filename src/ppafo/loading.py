@@ -87,12 +87,21 @@ def load_scenario(
 
 @checked
 def scenario_from_dict(content: Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Scenario:
-    """Return a scenario, walks among them, from nested dictionaries that are laid out as a scenario file is.
+    """Scenario or walk from nested dictionaries laid out as a scenario file.
 
-    Quantities are texts with their unit, ``{"angle": "75 deg"}``; relative paths begin in the working folder.
-    ScenarioError, ParameterError or DataError for anything that cannot be used.
+    Arguments:
+        content: tables of the file; quantities are texts with their unit, ``{"angle": "75 deg"}``, and relative paths
+            begin in the working folder
+        overrides: texts such as ``valve.area=12.6mm^2``, or a dictionary
+        plugins: modules of your own, files or names, whose objects files may name
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Returns:
+        the Scenario
+
+    Raises:
+        ScenarioError: a scenario that cannot be used
+        ParameterError: a parameter set, or a value of it, that cannot be used
+        DataError: a gait or recording that cannot be read
 
     >>> import ppafo
     >>> import tomllib

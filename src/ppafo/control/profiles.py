@@ -184,8 +184,12 @@ def used_knots(profile: TabulatedProfile) -> list[tuple[float, float]]:
 
 def table_bounds(profile: TabulatedProfile) -> tuple[float, float]:
     """The lowest and the highest value [N m or rad] of the knots that are used, with the level."""
-    values = [value for _, value in used_knots(profile)]
-    return profile.level + min(values), profile.level + max(values)
+    lowest, highest = profile.value_01, profile.value_01
+    for knot in profile.knots:
+        is_used = knot.time < profile.period
+        lowest = min(lowest, knot.value) if is_used else lowest
+        highest = max(highest, knot.value) if is_used else highest
+    return profile.level + lowest, profile.level + highest
 
 
 class KnotWindow(NamedTuple):

@@ -9,7 +9,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.arguments import checked
-from ppafo.documents.models import NAME, QUANTITY, SchemaVersion, make_schema, optional, table, validate
+from ppafo.documents.models import SchemaVersion, make_schema, optional, table, validate
+from ppafo.documents.problems import NAME, QUANTITY
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.gait import CURVES, REQUIRED, Gait, GaitCurve, plain_unit

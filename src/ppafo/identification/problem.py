@@ -13,7 +13,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.bench.flow import GasAt, Law

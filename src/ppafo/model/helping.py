@@ -1,4 +1,4 @@
-"""Numbers for what a controller of walking sees and does, in lanes and recordings: phase of stride, level of help."""
+"""Codes of a walking controller in lanes and recordings: phase of the stride, assistance level."""
 
 SWING = 0.0
 LANDING = 1.0

@@ -42,13 +42,21 @@ _LABELS = {
 
 @checked
 def workbench(scenarios: Sequence[str | Path] = DEFAULT, *, overrides: Overrides = (), plugins: Plugins = ()) -> bytes:
-    """Return a page, one file of HTML, in which scenarios are simulated again while their numbers are changed.
+    """Interactive page, one file of HTML, that simulates scenarios again as their numbers are changed.
 
-    ``scenarios`` are names or files of scenarios and walks; those with the same kind of motion share a tab.
-    ``overrides`` change all of them. Each tab opens with its first two scenarios.
-    ScenarioError for none, too many or two of one name; ProgramError where a program has to be built and cannot be.
+    Scenarios with the same kind of motion share a tab, which opens with the first two of them.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Arguments:
+        scenarios: names or files of scenarios and walks
+        overrides: changes of all scenarios, as texts or a dictionary
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        the page, in UTF-8
+
+    Raises:
+        ScenarioError: no scenario, too many, or two of one name
+        ProgramError: a program that the page needs and that cannot be built here
 
     >>> import ppafo
     >>> ppafo.workbench("torque-task-proportional")[:15]

@@ -13,7 +13,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, Field
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.documents.models import NAME, SchemaVersion, make_schema, one_of, optional, table, validate
+from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table, validate
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, beside, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.kinds import Kinds

@@ -166,15 +166,23 @@ def either(path: str, forms: Forms = FORMS) -> str:
 
 @checked
 def apply_overrides(parameter_set: ParameterSet, overrides: Overrides, *, valve: Name | None = None) -> ParameterSet:
-    """Return the set with values replaced; each override is a text such as ``valve.area=12.6mm^2``, in any order.
-
-    A dictionary of paths does as well, in which a number is in SI.
+    """Parameter set with values replaced.
 
     ``valve.X`` means the valve that is chosen (``valve``, else the set's default), ``valves.NAME.X`` one by name.
     Naming another gas brings that gas's molar mass and heat capacity ratio, unless they are given too; giving an
     orifice in the form of ISO 6358 drops its area and discharge coefficient, and the reverse. What follows a number
-    (``links_of_set``) is set with it, unless it is given too. ParameterError for an override that does not fit the set,
-    and for two that give one value.
+    (``links_of_set``) is set with it, unless it is given too.
+
+    Arguments:
+        parameter_set: the set, which stays as it is
+        overrides: texts such as ``valve.area=12.6mm^2``, in any order, or a dictionary of paths with numbers in SI
+        valve: name of the valve that ``valve.X`` means; default: the set's default valve
+
+    Returns:
+        the changed ParameterSet
+
+    Raises:
+        ParameterError: an override that does not fit the set, or two that give one value
 
     >>> import ppafo
     >>> changed = ppafo.apply_overrides(ppafo.load_parameter_set("ppafo2011"), ["supply.pressure=70 psi_g"])

@@ -16,7 +16,7 @@ from typing import Any
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.documents.models import quote
+from ppafo.documents.problems import quote
 from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.controlled import CONTROLLED, TORQUE

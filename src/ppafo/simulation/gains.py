@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.kind import ControllerKind
-from ppafo.model.controlled import ANGLE, CONTROLLED, TORQUE
+from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.model.ports import load_torque
 from ppafo.parameters.graph import LinkFunction
 from ppafo.parameters.plant import effects_of
 from ppafo.simulation.declaration import law_settings
 from ppafo.simulation.numbers import number_at
-from ppafo.simulation.scenario import Scenario
+from ppafo.simulation.scenario import PrescribedMotion, Scenario
 from ppafo.simulation.torque_loop import DEAD_TIME, RATE, loop_terms
 
 _OF_LOOP = frozenset(
@@ -66,7 +66,7 @@ class Gains:
     dead_time: float
     unit: str = "N m"
     unknown_loads: tuple[str, ...] = ()
-    """Effects that load the joint, where a gain is computed from the joint: none of them is in it."""
+    """Effects that load a joint that they may move, where a gain is computed: none of them is in it."""
 
     @property
     def sentence(self) -> str:
@@ -110,6 +110,7 @@ def gains_of(scenario: Scenario, law: ControllerKind) -> Gains | None:
     )
     rate, late = (float(terms[name].number(lambda path: number_at(scenario, path))) for name in (RATE, DEAD_TIME))
     controlled = scenario.controlled if TORQUE in law.controls else TORQUE
-    of_joint = any(gain.computed for gain in gains) and scenario.controlled == ANGLE
+    # A load moves the chambers of a joint that nothing leads, also of one whose torque is controlled.
+    of_joint = any(gain.computed for gain in gains) and not isinstance(scenario.motion, PrescribedMotion)
     loads = [effect.section for effect in effects_of(scenario.device) if load_torque in effect.laws]
     return Gains(gains, rate, late, CONTROLLED[controlled].plain_unit, tuple(loads) if of_joint else ())

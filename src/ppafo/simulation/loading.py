@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from ppafo.control.catalog import CONTROLLERS
-from ppafo.documents.models import all_problems, is_gap, is_unknown_kind
+from ppafo.documents.problems import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -68,6 +68,7 @@ from ppafo.simulation.declaration import (
     value_at,
 )
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.law_signals import LEG_PATHS, MOVED, PERIOD_PATH, seen_in_scenario
 from ppafo.simulation.motion_kind import MOTIONS, RunTimes
 from ppafo.simulation.nominal import nominal_terms
 from ppafo.simulation.numbers import check_parts
@@ -88,7 +89,7 @@ from ppafo.simulation.scenario import (
     SupplyLine,
 )
 from ppafo.simulation.schema import scenario_file, whole_scenario_file
-from ppafo.simulation.torque_loop import LEG_PATHS, PERIOD_PATH, loop_terms, seen_in_scenario
+from ppafo.simulation.torque_loop import loop_terms
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_in, shown_text, written_text
 
@@ -307,12 +308,16 @@ def _control(
         return Control(kind, reading.section("controller", items), period), {}
     rows = None if lines is None else lines.row(device.supply)
     is_locked = getattr(motion, "locked_angle", None) is not None and motion.motion_kind.name == "locked"
-    seen = seen_in_scenario(controlled, leg is not None, is_locked, reference.kind)
+    profile = getattr(motion, "profile", None)
+    moved = profile if isinstance(profile, ProfileChoice) and not is_locked else None
+    seen = seen_in_scenario(controlled, leg is not None, is_locked, reference.kind, "" if moved is None else moved.kind)
     terms = nominal_terms(device, rows) | loop_terms(device, CONTROLLERS[kind], seen, controlled)
     of_sensors = {quantity.name: getattr(sensors, quantity.name) for quantity in SENSORS}
     present = numbers_of_sensors(of_sensors) | numbers_of_lines(rows) | {PERIOD_PATH: period}
     if is_locked:
         present |= {LOCKED_ANGLE: motion.locked_angle}
+    if moved is not None:
+        present |= {f"{MOVED}.{name}": number for name, number in moved.settings.items()}
     present |= {f"reference.{name}": number for name, number in reference.settings.items()}
     if leg is not None:
         present |= {path: getattr(leg, path.removeprefix("motion.")) for path in LEG_PATHS}

@@ -105,11 +105,11 @@ class VaneKind:
 
     def sees(self, scenario: Scenario) -> LawSignals:
         """Return how the controller sees what it controls, with the foot of a leg or without."""
-        from ppafo.simulation.torque_loop import seen_in_scenario
+        from ppafo.simulation.law_signals import seen_in_scenario
 
-        motion = vane_motion(scenario)
-        is_locked = scenario.motion.motion_kind.name == "locked"
-        return seen_in_scenario(scenario.controlled, motion.leg is not None, is_locked, scenario.reference.kind)
+        motion, is_locked = vane_motion(scenario), self.name == "locked"
+        moved = motion.profile.kind if isinstance(motion, PrescribedMotion) and not is_locked else ""
+        return seen_in_scenario(scenario.controlled, motion.leg is not None, is_locked, scenario.reference.kind, moved)
 
     def follows_reference(self, scenario: Scenario) -> bool:
         """Tell whether there is a law that follows the reference, and not a constant command."""

@@ -13,7 +13,8 @@ from pydantic import BaseModel, Field, WithJsonSchema
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.documents.models import NAME, SchemaVersion, make_schema, one_of, optional, table
+from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table
+from ppafo.documents.problems import NAME
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity
 from ppafo.simulation import declaration

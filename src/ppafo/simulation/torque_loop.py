@@ -4,11 +4,9 @@ A gain is a frame here: the chambers of the actuator, the flow of the valve and 
 so that one function of floats gives the gain in a file, in a study and in an exported library.
 """
 
-import math
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
 
-from ppafo.constants import STANDARD_GRAVITY
 from ppafo.control import angle_loop, torque_loop
 from ppafo.control.angle_loop import Joint
 from ppafo.control.kind import ControllerKind
@@ -17,28 +15,16 @@ from ppafo.model.actuators.kind import Range
 from ppafo.model.binding import made_of
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import ANGLE, TORQUE
-from ppafo.model.declaration import Number, PlainFunction, row_with
+from ppafo.model.declaration import Number, PlainFunction
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import LinkFunction
 from ppafo.parameters.plant import valve_settings
-from ppafo.simulation.declaration import LOCKED_ANGLE
-from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of, usual_place
+from ppafo.simulation.mean_chambers import MeanChambers, Surroundings, chambers_of
 from ppafo.simulation.motion_kind import LawSignals
 from ppafo.simulation.nominal import AREA_PATHS, SONIC_PATHS, VALVE, flow_of_area, flow_of_sonic, in_its_form
 
-PERIOD_PATH = "controller.period"
 RATE, DEAD_TIME = "torque rate at full opening", "dead time of the torque loop"
 """Names of what the gains are made of, among the terms."""
-_OF_DEVICE = (
-    "foot_plate.inertia",
-    "foot_plate.gravity_torque",
-    "friction.viscous_damping",
-    "friction.dynamic_torque",
-    "friction.static_torque",
-)
-_OF_ANGLE = ("sensors.angle_bandwidth", "sensors.angle_resolution", "sensors.angle_noise")
-LEG_PATHS = ("motion.foot_mass", "motion.foot_mass_centre", "motion.foot_inertia")
-"""Paths of the foot of a leg."""
 
 
 class FlowNumbers(NamedTuple):
@@ -51,92 +37,10 @@ class FlowNumbers(NamedTuple):
     orifice_2: Annotated[float, Number("", "discharge coefficient or critical ratio")]
 
 
-_Seconds = Annotated[float, Number("s", "")]
-_Hertz = Annotated[float, Number("Hz", "")]
-_Inertia = Annotated[float, Number("kg m^2", "")]
-_Torque = Annotated[float, Number("N m", "")]
-_Damping = Annotated[float, Number("N m s/rad", "")]
-_Angle = Annotated[float, Number("rad", "")]
-_Mass = Annotated[float, Number("kg", "")]
-_Length = Annotated[float, Number("m", "")]
-
-
-class SignalsOfWalk(NamedTuple):
-    """Sample period [s] and bandwidth of the pressure sensors [Hz] of a walk, whose measurements are not old."""
-
-    period: _Seconds
-    bandwidth: _Hertz
-
-
-class Signals(NamedTuple):
-    """Sample period and age of a measurement [s], bandwidth of the pressure sensors [Hz]."""
-
-    period: _Seconds
-    bandwidth: _Hertz
-    delay: _Seconds
-
-
-_Joint = {
-    "angle_resolution": _Angle,
-    "angle_noise": _Angle,
-    "inertia": _Inertia,
-    "gravity_torque": _Torque,
-    "viscous_damping": _Damping,
-    "dynamic_torque": _Torque,
-    "static_torque": _Torque,
-}
-Locked: Any = row_with("Locked", Signals, locked_angle=_Angle)
-"""Signals of a joint that is locked, with its angle [rad]."""
-OfJoint: Any = row_with("OfJoint", Signals, angle_bandwidth=_Hertz, **_Joint)
-"""Signals of a scenario, bandwidth [Hz], resolution and noise [rad] of its angle sensor; what turns, its friction."""
-OfLeg: Any = row_with("OfLeg", OfJoint, foot_mass=_Mass, foot_mass_centre=_Length, foot_inertia=_Inertia)
-"""Signals, and a joint with a foot: its mass [kg], ankle to mass centre [m], inertia about that [kg m^2]."""
-_Ramp = {"start_level": _Angle, "level": _Angle}
-_Sine = {"level": _Angle, "amplitude": _Angle}
-JointAtLevel: Any = row_with("JointAtLevel", OfJoint, level=_Angle)
-LegAtLevel: Any = row_with("LegAtLevel", OfLeg, level=_Angle)
-JointOnRamp: Any = row_with("JointOnRamp", OfJoint, **_Ramp)
-LegOnRamp: Any = row_with("LegOnRamp", OfLeg, **_Ramp)
-JointOnSine: Any = row_with("JointOnSine", OfJoint, **_Sine)
-LegOnSine: Any = row_with("LegOnSine", OfLeg, **_Sine)
-"""Signals with the settings of a reference of the angle [rad]."""
-
-
 class SpoolParts(NamedTuple):
     """Functions for the time of a spool: the time [s] after which the valve has followed a command."""
 
     follow_time: Callable[[Any], float]
-
-
-def anywhere(stops: Range, _signals: Any) -> tuple[float, float]:
-    """Place [rad], twice, of a joint that may be anywhere."""
-    place = usual_place(stops.angle_min, stops.angle_max)
-    return place, place
-
-
-def where_locked(_stops: Range, signals: Any) -> tuple[float, float]:
-    """Place [rad], twice, of a joint that is locked."""
-    return signals.locked_angle, signals.locked_angle
-
-
-def at_level(stops: Range, signals: Any) -> tuple[float, float]:
-    """Place [rad], twice, of a joint whose angle is to be constant."""
-    return between(stops, signals.level), between(stops, signals.level)
-
-
-def at_both_levels(stops: Range, signals: Any) -> tuple[float, float]:
-    """Places [rad] of a joint whose angle is to go from one level to another."""
-    return between(stops, signals.start_level), between(stops, signals.level)
-
-
-def at_both_crests(stops: Range, signals: Any) -> tuple[float, float]:
-    """Places [rad] of a joint whose angle is to be a sine."""
-    return between(stops, signals.level - signals.amplitude), between(stops, signals.level + signals.amplitude)
-
-
-def between(stops: Range, angle: float) -> float:
-    """The angle between the stops that is nearest to an angle [rad]."""
-    return float(min(max(angle, stops.angle_min), stops.angle_max))
 
 
 class LoopParts(NamedTuple):
@@ -216,21 +120,6 @@ def time_of_pair(valve: Any, period: float) -> float:
     return delay + wait
 
 
-def lag_of_sensor(bandwidth: float) -> float:
-    """Time constant [s] of a sensor with a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
-    return 1.0 / (2.0 * math.pi * bandwidth) if bandwidth > 0.0 else 0.0
-
-
-def time_in_scenario(signals: Signals) -> float:
-    """Age of a measurement [s]: transport delay and lag of the pressure sensors."""
-    return signals.delay + lag_of_sensor(signals.bandwidth)
-
-
-def time_in_walk(signals: SignalsOfWalk) -> float:
-    """Time [s] by which pressure sensors of a walk follow late."""
-    return lag_of_sensor(signals.bandwidth)
-
-
 def torque_by_pressure_1(mean: MeanChambers) -> float:
     """Derivative of the controlled quantity by the pressure in chamber 1: for a torque [m^3], positive."""
     return mean.torque_per_pressure_1
@@ -299,25 +188,6 @@ def reach_of(
     gauge_1 = abs(around.supply_pressure - around.atmospheric_pressure)
     gauge_2 = abs(around.dorsiflexion_pressure - around.atmospheric_pressure)
     return max(parts.per_pressure_1(mean) * gauge_1, parts.per_pressure_2(mean) * gauge_2, 0.0)
-
-
-def time_with_angle(signals: Any) -> float:
-    """Age of a measurement [s]: transport delay and lag of the slower sensors."""
-    late: float = max(lag_of_sensor(signals.bandwidth), lag_of_sensor(signals.angle_bandwidth))
-    age: float = signals.delay
-    return age + late
-
-
-def turning_alone(signals: Any) -> tuple[float, float]:
-    """Inertia [kg m^2] and largest gravity torque [N m] of what the actuator moves."""
-    return signals.inertia, signals.gravity_torque
-
-
-def turning_with_foot(signals: Any) -> tuple[float, float]:
-    """Inertia [kg m^2] and largest gravity torque [N m] of actuator and foot about the ankle."""
-    moment = signals.foot_mass * signals.foot_mass_centre
-    inertia = signals.inertia + signals.foot_inertia + moment * signals.foot_mass_centre
-    return inertia, signals.gravity_torque + moment * STANDARD_GRAVITY
 
 
 def joint_of(
@@ -485,42 +355,6 @@ class LoopFrames(NamedTuple):
     rows: tuple[type, ...]
     sources: tuple[str, ...]
     joint: PlainFunction | None
-
-
-_PRESSURES = (PERIOD_PATH, "sensors.pressure_bandwidth")
-_ANGLE = (*_PRESSURES, "sensors.delay", *_OF_ANGLE, *_OF_DEVICE)
-IN_WALK = LawSignals(signals=SignalsOfWalk, late=time_in_walk, paths=_PRESSURES, places=anywhere)
-"""The torque in a walk."""
-IN_SCENARIO = LawSignals(signals=Signals, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay"), places=anywhere)
-"""A torque or a pressure of a vane alone."""
-LOCKED = LawSignals(
-    signals=Locked, late=time_in_scenario, paths=(*_PRESSURES, "sensors.delay", LOCKED_ANGLE), places=where_locked
-)
-"""The same of a joint that is locked at an angle."""
-_PLACES: dict[str, tuple[tuple[type, type], tuple[str, ...], Callable[[Range, Any], tuple[float, float]]]] = {
-    "": ((OfJoint, OfLeg), (), anywhere),
-    "constant": ((JointAtLevel, LegAtLevel), ("level",), at_level),
-    "ramp_hold": ((JointOnRamp, LegOnRamp), ("start_level", "level"), at_both_levels),
-    "sine": ((JointOnSine, LegOnSine), ("level", "amplitude"), at_both_crests),
-}
-"""Rows of a joint and of a leg, and settings of a reference that say between which angles the joint is to be."""
-
-
-def seen_in_scenario(controlled: str, has_leg: bool, is_locked: bool = False, reference: str = "") -> LawSignals:
-    """Return how the law of a vane alone sees what is controlled, by its kind of reference.
-
-    The joint may have a leg's foot, or be locked.
-    """
-    if controlled == ANGLE:
-        rows, names, places = _PLACES.get(reference, _PLACES[""])
-        return LawSignals(
-            signals=rows[has_leg],
-            late=time_with_angle,
-            paths=(*_ANGLE, *(LEG_PATHS if has_leg else ()), *(f"reference.{name}" for name in names)),
-            places=places,
-            turning=turning_with_foot if has_leg else turning_alone,
-        )
-    return LOCKED if is_locked else IN_SCENARIO
 
 
 def _frames(device: Device, seen: LawSignals, controlled: str, sonic: bool) -> LoopFrames:

@@ -8,7 +8,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field
 
-from ppafo.documents.models import LABEL, NAME, SchemaVersion, StrictTable, Text, Texts, make_schema
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema
+from ppafo.documents.problems import LABEL, NAME
 
 MAXIMUM_RUNS = 2**32
 """Draws after which a Sobol sequence of 32 bits repeats; no other method needs a lower limit."""

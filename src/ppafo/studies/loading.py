@@ -64,11 +64,20 @@ def load_study(
     seed: Seed | None = None,
     plugins: Plugins = (),
 ) -> Study:
-    """Return a study by its name in the package, by the path of a TOML file, or from data laid out as such a file.
+    """Load a study.
 
-    ``overrides`` as on the command line change every configuration; ``draws`` and ``seed`` replace the number of draws
-    and the random seed of the file. ``plugins`` are modules of your own whose objects files may name, as of
-    ``simulate``. StudyError for anything that is not usable.
+    Arguments:
+        study: name of a study, a .toml file, or data laid out as such a file
+        overrides: changes of every configuration, as texts or a dictionary
+        draws: number of draws, instead of the number in the file
+        seed: random seed, instead of the seed in the file
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        the Study, checked
+
+    Raises:
+        StudyError: a study that cannot be used
 
     >>> import ppafo
     >>> study = ppafo.load_study("torque-task-uncertainty", draws=64)

@@ -17,7 +17,8 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from ppafo.control.kind import PythonController
 from ppafo.documents.json_text import plain
-from ppafo.documents.models import quote, validate
+from ppafo.documents.models import validate
+from ppafo.documents.problems import quote
 from ppafo.engine.lanes import write_source
 from ppafo.errors import DataError, StudyError, UnitError, one_line
 from ppafo.metrics import METRICS

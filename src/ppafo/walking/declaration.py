@@ -10,7 +10,8 @@ from pydantic import BaseModel, Field
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS, load_walking_controller, walking_controllers
 from ppafo.control.walking.timings import TIMINGS
-from ppafo.documents.models import make_schema, one_of, optional, quote, table
+from ppafo.documents.models import make_schema, one_of, optional, table
+from ppafo.documents.problems import quote
 from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault

@@ -40,7 +40,7 @@ EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
 
 PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.level"
-"""Row of an event-based controller for its level of help: full, paused or stopped."""
+"""Row of an event-based controller for its assistance level: full, paused or stopped."""
 
 SILENT_ROW = "unpowered.silent"
 """Row of the time for which the controller has been silent, with a shut-off valve that has a watchdog."""

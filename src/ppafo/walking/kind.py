@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from ppafo.control.kind import ControllerKind
+from ppafo.simulation.law_signals import IN_WALK
 from ppafo.simulation.motion_kind import WALK, LawSignals
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.torque_loop import IN_WALK
 from ppafo.walking import contradictions, motion, planning, result
 
 

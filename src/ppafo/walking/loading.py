@@ -28,6 +28,7 @@ from ppafo.parameters.plant import venting_valve
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.simulation.declaration import PERIOD, RATE, SUPPLY_LINE, DocumentReader, kind_at, value_at
 from ppafo.simulation.following import numbers_of_lines, numbers_of_sensors, read_followers
+from ppafo.simulation.law_signals import IN_WALK, PERIOD_PATH
 from ppafo.simulation.loading import (
     Layout,
     ScenarioRequest,
@@ -52,7 +53,7 @@ from ppafo.simulation.scenario import (
     Sensors,
     SupplyLine,
 )
-from ppafo.simulation.torque_loop import IN_WALK, PERIOD_PATH, loop_terms
+from ppafo.simulation.torque_loop import loop_terms
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BottleSupply, read_bottle
 from ppafo.walking.contradictions import check_walk
 from ppafo.walking.declaration import (
@@ -117,13 +118,26 @@ def load_walk(
     parameter_set: ParameterSet | str | Path | None = None,
     plugins: Plugins = (),
 ) -> Scenario:
-    """Return a scenario that is a walk by its name in the package or by the path of a TOML file, in SI units.
+    """Load a walk as a scenario in SI units.
 
-    ``overrides`` are texts such as ``controller.peak_torque=6 N m`` or ``valve.area=12.6mm^2``; ``gait``,
-    ``task_sequence`` and ``bottle`` replace the file's. A gait that is named, by the file or by ``gait``, brings its
-    subject as the default wearer; ``parameter_set`` takes the place of the set that is named. ``plugins``
-    are modules of your own whose objects files may name, as of ``simulate``. ScenarioError, ParameterError or DataError
-    for anything that cannot be used.
+    The subject of a gait that the file or ``gait`` names is the default wearer.
+
+    Arguments:
+        scenario: name of a walk, or a .toml file
+        overrides: texts such as ``controller.peak_torque=6 N m``, or a dictionary
+        gait: name or file of a gait, instead of the file's
+        task_sequence: name or file of a task sequence, instead of the file's
+        bottle: name or file of a bottle, instead of the file's
+        parameter_set: parameter set of the device, instead of the file's
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        the Scenario, whose motion is a walk
+
+    Raises:
+        ScenarioError: a walk that cannot be used
+        ParameterError: a parameter set, or a value of it, that cannot be used
+        DataError: a gait that cannot be read
 
     >>> import ppafo
     >>> ppafo.load_walk("solenoid", task_sequence="corridor").name

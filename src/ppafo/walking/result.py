@@ -14,8 +14,6 @@ from ppafo.engine.scheme.actuators import pressures_of, torque_of
 from ppafo.engine.step.lane import LaneResult
 from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
-from ppafo.model.contact import SWING
-from ppafo.model.leg import centrifugal_torques, gravity_torques, mass_matrix, passive_torque
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
 from ppafo.simulation import at_hand
@@ -40,6 +38,7 @@ from ppafo.walking.events import (
     safety_events,
 )
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
+from ppafo.walking.inverse_dynamics import dorsiflexor_moment, swing_knee_torque
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import requests_torque, task_sequence_of_walk
@@ -95,7 +94,7 @@ def valve_and_ground_channels(record: Mapping[str, Floats]) -> Channels:
 
 
 def controller_channels(record: Mapping[str, Floats]) -> Channels:
-    """Channels of a controller: gait phase, level of help, requested torque, phase in the stride."""
+    """Channels of a controller: gait phase, assistance level, requested torque, phase in the stride."""
     channels: Channels = {}
     if PHASE_ROW in record:
         channels["controller_phase"] = (record[PHASE_ROW], "-")
@@ -134,12 +133,12 @@ def recording_of_walk(
         "shank_angle": (record["walk.now.shank"], "rad"),
         "healthy_angle": (record["walk.now.ankle"], "rad"),
         **actuator_channels(run, record),
-        "swing_knee_torque": (swing_knee_torque(run, time, record), "N m"),
+        "swing_knee_torque": (swing_knee_torque(led.leg, time, record), "N m"),
         "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
         **valve_and_ground_channels(record),
     }
     if led.leg.keeps_gait >= 0.5:
-        channels["dorsiflexor_moment"] = (dorsiflexor_moment(run, record), "N m")
+        channels["dorsiflexor_moment"] = (dorsiflexor_moment(led.leg, record), "N m")
     channels |= gas_channels(configuration.device.gas, run, record)
     if supply is not None:
         channels |= supply_channels(supply, time, record)
@@ -188,37 +187,6 @@ def _task_sequence_channels(
     if gait.walking_speed is not None:
         channels["walking_speed"] = (gait.walking_speed * pace.stride * pace.frequency * gait.stride_time, "m/s")
     return channels
-
-
-def dorsiflexor_moment(run: Run, record: Mapping[str, Any]) -> Floats:
-    """Moment [N m] of the muscles that lift the foot, 0 or more, of a wearer who keeps the measured ankle.
-
-    What the healthy ankle needs, by its moment on the ground and by equation (11) in the swing, less tissue and T_ex.
-    The literature shows the activity of the tibialis anterior in its place.
-    """
-    in_swing = record["walk.contact"] == SWING
-    needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
-    tissue = passive_torque(led_leg(run).leg, record["walk.now.ankle"])
-    return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
-
-
-def swing_knee_torque(run: Run, time: Floats, record: Mapping[str, Any]) -> Floats:
-    """T_1 of equation (11) [N m] in the swing: what moves shank and foot as prescribed; 0 on the ground.
-
-    There it would need the horizontal force of the ground, which a gait file does not have.
-    """
-    leg = led_leg(run).leg
-    theta, phi = record["state.angle"], record["walk.now.shank"]
-    alpha = phi - theta + 0.5 * np.pi
-    rate = record["state.angular_velocity"]
-    # A walk that fails at once has one sample, and no acceleration is known of it.
-    ankle_acceleration = np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate)
-    matrix = mass_matrix(leg, np.cos(theta))
-    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])
-    forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
-    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
-    inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
-    return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)
 
 
 WALK_FORMAT = "ppafo walk"

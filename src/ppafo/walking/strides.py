@@ -49,7 +49,7 @@ def per_stride(totals: Mapping[str, Floats], starts: NDArray[np.intp]) -> dict[s
 
 
 def helped_strides(level: Floats, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """True for each whole stride that had help from strike to strike, from the level of help."""
+    """True for each whole stride that had help from strike to strike, from the assistance level."""
     # A running count of samples without help is the same at both strikes where there were none between.
     vented = np.concatenate([[0], np.cumsum(level > HELPS)])
     return np.asarray(vented[starts[1:]] == vented[starts[:-1]])

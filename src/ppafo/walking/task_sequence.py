@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, Field
 
-from ppafo.documents.models import NAME, SchemaVersion, make_schema, one_of, optional, quote, table, validate
+from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table, validate
+from ppafo.documents.problems import NAME, quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.engine.rows import leaves
 from ppafo.errors import ScenarioError, nearest_name

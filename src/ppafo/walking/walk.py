@@ -178,9 +178,19 @@ class WalkComparison:
 def compare_walks(
     scenario: Scenario | str | Path, *, minutes: Minutes | None = None, progress: Progress = silent
 ) -> WalkComparison:
-    """Walk ``minutes`` [min], or a whole task sequence, with the device and without.
+    """Walk with the device and without it, for some minutes or along a whole task sequence.
 
-    ScenarioError for bad input, SimulationError where its bottle ends the walk before there is anything to compare.
+    Arguments:
+        scenario: a walk, its name or its file
+        minutes: duration [min]; default: the length that the walk states
+        progress: called with the time walked and the whole time [min]
+
+    Returns:
+        WalkComparison of both walks and of the healthy gait
+
+    Raises:
+        ScenarioError: a walk that cannot be used
+        SimulationError: a bottle that ends the walk before there is anything to compare
 
     >>> import ppafo
     >>> compared = ppafo.compare_walks("solenoid", minutes=0.1)
@@ -347,9 +357,20 @@ def walk_population(
     seed: Seed = 1,
     progress: Progress = silent,
 ) -> Population:
-    """Let many wearers walk for ``minutes`` [min], or all of a task sequence; the first is the configuration's.
+    """Walks of many random wearers; the first is the wearer of the configuration.
 
-    ``progress`` gets the number of wearers that have walked and the number of all. ScenarioError for bad input.
+    Arguments:
+        scenario: a walk, its name or its file
+        wearers: number of wearers
+        minutes: duration of each walk [min]; default: the length that the walk states
+        seed: random seed of the wearers
+        progress: called with the number of wearers that have walked and the number of all
+
+    Returns:
+        Population with one value of every outcome for each wearer [SI]
+
+    Raises:
+        ScenarioError: a walk or a number of wearers that cannot be used
 
     >>> import ppafo
     >>> population = ppafo.walk_population("solenoid", wearers=2, minutes=0.1)

@@ -323,6 +323,12 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
     assert Run(step, valve_dead_band=0.1).status == GOING_ON
 
 
+TABLE_OF_ANGLES = (
+    *("reference.kind=tabulated", "reference.period=0.3 s", "reference.value_01=0 deg"),
+    *("reference.time_02=0.15 s", "reference.value_02=-10 deg"),
+)
+
+
 @pytest.mark.parametrize(
     ("name", "law", "change"),
     [
@@ -331,14 +337,16 @@ def test_settings_that_need_other_functions_are_refused(step: Loaded, setting: s
         ("torque-task-slow-valve", ("controller.kind=on_off_dead_zone",), ("supply.pressure", 5.0e5)),
         ("torque-task-slow-valve", ("controller.kind=feedback_linearisation",), ("valve.dead_band", 0.2)),
         ("torque-task-slow-valve", (), ("valve.dead_band", 0.2)),
+        ("torque-task-moving-ankle", ("controller.kind=sliding_mode",), ("motion.profile.level", 1.0)),
+        ("cylinder-servo", TABLE_OF_ANGLES, ("reference.level", 1.4)),
     ],
-    ids=["cylinder-servo", "pressure-loop", "dead zone", "dead band", "dead band of a PID"],
+    ids=["cylinder-servo", "pressure-loop", "dead zone", "dead band", "dead band of a PID", "moving", "table"],
 )
 def test_a_library_has_the_bits_of_python_and_gains_that_follow_what_is_changed(
     name: str, law: tuple[str, ...], change: tuple[str, float], tmp_path: Path
 ) -> None:
     path, number = change
-    unit = {"foot_plate.inertia": "kg m^2", "supply.pressure": "Pa_a", "valve.dead_band": ""}[path]
+    unit = {"foot_plate.inertia": "kg m^2", "supply.pressure": "Pa_a", "valve.dead_band": ""}.get(path, "rad")
     overrides = (*law, "run.duration=0.2 s", f"{path}={number!r} {unit}".rstrip())
     library = Loaded(name, tmp_path, law)
     recording = simulate(name, overrides).recording

@@ -13,6 +13,7 @@ from ppafo.parameters.plant import plant_parameters
 from ppafo.parameters.reach import torque_reach
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import run_ensemble
+from ppafo.simulation.gains import gains_of
 from ppafo.simulation.numbers import moving_together, with_numbers
 from ppafo.simulation.scenario import Scenario
 from ppafo.walking import load_walk
@@ -167,3 +168,55 @@ def test_an_ensemble_has_the_gains_of_each_run() -> None:
     for run, area in enumerate(areas.tolist()):
         alone = simulate(with_numbers(base, {"valve.area": area}))
         assert together.metrics["rms_error"][run] == pytest.approx(alone.metrics["rms_error"].value, rel=1e-12)
+
+
+TABLE_OF_ANGLES = ("level=70 deg", "period=1 s", "value_01=-45 deg", "time_02=0.5 s", "value_02=10 deg")
+SINE_OF_ANGLES = ("level=52.5 deg", "amplitude=27.5 deg")
+RAMP_OF_ANGLES = ("start_level=80 deg", "level=25 deg")
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [
+        ("sine", SINE_OF_ANGLES),
+        ("ramp_hold", RAMP_OF_ANGLES),
+        ("tabulated", TABLE_OF_ANGLES),
+        ("smooth", TABLE_OF_ANGLES),
+    ],
+)
+def test_gains_of_a_torque_on_a_moving_joint_are_those_of_the_worst_place_of_its_way(
+    kind: str, settings: tuple[str, ...]
+) -> None:
+    law = "controller.kind=sliding_mode"
+    profile = (f"motion.profile.{text}" for text in (f"kind={kind}", *settings))
+    moving = load_scenario("torque-task-proportional", [law, "motion.kind=prescribed", *profile])
+    ends = [
+        load_scenario("torque-task-proportional", [law, f"motion.angle={angle} deg"]).controller.boundary_layer
+        for angle in (25.0, 80.0)
+    ]
+    assert ends[0] > 1.2 * ends[1]
+    assert moving.controller.boundary_layer == pytest.approx(ends[0], rel=1e-9)
+    higher = with_numbers(moving, {"motion.profile.level": float(moving.motion.profile.level) + 0.1})
+    assert higher.controller.boundary_layer < ends[0], "it follows what moves the joint"
+
+
+@pytest.mark.parametrize("kind", ["tabulated", "smooth"])
+def test_gains_of_an_angle_on_a_table_are_those_of_a_ramp_between_its_ends(kind: str) -> None:
+    table, ramp = (
+        load_scenario("cylinder-servo", [f"reference.{text}" for text in (f"kind={kind}", *settings)]).controller
+        for kind, settings in ((kind, TABLE_OF_ANGLES), ("ramp_hold", RAMP_OF_ANGLES))
+    )
+    assert table.settings == pytest.approx(ramp.settings)
+    assert table.settings != load_scenario("cylinder-servo").controller.settings
+
+
+def test_gains_say_that_they_do_not_know_a_load_which_may_move_the_joint() -> None:
+    load = ("controller.kind=sliding_mode", "effects.joint_load.stiffness=2 N m/rad")
+    free = load_scenario("torque-task-proportional", [*load, "motion.kind=free", "motion.angle=75 deg"])
+    locked, worn = load_scenario("torque-task-proportional", load), load_walk("proportional", load[1:])
+    said = [gains_of(item, item.motion.motion_kind.law(item)) for item in (free, locked, worn)]
+    assert [gains is not None and gains.unknown_loads for gains in said] == [
+        ("effects.joint_load",),
+        (),
+        ("effects.joint_load",),
+    ]

@@ -55,15 +55,33 @@ def estimate(
     plugins: Plugins = (),
     progress: Report | None = None,
 ) -> Finding[StatisticEstimate]:
-    """Return a statistic of a metric over the distributions of a study, drawn until its interval is ``width`` wide.
+    """Statistic of a metric over the distributions of a study, drawn until its confidence interval is narrow enough.
 
-    ``statistic`` is ``mean``, ``quantile 0.95`` or ``probability above 3 N m``; ``width`` a fraction of its value
-    (default ``1 %``) or a difference with its unit (``0.01 N m``; for a probability a number, 0.02). Draws are
-    those that the interval needs, whatever the study's sampling method: randomised Sobol replicates for a mean, else
-    independent ones. ``seed`` is the study's by default. ``also`` names further metrics: means over the same draws.
-    StudyError for bad input and where more than the fraction ``maximum_failed`` of the runs fails.
+    The sampling method of the study is not used: a mean takes randomised Sobol replicates, other statistics take
+    independent draws.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Arguments:
+        study: a study, its name, its file or its content
+        metric: name of the metric
+        statistic: ``mean``, ``quantile 0.95``, ``probability above 3 N m`` or ``probability below 3 N m``
+        width: target width of the interval: ``1 %`` of the value (default), ``0.01 N m``, or 0.02 for a probability
+        also: further metrics, whose means over the same draws are given
+        configuration: configuration of the study, needed if it has several
+        first_draws: draws before the first estimate
+        overrides: changes of every configuration, as texts or a dictionary
+        draws: maximum number of draws
+        seed: random seed; default: the study's
+        confidence: confidence of the interval
+        maximum_failed: fraction of the runs that may fail before the study is refused
+        threads: number of threads; default: all cores
+        plugins: modules of your own, files or names, whose objects files may name
+        progress: called with the Progress of the draws
+
+    Returns:
+        Finding with the estimate, its interval and the draws that it took
+
+    Raises:
+        StudyError: a study or setting that cannot be used, or too many failed runs
 
     >>> import ppafo
     >>> study = "torque-task-uncertainty"

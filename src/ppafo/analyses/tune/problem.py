@@ -11,7 +11,8 @@ import numpy as np
 from pydantic import Field
 
 from ppafo.arguments import Overrides, checked
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, beside
 from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
@@ -257,11 +258,18 @@ def list_tunings() -> tuple[str, ...]:
 
 @checked
 def load_tuning(tuning: str | Path | Mapping[str, Any], overrides: Overrides = (), *, plugins: Plugins = ()) -> Problem:
-    """Return a tuning by its name in the package, by the path of a TOML file, or from data laid out as such a file.
+    """Load a tuning problem.
 
-    ``overrides`` change the scenario. StudyError for anything that is not usable.
+    Arguments:
+        tuning: name of a tuning, a .toml file, or data laid out as such a file
+        overrides: changes of the scenario, as texts or a dictionary
+        plugins: modules of your own, files or names, whose objects files may name
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Returns:
+        the Problem, checked
+
+    Raises:
+        StudyError: a tuning that cannot be used
 
     >>> import ppafo
     >>> print(ppafo.load_tuning("pid-gains"))

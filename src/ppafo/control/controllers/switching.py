@@ -39,10 +39,10 @@ CONSTANT = ControllerKind(
 
 
 class OrderedParameters(NamedTuple):
-    """Orders [-] from outside: the command, and the level of help, from 0 to 3, at which a shut-off valve shuts."""
+    """Orders [-] from outside: the command, and the assistance level, from 0 to 3; at 3 a shut-off valve shuts."""
 
     command: Annotated[float, Number("", "command, above 0 feeds chamber 1", 1.0, -1.0, 2.0)]
-    safe_state: Annotated[float, Number("", "level of help, 3 has stopped", 0.0, 0.0, 3.0)]
+    safe_state: Annotated[float, Number("", "assistance level, 3 has stopped", 0.0, 0.0, 3.0)]
 
 
 class Help(NamedTuple):
@@ -52,7 +52,7 @@ class Help(NamedTuple):
 
 
 class OrderedState(NamedTuple):
-    """State of a controller that is told its level of help."""
+    """State of a controller whose assistance level is set from outside."""
 
     safety: Help
 
@@ -66,7 +66,7 @@ def ordered_update(
 
 ORDERED = ControllerKind(
     name="ordered",
-    summary="Command and level of help from outside, for a plant whose shut-off valve goes by the latter.",
+    summary="Command and assistance level from outside, for a plant whose shut-off valve follows the level.",
     source="chosen here",
     quantities=quantities_of(OrderedParameters),
     parameters=OrderedParameters,

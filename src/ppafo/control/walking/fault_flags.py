@@ -18,7 +18,7 @@ SEEN = ("nominal_flow", "nominal_supply_pressure")
 
 @dataclass(frozen=True, slots=True)
 class FaultFlag:
-    """Name of a fault flag, level of help that it asks for, its cause, and the readings and settings that decide it."""
+    """Fault flag: its name, the assistance level that it requests, its cause, and the readings and settings used."""
 
     name: str
     level: float

@@ -48,7 +48,7 @@ WALKING_COMMAND = Input(
 SAFE_STATE = Input(
     "safe_state",
     "-",
-    "level of help, 0 to 3; at 3, where the controller has stopped, the shut-off valve shuts",
+    "assistance level, 0 to 3; at 3, where the controller has stopped, the shut-off valve shuts",
     0.0,
     0.0,
     3.0,

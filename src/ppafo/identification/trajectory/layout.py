@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, StrictTable, Text, Texts
+from ppafo.documents.models import StrictTable, Text, Texts
+from ppafo.documents.problems import NAME
 from ppafo.errors import IdentificationError
 from ppafo.identification.keys import Columns, Confidence
 from ppafo.identification.trajectory.experiment import ALL_INPUTS

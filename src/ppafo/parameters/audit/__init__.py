@@ -63,13 +63,22 @@ _ORDER = {"error": 0, "warning": 1, "note": 2}
 def audit(
     parameter_set: ParameterSet | str | Path, *, parent: ParameterSet | str | Path | None = None, plugins: Plugins = ()
 ) -> list[AuditFinding]:
-    """Return what contradicts, or deserves attention in, any parameter set; errors first.
+    """Audit of a parameter set: contradictions and values that deserve attention, errors first.
 
     An error that the set accepts with a reason becomes a warning that shows the reason. A reason that stands in its
     ``parent`` too, the set that the file names unless given, lapses where the set changes a value of the finding. A
     reason for something that is not found is a warning, so that it does not outlive what it excuses.
 
-    ``plugins`` are modules of your own whose objects files may name, as of ``simulate``.
+    Arguments:
+        parameter_set: the set, its name or its file
+        parent: the set that it was made from; default: the one that its file names
+        plugins: modules of your own, files or names, whose objects files may name
+
+    Returns:
+        findings with their numbers, sentence and severity
+
+    Raises:
+        ParameterError: a set that cannot be read
 
     >>> import ppafo
     >>> [finding.id for finding in ppafo.audit("ppafo2011") if finding.severity == "warning"][:3]

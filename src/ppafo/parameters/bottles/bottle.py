@@ -17,7 +17,8 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.documents.models import NAME, SchemaVersion, make_schema, optional, read_model, table
+from ppafo.documents.models import SchemaVersion, make_schema, optional, read_model, table
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as, said_missing
 from ppafo.model.cold_gas import ColdSupply, Passage

@@ -12,7 +12,8 @@ from pydantic import BaseModel, Field
 
 from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, make_schema, one_of, optional, table, validate
+from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, one_of, optional, table, validate
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
 from ppafo.model.catalog import VALVES

@@ -13,7 +13,8 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import ScenarioError, first_twice
 

@@ -8,6 +8,7 @@ from ppafo.control.kind import ControllerKind
 from ppafo.metrics.metric import followed
 from ppafo.metrics.switching import SHUT
 from ppafo.model.controlled import ANGLE, TORQUE
+from ppafo.simulation.law_signals import anywhere
 from ppafo.simulation.mean_chambers import quicker_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.load_causes import flung_at_start, load_beyond_reach, stop_of, torque_beyond_reach
@@ -83,9 +84,9 @@ def oscillation(case: Case) -> TrackingCause | None:
     if law is None:
         return TrackingCause("its controller is of yours", (), "give it smaller gains")
     angle = float(np.mean(case.recording["angle"][case.settled.samples]))
-    # The gains of a locked joint are those of its angle.
-    is_locked = scenario.motion.motion_kind.name == "locked"
-    quicker = 1.0 if is_locked else quicker_at(scenario.device, angle, scenario.controlled)
+    # Gains are those of where the joint is to be, where that is known.
+    is_known = scenario.motion.motion_kind.sees(scenario).places is not anywhere
+    quicker = 1.0 if is_known else quicker_at(scenario.device, angle, scenario.controlled)
     if law.only_switches:
         return _steps_of_pair(case, law, quicker)
     names = [quantity.name for quantity in speed_settings(scenario, law).values()]

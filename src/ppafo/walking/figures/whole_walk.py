@@ -1,4 +1,4 @@
-"""A whole walk over time: gas, toes, phase of the controller, level of help; with failures, pauses and the stop."""
+"""A whole walk over time: gas, toes, phase of the controller, assistance level; with failures, pauses and the stop."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -26,11 +26,11 @@ _LEVELS = {
     PAUSED: ("pause", "#e3bb63"),
     STOPPED: ("stop", "#c07777"),
 }
-"""Name and colour of each level of help, darker the less there is, so that they differ in grey too."""
+"""Name and colour of each assistance level, darker the less there is, so that they differ in grey too."""
 _PHASES = ("swing", "heel", "free", "push")
 """Names of the phases, whose numbers count from 0."""
 _NAMED_STRETCH = 0.06
-"""Fraction of the walk from which a stretch at one level of help is wide enough for its name."""
+"""Fraction of the walk from which a stretch at one assistance level is wide enough for its name."""
 _APART = 0.2
 """Fraction of the walk within which failures have one label; others are in two rows in turn."""
 _ROW = 0.16
@@ -42,7 +42,7 @@ _ROOM = 1.4
 
 
 def whole_walk_figure(result: WalkResult) -> "Figure":
-    """Return gas, toe height, phase and level of help over the time of a walk, with faults, pauses and the stop."""
+    """Return gas, toe height, phase and assistance level over the time of a walk, with faults, pauses and the stop."""
     recording, time = result.recording, result.recording.time
     end = float(time[-1])
     axis = time_axis(end)

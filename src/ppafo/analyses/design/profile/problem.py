@@ -11,7 +11,8 @@ from pydantic import Field
 
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.profiles import KNOTS
-from ppafo.documents.models import NAME, SchemaVersion, StrictTable, Text, Texts
+from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts
+from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import beside
 from ppafo.errors import DataError, StudyError, UnitError, refused_as
 from ppafo.loading import reloaded

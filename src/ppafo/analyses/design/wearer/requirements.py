@@ -40,7 +40,7 @@ class DesignRequirements:
     """Design requirements: body mass [kg], stature [m] or None, torque [N m], supply [Pa absolute], time [s].
 
     ``toes`` is how far the toes clear the ground in mid-swing [m]; where it is None, ``usual_toes`` are wanted. ``gas``
-    is the species that the device is fed with, empty for that of the walk.
+    is the species that feeds the device, empty for the species of the walk.
     """
 
     mass: float

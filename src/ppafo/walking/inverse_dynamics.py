@@ -1,0 +1,40 @@
+"""Inverse dynamics of a recorded walk: knee torque in the swing, moment of the wearer's dorsiflexors."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ppafo.engine.lanes import Floats
+from ppafo.model.contact import SWING
+from ppafo.model.leg import LegParameters, centrifugal_torques, gravity_torques, mass_matrix, passive_torque
+
+
+def dorsiflexor_moment(leg: LegParameters, record: Mapping[str, Any]) -> Floats:
+    """Moment [N m] of the wearer's dorsiflexors, 0 or more, that keeps the measured ankle angle.
+
+    Ankle moment of the gait (on the ground measured, in the swing by equation (11)) less passive tissue and T_ex. The
+    literature reports the activity of the tibialis anterior instead.
+    """
+    in_swing = record["walk.contact"] == SWING
+    needed = np.where(in_swing, record["walk.now.healthy_torque"], record["walk.now.moment"])
+    tissue = passive_torque(leg, record["walk.now.ankle"])
+    return np.asarray(np.maximum(tissue + record["walk.external_torque"] - needed, 0.0))
+
+
+def swing_knee_torque(leg: LegParameters, time: Floats, record: Mapping[str, Any]) -> Floats:
+    """Knee torque T_1 of equation (11) [N m] that moves shank and foot as prescribed in the swing; 0 on the ground.
+
+    On the ground it depends on the horizontal ground reaction, which a gait file does not have.
+    """
+    theta, phi = record["state.angle"], record["walk.now.shank"]
+    alpha = phi - theta + 0.5 * np.pi
+    rate = record["state.angular_velocity"]
+    # A walk that fails at once has one sample, and no acceleration is known of it.
+    ankle_acceleration = np.gradient(rate, time) if len(time) > 1 else np.zeros_like(rate)
+    matrix = mass_matrix(leg, np.cos(theta))
+    turning = centrifugal_torques(leg, np.sin(theta), record["walk.now.shank_rate"], record["state.angular_velocity"])
+    forward, up = record["walk.now.knee_forward"], record["walk.now.knee_up"]
+    weight = gravity_torques(leg, np.sin(phi), np.cos(phi), np.sin(alpha), np.cos(alpha), forward, up)
+    inertial = matrix.shank * record["walk.now.shank_acceleration"] + matrix.coupling * ankle_acceleration
+    return np.where(record["walk.contact"] == SWING, inertial + turning.knee + weight.knee, 0.0)
