@@ -70,9 +70,8 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     remedies += integral_of_device(scenario, case.law)
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
-    text = f"its command of {asked:.2g} stays within `valve.dead_band = {band:.2g}`"
-    if believed >= band:
-        text = f"its command of {asked:.2g} hardly opens the valve"
+    opens = "stays within" if believed < band else "hardly opens the valve beyond"
+    text = f"its command of {asked:.2g} {opens} `valve.dead_band = {band:.2g}`"
     return TrackingCause(text, tuple(remedies), "give a larger gain")
 
 
