@@ -117,6 +117,19 @@ def test_a_walk_whose_pair_takes_the_torque_beyond_its_limit_is_told_with_a_valv
     assert simulate("solenoid", [f"valve.area={offered[1]}", *changes[1:]]).tracking is None
 
 
+def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsiflexion() -> None:
+    changes = ["supply.dorsiflexion_pressure=2 psi_g", "controller.filled_pressure=1 psi_g", "run.duration=6 s"]
+    scenario = load_scenario("proportional", changes)
+    verdict = tried(scenario, simulate(scenario).tracking)
+    assert verdict is not None
+    assert "it pushes one way only" in verdict.cause
+    offered = re.search(r"; with (.*) it does, as a further run shows", verdict.sentence)
+    assert offered is not None
+    unasked = [text.replace(" = ", "=") for text in re.findall(r"`([^`]*)`", offered[1])]
+    assert len(unasked) == 4
+    assert simulate("proportional", [*changes, *unasked]).tracking is None
+
+
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     assert simulate(TASK, ["run.duration=0.3 s"]).tracking is None
     assert simulate(TASK, ["reference.level=4 N m"]).tracking is None
@@ -264,7 +277,10 @@ def test_a_law_that_rests_within_the_dead_band_is_given_what_it_lacks(law: tuple
     scenario = load_scenario("torque-task-slow-valve", changes)
     verdict = tried(scenario, simulate(scenario).tracking)
     assert verdict is not None
-    assert re.search(r"its command of 0\.\d+ stays within `valve\.dead_band = 0\.3`", verdict.sentence)
+    assert re.search(
+        r"its command of 0\.\d+ (stays within|hardly opens the valve beyond) `valve\.dead_band = 0\.3`",
+        verdict.sentence,
+    )
     assert re.search(rf"with `controller\.{given}` it does, as a further run shows", verdict.sentence)
 
 
