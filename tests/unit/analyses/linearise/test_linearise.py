@@ -259,7 +259,7 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
         (TASK, 9.0, (), "--at 9 s is outside the run, which lasts 3 s"),
         (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator comes to 5 N m"),
         (TASK, "Equilibrium", (), "at: 'Equilibrium': must be a time such as .*, or 'equilibrium'"),
-        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' is on or off"),
+        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' opens fully or at a constant speed"),
     ):
         with pytest.raises(ppafo.PpafoError, match=line) as refused:
             linear(scenario, at, overrides)
