@@ -19,9 +19,9 @@ PSI = 6894.757293168361
 
 SPREAD: dict[str, tuple[float, float]] = {
     "plant.valve_conductance": (0.5, 1.3),
-    "controller.proportional_gain": (0.5, 2.0),
-    "controller.integral_gain": (0.5, 2.0),
-    "controller.derivative_gain": (0.5, 1.2),
+    "controller.gains.proportional_gain": (0.5, 2.0),
+    "controller.gains.integral_gain": (0.5, 2.0),
+    "controller.gains.derivative_gain": (0.5, 1.2),
     "reference.level": (0.5, 1.2),
 }
 """Smallest and largest factor on the scenario. With larger gains some runs chatter, and chaos would hide an error."""

@@ -16,7 +16,7 @@ from ppafo.engine.cache import kept
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.scenario import Scenario
 
-pytest_plugins = ("tests.costs", "tests.built_once", "tests.repeatable")
+pytest_plugins = ("tests.costs", "tests.built_once", "tests.quickly_compiled", "tests.repeatable")
 
 
 def pytest_configure() -> None:

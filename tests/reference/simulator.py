@@ -91,6 +91,7 @@ class Law(NamedTuple):
     d: float
     filter: float
     anti_windup: float
+    dead_band: float
     delay: float
     pressure_resolution: float
     bias: float
@@ -465,7 +466,8 @@ def decide(rig: Rig, time: float, seen: Any, memory: Any) -> float:
     wanted = law.p * error + memory[0] + law.d * memory[2]
     command = min(max(wanted, -1.0), 1.0)
     memory[0] += law.anti_windup * (command - wanted) * law.period
-    return command
+    # The dead band that the law believes in is jumped over, in 1/128 of the way.
+    return command + law.dead_band * (min(max(128.0 * command, -1.0), 1.0) - command)
 
 
 def opening_asked(valve: Valve, command: float) -> float:
@@ -692,7 +694,7 @@ def law_of(scenario: Scenario, bias: float) -> Law:
     s, sensors = scenario.controller.settings, scenario.sensors
     if sensors.angle_noise or sensors.pressure_noise:
         raise ValueError("the reference knows no noise")
-    names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup")
+    names = ("proportional_gain", "integral_gain", "derivative_gain", "derivative_filter", "anti_windup", "dead_band")
     gains = (s.get(name, 0.0) for name in names)
     seen = (sensors.delay, sensors.pressure_resolution, bias)
     return Law(CONTROLLERS[scenario.controller.kind], scenario.controller.period, s.get("command", 0.0), *gains, *seen)

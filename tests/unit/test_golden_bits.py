@@ -40,6 +40,7 @@ def test_every_scenario_and_walk_has_golden_hashes() -> None:
         pytest.param("zig", "off", marks=[pytest.mark.long, needs_zig]),
     ],
 )
+@pytest.mark.usefixtures("fully_compiled")
 def test_the_golden_bits_are_found_on_this_computer(backend: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PPAFO_BACKEND", backend)
     assert golden_bits.hashes_of(name, lambda _batch: run_batch) == golden_hashes()[name]

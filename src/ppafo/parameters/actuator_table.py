@@ -25,10 +25,8 @@ _CHECKED_SHARES = np.linspace(0.0, 1.0, 201)
 """Shares of the range of angles [-] at which a curve is looked at; at most 12 angles were measured."""
 _CLEAR = 1.0e-5
 """Distance of a moved curve from 0, in last digits."""
-_ROUNDING_VOLUME = 1.0e-12
-"""Size of a negative volume [m^3] that is rounding of the spline."""
-_ROUNDING_SHARE = 1.0e-9
-"""Size of a fall with the pressure, over the largest growth, that is rounding of the spline."""
+_ROUNDING = 1.0e-9
+"""Size of a negative volume or a fall with the pressure, over the largest volume, that is rounding of the spline."""
 
 
 def read_actuator_table(path: Path) -> Table:
@@ -95,7 +93,7 @@ def within_resolution(volume: Floats, shares: Floats, resolution: float) -> tupl
         ]
     )
     found = rules @ volume.ravel()
-    if resolution == 0.0 or found.min() >= 0.0:
+    if resolution == 0.0 or found.min() >= -_ROUNDING * np.abs(volume).max():
         return volume, 0.0
     # SciPy is slow to load, and few tables need it.
     from scipy.optimize import linprog
@@ -152,11 +150,12 @@ def _basis(shares: Floats, bends: Floats) -> Floats:
 
 def _check_curves(chamber: TabulatedChamber, bends: Floats, angles: Floats, name: str, file: str) -> None:
     """Refuse a chamber of which a curve swings so far between the angles that it is negative."""
-    basis = _basis(_CHECKED_SHARES, bends)
-    for curve in (chamber.lowest, *(rise.gain for rise in chamber.rises)):
-        values = basis @ np.array([*curve.powers, *curve.bends[: bends.size]])
+    basis, curves = _basis(_CHECKED_SHARES, bends), (chamber.lowest, *(rise.gain for rise in chamber.rises))
+    found = [basis @ np.array([*curve.powers, *curve.bends[: bends.size]]) for curve in curves]
+    # Twice what is left as it is: there the same numbers are summed in another order.
+    rounding = 2.0 * _ROUNDING * float(np.abs(sum(found)).max())
+    for curve, values in zip(curves, found, strict=True):
         is_volume = curve is chamber.lowest
-        rounding = _ROUNDING_VOLUME if is_volume else _ROUNDING_SHARE * float(np.abs(values).max())
         if values.min() < -rounding:
             angle = angles[0] + _CHECKED_SHARES[int(np.argmin(values))] * (angles[-1] - angles[0])
             problem = "is negative" if is_volume else "falls with the pressure"

@@ -45,6 +45,10 @@ _NEAREST_ANGLES = 0.01
 """Angles nearer to each other than this share of their range make a spline swing."""
 _NEAREST_PRESSURES = 1.0
 """Pressures [Pa] nearer to each other than this are one that was written twice."""
+_STEPS = (1, 2, 5, 10, 20, 50, 100)
+"""Steps, in last digits, in which people round what they read."""
+_TELLING = 10
+"""Different numbers that have a common step not by chance."""
 _LONGEST = 40
 """Characters of a cell that a message shows; a longer text is no number that anybody wrote either."""
 
@@ -54,7 +58,7 @@ class MeasuredVolumes:
     """Volumes of the chambers [m^3], each (angles, pressures), at every pair of an angle and a pressure.
 
     ``angles`` [rad] and ``pressures`` [Pa, gauge] grow. ``volume_2`` is None of an actuator with one chamber.
-    ``resolution_1`` and ``resolution_2`` [m^3] are the last digits that the volumes were written with.
+    ``resolution_1`` and ``resolution_2`` [m^3] are the steps in which the volumes were written.
     """
 
     angles: Floats
@@ -113,7 +117,7 @@ def _lines(text: str, file: str) -> list[_Line]:
 
 
 def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]:
-    """Return the columns of a file by name, each (lines,), and their last digits, in SI units.
+    """Return the columns of a file by name, each (lines,), and their steps in which they are written, in SI units.
 
     Pressures are above the atmosphere.
     """
@@ -135,16 +139,18 @@ def _columns(text: str, file: str) -> tuple[dict[str, Floats], dict[str, float]]
                 f"{declared.largest:g} {declared.unit.removesuffix('_a')}"
             )
         columns[name] = column
-        last = min(_last_digit(line.cells[index]) for line in lines)
-        digits[name] = abs(to_si(last, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
+        step = _step([Decimal(number_text(line.cells[index])) for line in lines])
+        digits[name] = abs(to_si(step, unit, declared.unit, 0.0) - to_si(0.0, unit, declared.unit, 0.0))
     return columns, digits
 
 
-def _last_digit(cell: str) -> float:
-    """Return the size of the last digit of a number as it is written: 0.1 for 7.4."""
-    exponent = Decimal(number_text(cell)).as_tuple().exponent
-    assert isinstance(exponent, int), "the number is finite"
-    return math.pow(10.0, exponent)
+def _step(numbers: Sequence[Decimal]) -> float:
+    """Return the step in which numbers are written: 0.1 for 7.4 and 3, and 5 for many multiples of 5."""
+    exponents = [number.as_tuple().exponent for number in numbers]
+    last = min(exponent for exponent in exponents if isinstance(exponent, int))
+    different = {int(number.scaleb(-last)) for number in numbers}
+    common = math.gcd(*different) if len(different) >= _TELLING else 1
+    return math.pow(10.0, last) * max(step for step in _STEPS if common % step == 0)
 
 
 def _units(header: Sequence[str], file: str) -> dict[str, str]:
@@ -210,7 +216,7 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     lines = Counter(zip(angle.tolist(), pressure.tolist(), strict=True))
     repeated = next((pair for pair, count in lines.items() if count > 1), None)
     if repeated is not None:
-        raise ParameterError(f"{file}: there is more than one line for {_point_text(*repeated)}")
+        raise ParameterError(f"{file}: has more than one line for {_point_text(*repeated)}; keep one of them")
     for pair in product(angles.tolist(), pressures.tolist()):
         if pair not in lines:
             raise ParameterError(f"{file}: there is no line for {_point_text(*pair)}; every angle needs every pressure")
@@ -225,7 +231,7 @@ def _check_spacing(name: str, values: Floats, maximum: int, nearest: float, file
 
 
 def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, resolution: float, file: str) -> None:
-    """Refuse volumes [m^3] (angles, pressures) that no chamber has, written with a last digit of ``resolution`` [m^3].
+    """Refuse volumes [m^3] (angles, pressures) that no chamber has, written in steps of ``resolution`` [m^3].
 
     They are negative, fall by more than that as the pressure grows, or at the highest pressure do not grow with the
     angle (chamber 1) or shrink with it (chamber 2).
@@ -239,8 +245,10 @@ def _check_volume(name: str, volume: Floats, angles: Floats, pressures: Floats, 
     falls = np.argwhere(np.diff(volume, axis=1) < -unseen)
     if falls.size:
         row, column = falls[0]
+        fall = 1e6 * (volume[row, column] - volume[row, column + 1])
         raise ParameterError(
-            f"{file}: {name} falls with the pressure at {_point_text(angles[row], pressures[column + 1])}"
+            f"{file}: {name} falls with the pressure at {_point_text(angles[row], pressures[column + 1])}, by "
+            f"{fall:.3g} mL in steps of {1e6 * resolution:.3g} mL; round the volumes to what was measured"
         )
     sign, direction = (1.0, "grow") if name == "volume_1" else (-1.0, "shrink")
     wrong = np.flatnonzero(sign * np.diff(volume[:, -1]) <= -unseen)

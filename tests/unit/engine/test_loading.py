@@ -222,6 +222,7 @@ def test_zig_compiles_where_the_environment_has_no_home(monkeypatch: pytest.Monk
 
 @on_unix
 @needs_gcc
+@pytest.mark.usefixtures("fully_compiled")
 @pytest.mark.parametrize("flag", ["-ffp-contract=fast", "-funsafe-math-optimizations"])
 def test_a_compiler_that_is_set_to_join_or_reorder_operations_is_left_out(
     flag: str, fresh_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture

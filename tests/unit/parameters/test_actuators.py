@@ -18,7 +18,9 @@ from ppafo.parameters.measured_volumes import MeasuredVolumes, read_measured_vol
 from ppafo.simulation.ensemble.columns import check_columns
 from ppafo.simulation.ensemble.planning import screen_columns
 from ppafo.simulation.loading import load_scenario
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.tracking.metered import shortfall
+from tests.actuators.soft import soft
 
 EXAMPLE = Path(__file__).parents[2] / "actuators"
 HEADER = "angle [deg],pressure [kPa_g],volume_1 [mL]"
@@ -88,13 +90,16 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER, "1,2,\uff13"), "line 2: volume_1 = '\uff13' is not a finite number"),
         ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL is beyond"),
         ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
-        ((HEADER, *GOOD, GOOD[0]), "there is more than one line for 20 deg and 0 kPa_g"),
+        ((HEADER, *GOOD, GOOD[0]), "has more than one line for 20 deg and 0 kPa_g; keep one"),
         ((HEADER, *(line.replace(",0,", ",10,") for line in GOOD)), "volumes at 0 kPa_g, vented, are needed too"),
         ((HEADER.replace(",", ";"), *GOOD), "separated by semicolons; commas are needed"),
         ((HEADER, *GOOD[:2]), "has one angle only"),
         ((HEADER, *(line.replace(",0,", ",-1,") for line in GOOD)), "volumes at 0 kPa_g, vented, are needed too"),
         ((HEADER, *(line.replace(",50,", ",-150,") for line in GOOD)), "pressure = -150 kPa_g is below a perfect vac"),
-        ((HEADER, *GOOD[:-1], "100,50,140"), "volume_1 falls with the pressure at 100 deg"),
+        (
+            (HEADER, *GOOD[:-1], "100,50,140"),
+            "volume_1 falls with the pressure at 100 deg and 50 kPa_g, by 10 mL in steps of 1 mL; round",
+        ),
         ((HEADER, "20,0,-5", *GOOD[1:]), "is negative"),
         ((HEADER, *GOOD[:3], "60,50,220", *GOOD[4:]), "must grow with the angle at the highest pressure"),
         ((HEADER, "20,0,1", "21,0,9", "22,0,9.1", "60,0,9.2"), "the curve of volume_1 is negative near"),
@@ -125,12 +130,40 @@ def test_a_table_is_fitted_within_its_last_digit_and_no_further(tmp_path: Path) 
     assert 0.0 < moved <= 0.05e-6
     assert np.max(np.abs(fitted - measurements.volume_1)) == pytest.approx(moved)
     assert read_actuator_table(measured(tmp_path, HEADER, *ROUNDED)).last_angle == pytest.approx(math.radians(75.0))
-    exact = [f"{line}00" for line in ROUNDED]
+    exact = [f"{line}01" for line in ROUNDED]
     with pytest.raises(ParameterError, match="falls with the pressure near"):
         read_actuator_table(measured(tmp_path, HEADER, *exact))
     unmoved, none = within_resolution(measurements.volume_1, shares, 0.0)
     assert none == 0.0
     assert unmoved is measurements.volume_1
+
+
+@pytest.mark.parametrize(("decimals", "times", "step"), [(".1f", 1.0, 0.1), (".3f", 1.0, 0.1), (".0f", 50.0, 5.0)])
+def test_the_step_of_a_table_is_that_of_its_numbers_and_not_of_its_zeros(
+    tmp_path: Path, decimals: str, times: float, step: float
+) -> None:
+    lines = [line.rpartition(",") for line in ROUNDED]
+    written = [f"{before},{times * float(volume):{decimals}}" for before, _, volume in lines]
+    assert read_measured_volumes(measured(tmp_path, HEADER, *written)).resolution_1 == pytest.approx(step * 1e-6)
+    few = measured(tmp_path, HEADER, *GOOD)
+    assert read_measured_volumes(few).resolution_1 == pytest.approx(1e-6), "six numbers may be multiples by chance"
+
+
+def test_equal_volumes_at_two_pressures_are_not_moved() -> None:
+    volumes = np.repeat(np.linspace(80.0e-6, 200.0e-6, 8) ** 1.1, 2).reshape(8, 2)
+    kept, moved = within_resolution(volumes, np.linspace(0.0, 1.0, 8), 1.0e-6)
+    assert moved == 0.0
+    assert kept is volumes
+    assert table_of(MeasuredVolumes(np.linspace(0.3, 1.9, 8), np.array([0.0, 1e5]), volumes, None, 1e-6), "a.csv")
+
+
+@pytest.mark.parametrize("law", [("controller.kind=pid",), ("motion.kind=free", "controller.kind=sliding_mode")])
+def test_all_tables_share_a_program(tmp_path: Path, law: tuple[str, ...]) -> None:
+    sets = (f"device.set={EXAMPLE / 'measured-bladder.toml'}", soft(tmp_path, 1), soft(tmp_path, 2))
+    given = ("reference.level=0.5 N m", *law)
+    scenarios = [load_scenario("torque-task-proportional", [chosen, *given]) for chosen in sets]
+    programs = {plan_run(scenario).program for scenario in scenarios}
+    assert len(programs) == 1
 
 
 def test_the_audit_says_by_how_much_a_rounded_table_is_moved(tmp_path: Path) -> None:
@@ -141,7 +174,7 @@ def test_the_audit_says_by_how_much_a_rounded_table_is_moved(tmp_path: Path) -> 
     assert "rounded-table" not in {finding.id for finding in audit(path)}
     table.write_text("\n".join([HEADER, *ROUNDED]), encoding="utf-8")
     (found,) = (finding for finding in audit(path) if finding.id == "rounded-table")
-    assert "within the last digit of 0.1 mL" in found.paragraph
+    assert "within the steps of 0.1 mL" in found.paragraph
 
 
 def test_columns_and_lines_may_stand_in_any_order(tmp_path: Path) -> None:
@@ -242,5 +275,5 @@ def test_the_bench_refuses_another_actuator_in_one_line(
     monkeypatch.chdir(tmp_path)
     assert main(["rig", "simulate", "step-response", "--device", "cylinder-lever", "--out", "out"]) == 2
     said = capsys.readouterr().err
-    assert "is made for a vane, and 'cylinder-lever' has an actuator 'cylinder'" in said
+    assert "supports vane actuators only, and 'cylinder-lever' has an actuator 'cylinder'" in said
     assert said.count("\n") == 1

@@ -469,7 +469,7 @@ def check_walks(shank: Signal, columns: CurveColumns, mapped: ShankMap) -> None:
     if mapped.terms is not None:
         # Radians that are called degrees have no event either, but a unit as a remedy.
         if travel < low and not low <= np.degrees(travel) <= high:
-            raise DataError(f"{said}: this is not walking, or the columns are not those of the shank")
+            raise DataError(f"{said}: this is not walking, or these are not the columns of the shank")
         return
     ends = {
         axis: [columns.table.columns.get(f"{label}.{axis}") for label in (mapped.knee, mapped.ankle)] for axis in "xyz"

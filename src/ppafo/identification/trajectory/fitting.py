@@ -204,7 +204,7 @@ def _remarks(fitted: Fit, runs: Sequence[_FittedRun], estimates: Sequence[Estima
     if fitted.edge:
         remarks.append(_at_edge(fitted.edge, estimates))
     elif not fitted.has_converged:
-        starts = ", ".join(map(_start_of, estimates))
+        starts = ", ".join(f'start = "{_in_unit(each.value, each)}" of {each.path}' for each in estimates)
         remarks.append(
             f"the search stopped after {fitted.evaluations} runs before it converged; give the parameters {starts}, "
             "where it ended"
@@ -235,11 +235,6 @@ def _left_out(fitted: Fit, blocks: Sequence[ResidualBlock], times: Mapping[str, 
             count, first = "1 sample" if is_one else f"{len(samples)} samples", times[block.recording][samples[0]]
             verb = "stands out by itself and was" if is_one else "stand out by themselves and were"
             yield f"experiment '{block.recording}': {count} of {block.channel}, at {first:.6g} s first, {verb} left out"
-
-
-def _start_of(estimate: Estimate) -> str:
-    """Return an estimate as the start that a problem file may give for it."""
-    return f'start = "{_in_unit(estimate.value, estimate)}" of {estimate.path}'
 
 
 _INSIDE = 1.0e-3

@@ -252,6 +252,6 @@ def check_rounded_table(evidence: Evidence) -> Iterator[AuditFinding]:
             paragraph=(
                 f"Between the angles of {parameter_set.actuator_file} the curves through its numbers would fit no "
                 f"chamber: negative, or falling with the pressure. They are moved by {1e6 * moved:.2g} mL at most, "
-                f"within the last digit of {1e6 * digit:.2g} mL. More digits would need no move."
+                f"within the steps of {1e6 * digit:.2g} mL in which they are written. More digits would need no move."
             ),
         )

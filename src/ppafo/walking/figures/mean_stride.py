@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
                 continue
             label = f"{name}, mean of {result.metrics['counted_strides'].value:.0f}"
             atmosphere = result.scenario.device.supply.atmospheric_pressure
-            for channel, dashes in zip(channels, _dashes_of(colour), strict=False):
+            for channel, dashes in zip(channels, (DASHES.get(colour, "-"), (0, (4, 2))), strict=False):
                 curves = result.averages[channel]
                 mean = curves.mean - atmosphere if kind is PRESSURE else curves.mean
                 mean = clinical_angle(mean) if kind is ANGLE else mean
@@ -93,11 +93,6 @@ def walk_figure(walks: Mapping[str, _MeanStrideData]) -> "Figure":
         title=f"{first.scenario.name}: {gait.name}, {first.metrics['strides'].value:.0f} strides",
         kind=first.recording.kind,
     )
-
-
-def _dashes_of(colour: str) -> tuple[Any, Any]:
-    """Return the line of a walk in a panel of two chambers: of the first its own, of the second dashed."""
-    return DASHES.get(colour, "-"), (0, (4, 2))
 
 
 def _band(mean: Floats, deviation: Floats | float, colour: str, alpha: float) -> Mark:

@@ -26,7 +26,7 @@ def _read(path: str | Path) -> MotionTable:
     DataError where nothing is called time.
     """
     file = read_matlab(path)
-    name = next((name for name in file.columns if _last(name) in _TIMES), None)
+    name = next((name for name in file.columns if name.rpartition(".")[2].lower() in _TIMES), None)
     if name is None:
         names = ", ".join(list(file.columns)[:12])
         raise DataError(f"{path}: no variable is called 'time' or 't'; it has {names}{file.said_of_objects()}")
@@ -48,10 +48,6 @@ def _read(path: str | Path) -> MotionTable:
 
 def _has_opensim(names: Iterable[str]) -> bool:
     return any(map(_OPENSIM.fullmatch, names))
-
-
-def _last(name: str) -> str:
-    return name.rpartition(".")[2].lower()
 
 
 def _angle(file: MatlabFile) -> str:
