@@ -48,7 +48,7 @@ def prepare_entry(
         if name not in made and leaf_paths(row, name):
             last = place_of(functions[-1])
             raise ProgramError(
-                f"{last}: no function of preparation sets 'lane.{name}', a {row.__name__} of the program"
+                f"{last}: no function of preparation gives '{name}', a {row.__name__} of the program"
             )
     cells = {setting.name: boundary.cell("settings", place, setting.name) for place, setting in enumerate(settings)}
 
