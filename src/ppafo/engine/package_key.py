@@ -64,7 +64,7 @@ def package_key(parts: Any, folders: tuple[str, ...] = COMPOSED) -> Key | None:
             digest = numbers.setdefault(read.scope["__name__"], hashlib.sha256())
             digest.update(f"{read.name} {read.value!r}\n".encode("utf-8", "surrogatepass"))
     values = {module: digest.hexdigest()[:16] for module, digest in numbers.items()}
-    return Key(described, _hash_of_files(folders), values, MadeFrom(reads))
+    return Key(described=described, files=_hash_of_files(folders), values=values, made_from=MadeFrom(reads))
 
 
 class _ElsewhereError(Exception):

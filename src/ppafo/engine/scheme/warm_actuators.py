@@ -109,8 +109,11 @@ def warm_functions(actuator: ActuatorModel) -> WarmFunctions:
     """Return the functions of chambers with an energy balance that an actuator has."""
     if actuator == VANE:
         return WarmFunctions(
-            thermal_gas.chambers_at_begin, thermal_gas.chambers_at_end, thermal_gas.after_motion, thermal_gas.with_work
+            chambers_at_begin=thermal_gas.chambers_at_begin,
+            chambers_at_end=thermal_gas.chambers_at_end,
+            after_motion=thermal_gas.after_motion,
+            with_work=thermal_gas.with_work,
         )
     own = functions_of_actuator(actuator)
     of_any = (chambers_at_begin, chambers_at_end, after_motion, with_work)
-    return WarmFunctions(*(made_of(function, function.__name__, own) for function in of_any))
+    return WarmFunctions(**{function.__name__: made_of(function, function.__name__, own) for function in of_any})

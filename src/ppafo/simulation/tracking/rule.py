@@ -280,7 +280,7 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     is_counted = rests & (not only_switches)
     peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
     is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)
-    return TaskExcess(off, swings, peak, np.where(is_still, share / LARGEST_SHARE, 0.0))
+    return TaskExcess(off=off, swings=swings, peak=peak, still=np.where(is_still, share / LARGEST_SHARE, 0.0))
 
 
 def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:
