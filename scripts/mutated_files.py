@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import ppafo
 from ppafo.cli.verbs.device import sets_audit
 from ppafo.errors import PpafoError
-from ppafo.storage import read_recording, read_result
+from ppafo.storage import read_recording, read_stored
 from tests.contract.test_files_run_no_code import STUDY, text_of
 from tests.contract.test_hostile_documents import LOADERS
 
@@ -122,7 +122,7 @@ def draw_study(folder: str) -> None:
 
 def open_run(folder: str) -> None:
     """The folder of a run."""
-    repr(read_result(folder)), read_recording(folder)
+    repr(read_stored(folder)), read_recording(folder)
 
 
 def audit(path: str) -> None:

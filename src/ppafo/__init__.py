@@ -72,9 +72,10 @@ _HOMES = {
     "ppafo.simulation.loading": ("list_scenarios",),
     "ppafo.simulation.scenario": ("Scenario",),
     "ppafo.simulation.simulate": ("Result", "Status"),
-    "ppafo.storage": ("read_recording", "read_result"),
+    "ppafo.storage": ("read_recording",),
     "ppafo.studies.loading": ("list_studies", "load_study"),
     "ppafo.report.finding": ("Finding",),
+    "ppafo.report.stored_figure": ("read_result",),
     "ppafo.walking": ("compare_walks", "list_walks", "load_walk", "walk_population"),
     "ppafo.walking.walk": ("walk",),
 }

@@ -57,6 +57,7 @@ from ppafo.parameters.parts import Catalogue as Catalogue
 from ppafo.parameters.parts import Part as Part
 from ppafo.parameters.parts import load_catalogue as load_catalogue
 from ppafo.report.finding import Finding as Finding
+from ppafo.report.stored_figure import read_result as read_result
 from ppafo.running import simulate as simulate
 from ppafo.running import simulate_many as simulate_many
 from ppafo.signals import Channel as Channel
@@ -66,7 +67,6 @@ from ppafo.simulation.scenario import Scenario as Scenario
 from ppafo.simulation.simulate import Result as Result
 from ppafo.simulation.simulate import Status as Status
 from ppafo.storage import read_recording as read_recording
-from ppafo.storage import read_result as read_result
 from ppafo.studies.loading import list_studies as list_studies
 from ppafo.studies.loading import load_study as load_study
 from ppafo.version import __version__ as __version__

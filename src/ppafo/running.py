@@ -98,7 +98,7 @@ def tried(scenario: Scenario, verdict: "Tracking | None") -> "Tracking | None":
     for cause, remedy in causes[:MOST_TRIED]:
         with contextlib.suppress(PpafoError):
             again = reloaded(scenario, remedy.overrides) if is_of_file else with_numbers(scenario, remedy.numbers)
-            candidates.append((cause, remedy, replace(again, run=_trial_run(scenario))))
+            candidates.append((cause, remedy, replace(again, run=_trial_run(again))))
     try:
         results = of_loaded.simulate_many([candidate for *_, candidate in candidates])
     except PpafoError:

@@ -7,9 +7,9 @@ from ppafo.analyses.endurance.walk_gas import WALK_FILE
 from ppafo.analyses.sweep.answer import load_study_results
 from ppafo.errors import DataError, reason
 from ppafo.report.recording_figure import recording_figure
-from ppafo.report.stored_figure import draw_stored_result, draw_stored_walk, stated_units
+from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
 from ppafo.rig.experiments import RIG_FILE
-from ppafo.storage import read_recording, read_result
+from ppafo.storage import read_recording
 from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
 from ppafo.study.manifest import MANIFEST
 from ppafo.units.shown import shown_in
@@ -35,7 +35,7 @@ def names_in(folder: Path) -> list[str]:
 def draw_folder(folder: Path, names: list[str]) -> "dict[str, Figure]":
     """Return figures by the stem of their files: of a run, a walk, a study or recordings of the rig; none of others."""
     if RUN_FILE in names:
-        return {_FIGURE: draw_stored_result(read_result(folder))}
+        return {_FIGURE: read_result(folder).plot()}
     if MANIFEST in names:
         return {_FIGURE: load_study_results(folder).plot()}
     if RIG_FILE in names:

@@ -141,6 +141,10 @@ class NumberWithUnit(float):
         given.unit = unit
         return given
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what a copy is made of."""
+        return NumberWithUnit, (float(self), self.unit)
+
 
 def units_given(by_si_unit: Mapping[str, float | None]) -> dict[str, str]:
     """Return the units of the numbers given with a unit, by unit in SI; a pressure also sets its differences."""

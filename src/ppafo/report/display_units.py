@@ -109,6 +109,12 @@ def metric_text(value: float, si_unit: str) -> str:
     return f"{without_exponent(shown, _METRIC)} {unit}".rstrip()
 
 
+def name_lines(metrics: Mapping[str, Metric]) -> list[str]:
+    """Return a line of text for each metric: name, value and unit as people are shown it, for ``repr``."""
+    width = max(map(len, metrics), default=0)
+    return [f"  {name:<{width}}  {metric_text(metric.value, metric.unit)}" for name, metric in metrics.items()]
+
+
 def metric_level(value: float, si_unit: str) -> tuple[float, str]:
     """Return a value of a metric or channel, and its unit, as people are shown them."""
     quantity = metric_quantity(si_unit)

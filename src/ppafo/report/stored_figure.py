@@ -4,15 +4,18 @@ A document may have been written by anybody: what is of another form is named by
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, one_line
 from ppafo.parameters.joint import ANKLE, JointNames
+from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
 from ppafo.signals import Recording
-from ppafo.storage import StoredResult
+from ppafo.storage import StoredResult, read_stored
 from ppafo.storage.result_folder import RUN_FILE
 from ppafo.units import conversion
 from ppafo.units.shown import GAUGE_ZERO, counted_from, shown_in
@@ -30,6 +33,19 @@ _END_OF_WALK = 5.0
 """Seconds at the end of a walk that are drawn, some strides: a minute of them is a black bar."""
 
 
+@checked
+def read_result(folder: str | Path) -> StoredResult:
+    """Return what a result folder holds, with its figure. DataError for a folder that holds none.
+
+    >>> import ppafo
+    >>> folder = ppafo.simulate("step-response").save("step")
+    >>> stored = ppafo.read_result(folder)
+    >>> stored.document["status"], len(stored.plot().axes)
+    ({'kind': 'completed', 'time': None, 'message': 'completed'}, 5)
+    """
+    return replace(read_stored(folder), drawn_by=draw_stored_result)
+
+
 def draw_stored_result(stored: StoredResult) -> "Figure":
     """Return the figure of a saved result: the same that ``Result.plot`` gave.
 
@@ -42,7 +58,7 @@ def draw_stored_result(stored: StoredResult) -> "Figure":
     valve = str(_under(file, document, "scenario", "device", "valve").get("kind", ""))
     joint = stated_joint(file, document, "scenario", "device")
     with shown_in(stated_units(file, document, device=("scenario", "device"))):
-        return recording_figure(stored.recording, one_line(name), _ending(file, document), valve, joint)
+        return shown(recording_figure(stored.recording, one_line(name), _ending(file, document), valve, joint))
 
 
 def draw_stored_walk(file: Path, document: Mapping[str, Any], recording: Recording) -> "Figure":

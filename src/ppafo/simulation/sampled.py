@@ -2,6 +2,7 @@
 
 import logging
 import math
+import traceback
 from collections.abc import Callable
 from typing import Any, final
 from weakref import WeakSet
@@ -12,7 +13,7 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
-from ppafo.errors import ScenarioError, SimulationError
+from ppafo.errors import ScenarioError, SimulationError, nearest_name
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
@@ -76,7 +77,7 @@ class SampledRun:
 
 
 def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
-    """Run a batch of one with a Python controller; SimulationError where it returns no finite number.
+    """Run a batch of one with a Python controller; SimulationError where it returns no finite number, and for a slip.
 
     A command beyond what the valve has is limited, which a line says once for each class of controllers.
     """
@@ -84,7 +85,11 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
     # What an earlier run left behind in the object must not steer this one.
     controller.reset()
     for _ in range(run.samples):
-        command = controller.update(run.time, run.requested, run.measurement())
+        now = (run.time, run.requested, run.measurement())
+        try:
+            command = controller.update(*now)
+        except (NameError, AttributeError, TypeError) as error:
+            raise _slip(controller, error) from error
         # A comparison that was meant to be a command is a bool, which Python takes for a whole number.
         is_number = isinstance(command, int | float | np.floating) and not isinstance(command, bool)
         if not is_number or not math.isfinite(command):
@@ -100,6 +105,18 @@ def run_sampled(batch: Batch, controller: PythonController) -> BatchResult:
             _say_limited(type(controller), f"{command:g} at t = {run.time:.6g} s", allowed)
         run.go_on(taken)
     return run.result()
+
+
+def _slip(controller: PythonController, error: NameError | AttributeError | TypeError) -> SimulationError:
+    """Return the error of a slip of the pen in a controller: file, line, what is wrong and the nearest name."""
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    walked = next(reversed(list(traceback.walk_tb(error.__traceback__))))[0]
+    name, hint = getattr(error, "name", None), ""
+    if name is not None and isinstance(error, AttributeError):
+        hint = nearest_name(name, [known for known in dir(error.obj) if not known.startswith("_")])
+    elif name is not None:
+        hint = nearest_name(name, [*walked.f_locals, *walked.f_globals])
+    return SimulationError(f"{frame.filename}, line {frame.lineno}: {type(controller).__name__}: {error}{hint}")
 
 
 _SAID: "WeakSet[type]" = WeakSet()

@@ -124,14 +124,14 @@ class Result:
         said = ("" if verdict is None else verdict.sentence, coarse_pair(self.scenario))
         return tuple(sentence for sentence in said if sentence)
 
+    @in_units(_units_of)
     def __repr__(self) -> str:
-        """Return name, status, duration and one line a metric, in SI units."""
+        """Return name, status, duration and one line a metric, in the units that people are shown."""
+        from ppafo.report.display_units import name_lines
+
         scenario, status = self.scenario, self.status
-        width = max((len(name) for name in self.metrics), default=0)
-        lines = [f"  {name:<{width}}  {metric.value:.4g} {metric.unit}" for name, metric in self.metrics.items()]
-        return "\n".join(
-            [f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}", *lines]
-        )
+        head = f"Result of '{scenario.name}', {scenario.run.duration:g} s: {status.message or status.kind}"
+        return "\n".join([head, *name_lines(self.metrics)])
 
     @in_units(_units_of)
     def __str__(self) -> str:

@@ -2,7 +2,7 @@
 
 from ppafo.storage.comma_separated import read_csv, write_csv
 from ppafo.storage.netcdf import dataset_of, write_netcdf
-from ppafo.storage.result_folder import StoredResult, check_result_folder, read_recording, read_result, write_result
+from ppafo.storage.result_folder import StoredResult, check_result_folder, read_recording, read_stored, write_result
 
 __all__ = [
     "StoredResult",
@@ -10,7 +10,7 @@ __all__ = [
     "dataset_of",
     "read_csv",
     "read_recording",
-    "read_result",
+    "read_stored",
     "write_csv",
     "write_netcdf",
     "write_result",

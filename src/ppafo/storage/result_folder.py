@@ -8,7 +8,7 @@ lists is ever removed.
 
 import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 from types import MappingProxyType
@@ -25,6 +25,7 @@ from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_by
 from ppafo.storage.netcdf import netcdf_bytes
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from pandas import DataFrame  # type: ignore[import-untyped]
     from xarray import Dataset
 
@@ -196,14 +197,23 @@ SCHEMA_VERSION = 1
 
 @dataclass(frozen=True, slots=True, repr=False)
 class StoredResult:
-    """Content of a result folder: the recording, and ``run.json`` as plain data."""
+    """Content of a result folder: the recording, and ``run.json`` as plain data.
+
+    ``drawn_by`` makes its figure, which no file needs to be read.
+    """
 
     folder: Path
     recording: Recording
     document: Mapping[str, Any]
+    drawn_by: "Callable[[StoredResult], Figure] | None" = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         return f"StoredResult in {self.folder}: {', '.join(self.document)}\n{self.recording!r}"
+
+    def plot(self) -> "Figure":
+        """Return the figure that ``Result.plot`` gave; ``.savefig(...)`` writes it."""
+        assert self.drawn_by is not None, "read by ppafo.read_result"
+        return self.drawn_by(self)
 
 
 def write_result(
@@ -237,15 +247,8 @@ def check_result_folder(folder: str | Path) -> None:
     check_owned_folder(Path(folder), _RESULT)
 
 
-@checked
-def read_result(folder: str | Path) -> StoredResult:
-    """Return what a result folder holds. DataError for a folder that holds none.
-
-    >>> import ppafo
-    >>> folder = ppafo.simulate("step-response").save("step")
-    >>> ppafo.read_result(folder).document["status"]
-    {'kind': 'completed', 'time': None, 'message': 'completed'}
-    """
+def read_stored(folder: str | Path) -> StoredResult:
+    """Return what a result folder holds, which nothing draws. DataError for a folder that holds none."""
     from ppafo.storage.netcdf_reading import read_netcdf
 
     folder_path = Path(folder)
@@ -330,7 +333,7 @@ def read_recording(
         column_map, map_name = column_map_of(columns)
         return read_foreign(file, column_map, atmosphere=atmosphere, map_name=map_name)
     if file.is_dir() and (file / RUN_FILE).exists():
-        return read_result(file).recording
+        return read_stored(file).recording
     return _read_file(_recording_of_walk(file) if file.is_dir() else file, atmosphere)
 
 

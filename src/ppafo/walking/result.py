@@ -241,12 +241,13 @@ class WalkResult:
         strides = self.metrics.get("strides")
         return None if strides is None or strides.value == 0.0 else tracking_in(self)
 
+    @in_units(_units_of)
     def __repr__(self) -> str:
-        """Return name, status, duration and one line a metric, in SI units."""
-        width = max((len(name) for name in self.metrics), default=0)
-        lines = [f"  {name:<{width}}  {metric.value:.4g} {metric.unit}" for name, metric in self.metrics.items()]
+        """Return name, status, duration and one line a metric, in the units that people are shown."""
+        from ppafo.report.display_units import name_lines
+
         head = f"Walk '{self.scenario.name}', {self.recording.time[-1] / 60.0:.3g} min: {self.status.message}"
-        return "\n".join([head, *lines])
+        return "\n".join([head, *name_lines(self.metrics)])
 
     @in_units(_units_of)
     def __str__(self) -> str:

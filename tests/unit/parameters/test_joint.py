@@ -14,7 +14,7 @@ from ppafo.parameters.loading import parameter_set_toml, parse_parameter_set
 from ppafo.report.stored_figure import draw_stored_result
 from ppafo.running import simulate
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_result
+from ppafo.storage import read_stored
 
 CYLINDER = (resources.files("ppafo.parameters") / "sets" / "cylinder-lever.toml").read_text(encoding="utf-8")
 ELBOW = '\n[joint]\nname = "elbow"\npositive = "flexion"\n'
@@ -61,7 +61,7 @@ def test_figures_and_recordings_speak_of_the_joint(elbow: Path, tmp_path: Path) 
     assert result.dataset()["angle"].attrs["long_name"] == "elbow angle, growing in flexion"
     folder = result.save(tmp_path / "out")
     assert json.loads((folder / "run.json").read_text())["scenario"]["device"]["joint"]["name"] == "elbow"
-    drawn = draw_stored_result(read_result(folder))
+    drawn = draw_stored_result(read_stored(folder))
     assert any(
         "Elbow angle" in axes.get_title() + axes.get_title(loc="left") + axes.get_ylabel() for axes in drawn.axes
     )

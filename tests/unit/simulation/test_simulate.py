@@ -332,3 +332,30 @@ def test_a_result_that_nobody_has_looked_at_is_copied_pickled_and_compared_as_an
     assert stored.recording == other.recording
     assert stored.metrics["angle_range"].value == other.metrics["angle_range"].value
     assert copy.deepcopy(simulate(step_response)) == dataclasses.replace(first, status=other.status)
+
+
+class WithASlip:
+    """A controller with a name and an attribute that are not there."""
+
+    def __init__(self, attribute: bool) -> None:
+        self.attribute = attribute
+
+    def reset(self) -> None:
+        pass
+
+    def update(self, time: float, reference: float, measurement: Measurement) -> float:
+        measured = measurement.torqe if self.attribute else measurement.torque  # type: ignore[attr-defined]
+        return float(refernce - measured)  # type: ignore[name-defined]  # noqa: F821
+
+
+@pytest.mark.parametrize(
+    ("attribute", "said"),
+    [
+        (False, r"name 'refernce' is not defined, did you mean 'reference'\?$"),
+        (True, r"'Measurement' object has no attribute 'torqe', did you mean 'torque'\?$"),
+    ],
+)
+def test_a_slip_in_a_controller_is_one_line_with_its_file_and_line(attribute: bool, said: str) -> None:
+    scenario = load_scenario("torque-task-proportional", ["run.duration=0.1 s"])
+    with pytest.raises(SimulationError, match=rf"test_simulate\.py, line \d+: WithASlip: {said}"):
+        simulate(scenario.controlled_by(WithASlip(attribute)))

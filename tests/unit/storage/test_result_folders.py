@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording
-from ppafo.storage import check_result_folder, files, read_recording, read_result, write_result
+from ppafo.storage import check_result_folder, files, read_recording, read_stored, write_result
 
 DOCUMENT = {"status": {"kind": "completed"}, "scenario": {"name": "task"}}
 
@@ -31,7 +31,7 @@ def test_a_folder_holds_both_recordings_the_document_and_the_attachments(tmp_pat
 
 def test_a_folder_is_read_back_exactly_from_either_file(tmp_path: Path) -> None:
     folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
-    stored = read_result(folder)
+    stored = read_stored(folder)
     assert stored.recording == recording()
     assert stored.document["scenario"] == {"name": "task"}
     for place in (folder, folder / "recording.nc", folder / "recording.csv"):
@@ -71,7 +71,7 @@ def test_an_empty_folder_is_filled_and_an_earlier_result_is_replaced_whole(tmp_p
     folder.mkdir()
     write_result(folder, recording(1.0), DOCUMENT, {"figure.pdf": b"old"})
     write_result(folder, recording(2.0), DOCUMENT, {})
-    assert read_result(folder).recording == recording(2.0)
+    assert read_stored(folder).recording == recording(2.0)
     assert names(folder) == ["recording.csv", "recording.nc", "run.json"]
     assert names(tmp_path) == ["task"]
 
@@ -186,7 +186,7 @@ def test_an_interrupt_leaves_an_earlier_result_as_it_was(
     with pytest.raises(KeyboardInterrupt):
         write_result(folder, recording(2.0), DOCUMENT, {})
     monkeypatch.undo()
-    assert read_result(folder).recording == recording(1.0)
+    assert read_stored(folder).recording == recording(1.0)
     assert names(tmp_path) == ["task"]
 
 
@@ -215,7 +215,7 @@ def test_an_unusable_document_is_one_line_that_names_it(tmp_path: Path, content:
     folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
     (folder / "run.json").write_text(content)
     with pytest.raises(DataError, match=message) as caught:
-        read_result(folder)
+        read_stored(folder)
     assert str(caught.value).startswith(f"{folder / 'run.json'}: ")
 
 
@@ -223,7 +223,7 @@ def test_a_result_without_its_recording_is_refused_by_file(tmp_path: Path) -> No
     folder = write_result(tmp_path / "task", recording(), DOCUMENT, {})
     (folder / "recording.nc").unlink()
     with pytest.raises(DataError, match=r"recording\.nc: cannot be read"):
-        read_result(folder)
+        read_stored(folder)
 
 
 def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_a_recording_that_changed_on_disk_is_refused_before_it_is_opened(tmp_pat
     damaged[len(damaged) // 2] ^= 1
     (folder / "recording.nc").write_bytes(damaged)
     with pytest.raises(DataError, match=r"recording\.nc: is not the file that was written with run\.json"):
-        read_result(folder)
+        read_stored(folder)
 
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.errors import DataError, ParameterError
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
+from ppafo.units.shown import shown_text
 
 PEAK_WINDOW = 0.1
 """Seconds over which the largest flow of a recording is averaged; lines and regulator even out what is shorter."""
@@ -42,8 +43,8 @@ def demand_of_numbers(mass_per_stride: float, stride_time: float, peak_flow: flo
     mean = mass_per_stride / stride_time
     if peak_flow is not None and not (math.isfinite(peak_flow) and peak_flow >= mean):
         raise ParameterError(
-            f"the largest flow, {peak_flow * GRAMS_PER_KILOGRAM:.4g} g/s, must be at least the mean flow, "
-            f"{mean * GRAMS_PER_KILOGRAM:.4g} g/s"
+            f"the largest flow, {shown_text(peak_flow, 'kg/s', '.4g')}, must be at least the mean flow, "
+            f"{shown_text(mean, 'kg/s', '.4g')}"
         )
     return GasDemand(mass_per_stride, stride_time, mean if peak_flow is None else peak_flow, "numbers given")
 

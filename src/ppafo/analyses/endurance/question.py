@@ -66,11 +66,13 @@ def bottle(
     from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
     from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
     from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
+    from ppafo.arguments.words import units_given
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
     from ppafo.report.stored_figure import stated_units
     from ppafo.signals import Recording
     from ppafo.storage.result_folder import RUN_FILE, read_json, read_recording
+    from ppafo.units.shown import shown_in, units_in_force
     from ppafo.walking import WalkResult
     from ppafo.walking.bottle.coupling import Schedule
 
@@ -84,8 +86,11 @@ def bottle(
     schedule = Schedule(BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
     named, changed = PAPER_BOTTLE if bottle is None else bottle, tuple(overrides)
     if gas_per_stride is not None:
-        draw = demand_of_numbers(gas_per_stride, STRIDE_TIME if stride_time is None else stride_time, peak_flow)
-        return finding_of(follow_bottle(load_bottle(named, changed), draw, schedule))
+        units = units_given({"kg/s": peak_flow})
+        with shown_in({**units_in_force(), **units}):
+            draw = demand_of_numbers(gas_per_stride, STRIDE_TIME if stride_time is None else stride_time, peak_flow)
+        emptied = follow_bottle(load_bottle(named, changed), draw, schedule)
+        return finding_of(replace(emptied, device_units=units))
     if peak_flow is not None:
         raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
     uses: dict[str, str | Path | Recording | WalkResult] = {}

@@ -60,7 +60,9 @@ def _shut_valve(case: Case) -> TrackingCause | None:
         return TrackingCause("its law asks for nothing: its gains are 0, or its dead zone is wider than the error")
     if asked > _EDGE * band or settled.turns or case.failure == "overshoots":
         return None
-    believed = float(scenario.controller.settings.get("dead_band", band))
+    believed = float(scenario.controller.settings.get("dead_band", 0.0))
+    if believed >= band and _is_settling(case):
+        return None
     remedies = [remedy(scenario, {"controller.dead_band": band})] if believed < band else []
     # A law that knows the band asks for more openings than it gets, and errs by what its gain lacks.
     lacking = band / asked if believed < band else settled.error / (LARGEST_SHARE * settled.wanted)
@@ -68,7 +70,8 @@ def _shut_valve(case: Case) -> TrackingCause | None:
     remedies += integral_of_device(scenario, case.law)
     if torque_asked(scenario, case.law, settled.error) is not None:
         remedies += stiffer_laws(scenario, float(scenario.device.friction.static_torque), settled)
-    text = f"its command of {asked:.2g} stays within `valve.dead_band = {band:.2g}`"
+    opens = "stays within" if believed < band else "hardly opens the valve beyond"
+    text = f"its command of {asked:.2g} {opens} `valve.dead_band = {band:.2g}`"
     return TrackingCause(text, tuple(remedies), "give a larger gain")
 
 
@@ -184,17 +187,24 @@ def gains_of_another_device(case: Case) -> TrackingCause | None:
     return TrackingCause("its gains are not this device's", (right, *others))
 
 
-def _not_settled(case: Case) -> TrackingCause:
-    """The run ends before the loop has settled, the law has no integral, or nothing above applies."""
+def _is_settling(case: Case) -> bool:
+    """True where the error still falls in the settled part, by three tenths from its first half to the second."""
     reference, value = followed(case.recording)
     error = np.abs((value - reference)[case.settled.samples])
     half = error.size // 2
+    return half > 0 and bool(np.mean(error[half:]) < 0.7 * np.mean(error[:half]))
+
+
+def _not_settled(case: Case) -> TrackingCause:
+    """The run ends before the loop has settled, the law has no integral, or nothing above applies."""
     settings = case.scenario.controller.settings
     stop = stop_of(case.scenario, case.recording["angle"][case.settled.samples])
     if stop and case.scenario.controlled == ANGLE:
         return TrackingCause(f"the joint lies on its {stop} stop", (), "look at what presses it")
-    if half and np.mean(error[half:]) < 0.7 * np.mean(error[:half]):
-        return TrackingCause("it has not settled at the end", (), "give it a longer `run.duration`")
+    if _is_settling(case):
+        longer = [remedy(case.scenario, {"run.duration": times * case.scenario.run.duration}) for times in (2.0, 4.0)]
+        quicker = larger_gains(case.scenario, case.law, (2.0, 4.0))
+        return TrackingCause("it has not settled at the end", (*longer, *quicker), "give it a longer `run.duration`")
     integral = next((name for name in settings if "integral" in name and settings[name] == 0.0), "")
     if integral:
         remedies = tuple(integral_of_device(case.scenario, case.law))

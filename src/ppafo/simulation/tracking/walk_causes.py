@@ -10,10 +10,13 @@ from ppafo.parameters.reach import static_torque, supply_for, torque_reach
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.tracking.case import Case, TrackingCause
 from ppafo.simulation.tracking.causes import gains_of_another_device, oscillation
+from ppafo.simulation.tracking.load_causes import ONE_WAY
 from ppafo.simulation.tracking.remedies import dead_band, larger_gains, level_text, remedy, sized_valves
 
 _OFTEN = 0.1
 """Share of the time with a request that is often [-]."""
+_DORSIFLEXION = ("landing_peak_torque", "swing_peak_torque", "hold_stiffness", "hold_damping")
+"""Settings of a walk that ask for a torque in dorsiflexion."""
 _ANGLES_OF_WALK = 400
 """Samples of a walk at which the reach is compared with the request."""
 
@@ -41,6 +44,8 @@ def _request_beyond_reach(case: Case) -> TrackingCause | None:
         f"in {100.0 * share:.0f} % of the time its controller asks for more than the actuator gives there, {most[0]} "
         f"at most of {most[1]} asked for"
     )
+    if np.mean(below > 0.0) > _OFTEN and -reaches[:, 0].min() <= ONE_WAY * reaches[:, 1].max():
+        return _one_way_request(case, float(reaches[:, 0].min()), float(reference[places].min()))
     numbers: dict[str, float] = {}
     for path, lacking in (("supply.pressure", above), ("supply.dorsiflexion_pressure", below)):
         place = places[int(np.argmax(lacking))]
@@ -83,6 +88,18 @@ def _speed_of_gait(case: Case) -> TrackingCause:
         tuple(remedies),
         "take larger dead volumes or a quicker valve",
     )
+
+
+def _one_way_request(case: Case, lowest: float, asked: float) -> TrackingCause:
+    """The controller asks in dorsiflexion for what an actuator that pushes one way only does not give [N m]."""
+    settings = case.scenario.controller.settings
+    text = (
+        f"its controller asks for {level_text('N m', asked)}, where the actuator gives {level_text('N m', lowest)} at "
+        "most: it pushes one way only"
+    )
+    unasked = {f"controller.{name}": 0.0 for name in _DORSIFLEXION if settings.get(name, 0.0) > 0.0}
+    remedies = (remedy(case.scenario, unasked),) if unasked else ()
+    return TrackingCause(text, remedies, "ask for no dorsiflexion, or let a spring lift the foot", is_beyond_reach=True)
 
 
 def _oscillation_of_walk(case: Case) -> TrackingCause | None:

@@ -178,7 +178,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert at_stop.edges == (SlopeKink("command", is_above=False),)
     assert "the column of `command` is valid below 1 only; its slope differs above it" in text_of(finding_of(at_stop))
     assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
-    deaf = linear(TASK, 0.1, ["valve.dead_band=0.5"])
+    deaf = linear(TASK, 0.1, ["valve.dead_band=0.5", "controller.dead_band=0"])
     assert "the command's column is 0" in deaf.sides["valve"]
     assert not deaf.b[:, 0].any()
     assert not finding_of(deaf).figures
@@ -259,7 +259,7 @@ def test_what_has_no_linear_model_is_refused_in_one_line() -> None:
         (TASK, 9.0, (), "--at 9 s is outside the run, which lasts 3 s"),
         (TASK, "equilibrium", (), "no equilibrium at 6 N m.*with the valve fully open the actuator comes to 5 N m"),
         (TASK, "Equilibrium", (), "at: 'Equilibrium': must be a time such as .*, or 'equilibrium'"),
-        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' is on or off"),
+        ("torque-task-solenoid", 1.0, (), "valve 'solenoid' opens fully or at a constant speed"),
     ):
         with pytest.raises(ppafo.PpafoError, match=line) as refused:
             linear(scenario, at, overrides)
