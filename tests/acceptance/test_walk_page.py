@@ -1,9 +1,11 @@
 """What the page on walking shows is run as it stands there."""
 
+import contextlib
+import io
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -21,37 +23,43 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", PAGE, re.DOTALL | re.MULTILINE)
 
 
-def test_the_commands_and_the_python_of_the_page_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    commands = [line for block in blocks("sh") for line in block.splitlines()]
-    assert [main(shlex.split(command)[1:]) for command in commands] == [0] * 17
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """Text of each command of the page, one after the other in a folder, which is the current one."""
+    commands = [line for block in blocks("sh") for line in block.splitlines() if line.startswith("ppafo ")]
+    texts = {}
+    with contextlib.chdir(tmp_path_factory.mktemp("page")):
+        for command in commands:
+            with contextlib.redirect_stdout(io.StringIO()) as text:
+                assert main(shlex.split(command)[1:]) == 0, command
+            texts[command] = text.getvalue()
+        yield texts
+
+
+def test_the_commands_of_the_page_write_the_files_that_it_lists(printed: dict[str, str]) -> None:
+    assert len(printed) > 20
     table = PAGE.partition("| In the folder |")[2].partition("\n\n")[0]
     listed = {
         name for cell in re.findall(r"^\| (`.*?`) \|", table, re.MULTILINE) for name in re.findall(r"`(.*?)`", cell)
     }
     assert len(listed) > 6
-    assert {name for name in listed if not (tmp_path / "out" / "walk" / name).is_file()} == set()
-    capsys.readouterr()
-    names: dict[str, Any] = {}
-    exec(blocks("python")[0], names)
-    printed = capsys.readouterr().out.splitlines()
-    assert printed[0].startswith("completed 0.")
-    assert printed[2:] == ["100 wearers, (100,)", "9 strides, (9, 101)"]
-    assert {path.name for path in (tmp_path / "out" / "my-gait").iterdir()} == {
+    assert {name for name in listed if not Path("out", "walk", name).is_file()} == set()
+    assert {path.name for path in Path("out", "my-gait").iterdir()} == {
         *("my-gait.toml", "gait.json", "gait.txt", "gait.png", "gait.svg"),
         *("report.html", "ppafo.json"),
     }
 
 
-def test_the_table_of_the_page_is_what_the_command_prints(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_the_python_of_the_page_prints_what_it_shows(capsys: pytest.CaptureFixture[str]) -> None:
+    (shown,) = re.findall(r"^```text\n(solenoid .*?)^```", PAGE, re.DOTALL | re.MULTILINE)
+    exec(blocks("python")[0], {})
+    assert capsys.readouterr().out == shown
+
+
+def test_the_table_of_the_page_is_what_the_command_prints(printed: dict[str, str]) -> None:
     shown = [line.split() for line in PAGE.partition("\nprints\n")[2].splitlines()[1:12]]
-    assert main(["walk", "solenoid", "--minutes", "0.2"]) == 0
-    assert [line.split() for line in capsys.readouterr().out.splitlines()[2:13]] == shown
+    lines = printed["ppafo walk solenoid --minutes 0.2 --out out/walk"].splitlines()
+    assert [line.split() for line in lines[2:13]] == shown
     assert len(shown) == 11
 
 
@@ -85,13 +93,12 @@ def test_the_task_sequence_and_the_bottle_of_the_page_load(tmp_path: Path) -> No
     assert walk_of(load_walk(walk_file, [f"task_sequence={tmp_path / 'door.toml'}"])).task_sequence is not None
 
 
-def test_the_segments_of_the_page_are_rows_of_what_the_command_prints(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_segments_of_the_page_are_rows_of_what_the_command_prints(printed: dict[str, str]) -> None:
     rows = re.findall(r"^    \*? +(rest|start, 0.4 m/s|ramp, 1 m/s|whole task sequence) +(.*)$", PAGE, re.MULTILINE)
     assert len(rows) == 4
-    assert main(["walk", "solenoid", "--task-sequence", "first-steps"]) == 0
-    printed = capsys.readouterr().out
+    text = printed["ppafo walk solenoid --task-sequence first-steps --out out/first-steps"]
     for name, numbers in rows:
-        (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", printed, re.MULTILINE)
+        (found,) = re.findall(rf"^\*? +{re.escape(name)} +(.*)$", text, re.MULTILINE)
         cells = re.split(r" {2,}", found)
         assert re.split(r" {2,}", numbers) == [*cells[:7], cells[-1]]
 

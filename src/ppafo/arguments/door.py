@@ -8,6 +8,7 @@ import contextlib
 import functools
 import inspect
 import re
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
@@ -39,14 +40,42 @@ class _Signature(NamedTuple):
 _says_arguments: ContextVar[bool] = ContextVar("_says_arguments", default=True)
 
 
+_has_options: ContextVar[bool] = ContextVar("_has_options", default=False)
+
+
 @contextlib.contextmanager
 def without_names() -> Iterator[None]:
-    """Leave errors inside as they are, without the name of an argument: a command line has words in its place."""
+    """Leave errors inside as they are, without the name of an argument."""
     token = _says_arguments.set(False)
     try:
         yield
     finally:
         _says_arguments.reset(token)
+
+
+@contextlib.contextmanager
+def with_options() -> Iterator[None]:
+    """Speak inside to somebody at a command line, who has options where a caller in Python has arguments."""
+    token = _has_options.set(True)
+    try:
+        with without_names():
+            yield
+    finally:
+        _has_options.reset(token)
+
+
+def argument_text(name: str, value: str = "", option: str = "") -> str:
+    """Return an argument as who called writes it, and a value with it.
+
+    On the command line that is an ``option``, by default the name with dashes: ``--peak-flow '4 g/s'``.
+
+    >>> argument_text("peak_flow"), argument_text("peak_flow", "4 g/s")
+    ('peak_flow', "peak_flow='4 g/s'")
+    """
+    if not _has_options.get():
+        return f"{name}={value!r}" if value else name
+    option = option or f"--{name.replace('_', '-')}"
+    return f"{option} {shlex.quote(value)}" if value else option
 
 
 def _usual_numpy() -> contextlib.AbstractContextManager[object]:

@@ -10,7 +10,7 @@ from typing import Any
 from ppafo.engine.linking import link_program
 from ppafo.engine.plain_python import check_flow, check_grammar, place, refusal
 from ppafo.engine.program import Program
-from ppafo.engine.reduction import NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
+from ppafo.engine.reduction import HISTORIES, NUMBER, Effects, Reduction, definition_of, names_in, uses_of_group
 from ppafo.engine.source_text import (
     Composer,
     RewrittenNames,
@@ -81,9 +81,15 @@ class StepText:
         return {**self.parameters, **self.states, **self.of_step, **self.further}
 
     def phase(self, function: PlainFunction, known: Mapping[str, Any] | None = None) -> ComposedFunction:
-        """A function that the loop over steps calls: of what it sets it returns what later phases may read."""
+        """A function that the loop over steps calls: of what it sets it returns what later phases may read.
+
+        ProgramError where it asks for a group that no phase before it has kept.
+        """
         assert isinstance(function, FunctionType), "it is no other callable"
         phase = self._composed(function, known or {}, is_phase=True)
+        for name in phase.handed:
+            if name not in self.rows and name not in (NUMBER, *HISTORIES):
+                raise self.refuse_unkept(name, phase)
         # Where a loop of one run has whole steps too, phases that divide a step are written out of their order.
         for name in phase.effects.reads if not self.ending else ():
             if name in self.of_step and name not in self.given:

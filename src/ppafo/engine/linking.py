@@ -5,10 +5,11 @@ from dataclasses import replace
 from typing import Any, Protocol
 
 from ppafo.engine.program import Program
+from ppafo.engine.source_text import place_of
 from ppafo.errors import ProgramError
 from ppafo.model.controlled import CONTROLLED, TORQUE, controlled, steered, turned_round
 from ppafo.model.effects.kind import Effect, effect_problem, laws_in_order
-from ppafo.model.plant import PlantParameters
+from ppafo.model.plant import PlantParameters, net_torque
 from ppafo.model.valves.kind import valve_problem
 
 
@@ -32,12 +33,19 @@ def link_program(program: Program, collector: LinkCollector) -> None:
     problem = valve_problem(program.valve)
     if problem:
         raise ProgramError(f"valve: {problem}")
+    # What friction or a stop may hold is decided elsewhere, where a spring in the sum alone would be missed.
+    at_rest = [net_torque(0.0, 0.0, 0.0, angle, 0.0) for angle in (1.0, 1.5)]
+    if any(at_rest):
+        raise ProgramError(
+            f"{place_of(net_torque)}: net_torque takes {-max(at_rest, key=abs):.4g} N m of a joint at rest, which "
+            "friction would not hold; let load_torque of ppafo.model.ports take it"
+        )
     if program.actuator.plant is not PlantParameters:
         collector.links[PlantParameters, "_replace"] = program.actuator.plant
     if program.leg is not None:
         of_walk = program.leg.links(program)
         collector.links.update(of_walk)
-        collector.effects.update({function: program.leg.ASKED[function] for function in of_walk.values()})
+        collector.effects.update(dict.fromkeys(of_walk.values(), program.leg.ASKED))
     followed = CONTROLLED[program.controlled]
     if program.controlled != TORQUE:
         collector.links[controlled] = followed.value

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from ppafo.engine.entries import indent, parse_expression
 from ppafo.engine.generator import ComposedFunction, StepText
 from ppafo.engine.lane_rows import HANDED, lanes_of
-from ppafo.engine.reduction import HISTORIES, NUMBER, TRACE, Slot, group_of_name, with_arguments
+from ppafo.engine.reduction import NUMBER, TRACE, Slot, group_of_name, with_arguments
 from ppafo.engine.rows import leaf_paths, row_expression, row_numbers
 
 
@@ -115,14 +115,8 @@ class RowsOfLanes:
         return _for_each_lane(lines or ["pass"])
 
     def for_lane(self, call: Call) -> list[str]:
-        """Lines for one lane: what the phase asks for, the call, and what it returns in its rows.
-
-        ProgramError where it asks for a group that no phase before it has kept.
-        """
+        """Lines for one lane: what the phase asks for, the call, and what it returns in its rows."""
         effects, rows = call.phase.effects, self.step.rows
-        for name in call.phase.handed:
-            if name not in rows and name not in (NUMBER, *HISTORIES):
-                raise self.step.refuse_unkept(name, call.phase)
         if not effects.results:
             return []
         lines = [self.load(name) for name in call.phase.handed if name in rows]

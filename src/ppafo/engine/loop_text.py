@@ -91,7 +91,9 @@ class LoopText:
                 return [ast.AugAssign(node.target, node.op, self.expression(node.value))]
             case ast.Break():
                 return [node]
-        raise self.reduction.refuse(node, f"'{ast.unparse(node).splitlines()[0]}' is no statement of the loop")
+        raise self.reduction.refuse(
+            node, f"'{ast.unparse(node).splitlines()[0]}' is not a supported statement of the loop"
+        )
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
         """A decision: of the parts, of a question to all runs, or of numbers that all have."""
@@ -152,7 +154,7 @@ class LoopText:
                     made.append(node)
                 case _:
                     line = ast.unparse(node).splitlines()[0]
-                    raise self.reduction.refuse(node, f"'{line}' is no statement of a lane in the loop")
+                    raise self.reduction.refuse(node, f"'{line}' is not a supported statement of a lane in the loop")
         return made
 
     def number_of_lane(self, node: ast.expr) -> ast.expr:

@@ -108,7 +108,7 @@ class LegPhases(Protocol):
         """Groups of numbers that it has in a lane."""
 
     @property
-    def ASKED(self) -> Mapping[Any, tuple[str, ...]]:  # noqa: N802
+    def ASKED(self) -> tuple[str, ...]:  # noqa: N802
         """Groups of rows that what stands in ``links`` takes before its own arguments."""
 
     def links(self, parts: "Program") -> Mapping[Any, Any]:

@@ -474,7 +474,7 @@ class Reduction:
                 before = ast.copy_location(ast.Name(name, ast.Load()), target)
                 return self.assignment(target, ast.copy_location(ast.BinOp(before, op, value), node))
         line = ast.unparse(node).splitlines()[0]
-        raise self.refuse(node, f"'{line}' is no statement of a phase: {_STATEMENTS}")
+        raise self.refuse(node, f"'{line}' is not a supported statement of a phase: {_STATEMENTS}")
 
     def branch(self, node: ast.If) -> list[ast.stmt]:
         """A decision: of the parts one branch alone, else a group that only one of both sets is also read."""

@@ -18,7 +18,7 @@ from ppafo.engine.step.lane import MAXIMUM_PARTS, LaneResult, LaneTiming, NoPara
 from ppafo.model.columns import larger, truncated
 from ppafo.model.effects.kind import PlantSnapshot
 from ppafo.model.orifice import ExactOrifice
-from ppafo.model.plant import PlantParameters, PlantState, ThermalParameters, chamber_pressures
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, ThermalParameters
 from ppafo.model.sensors import NOTHING_SEEN, GaitSensors, SensorParameters
 
 if TYPE_CHECKING:  # for most runs know no leg, no line, no walk and no fault
@@ -281,9 +281,9 @@ def states_at_start(run: Run) -> list[Any]:
     ]
 
 
-def moment_at_start(plant: PlantParameters, initial: PlantState) -> PlantSnapshot:
+def moment_at_start(plant: PlantParameters, initial: PlantState, *, parts: ActuatorFunctions) -> PlantSnapshot:
     """State of the plant that effects depend on, at the start of the run."""
-    pressure_1, pressure_2 = chamber_pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
+    pressure_1, pressure_2 = parts.pressures(plant, initial.angle, initial.mass_1, initial.mass_2)
     return _at_rest(initial, pressure_1, pressure_2)
 
 

@@ -116,7 +116,9 @@ def fit(
     and for bounds that leave a number no room about its start.
     """
     if not numbers or not blocks:
-        raise IdentificationError(f"a fit of {len(numbers)} numbers to {len(blocks)} blocks: each needs at least one")
+        raise IdentificationError(
+            f"a fit needs at least one number and one block of residuals, it has {len(numbers)} and {len(blocks)}"
+        )
     for one in numbers:
         if not (one.low <= one.start <= one.high and one.low < one.high):
             raise IdentificationError(

@@ -175,26 +175,28 @@ def loaded(torque: float, angle: float) -> float:
     return torque - load_torque(0.0, angle, 0.0)
 
 
-def undamped_torque(driving: float, friction: float, angle: float, angular_velocity: float) -> float:
-    """Net torque [N m] but for the viscous damping, which an implicit step finds with its end. Equation (1).
+def viscous_torque(viscous_damping: float, angular_velocity: float) -> float:
+    """Torque [N m] of viscous damping [N m s/rad] at an angular velocity [rad/s]: it is subtracted. Equation (1)."""
+    return viscous_damping * angular_velocity
+
+
+def net_torque(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
+    """Torque [N m] that is left to accelerate the joint: the right-hand side of equation (1), and its only home.
 
     ``driving`` [N m] is less what loads take at rest (``loaded``): what they take of a joint that moves is subtracted
-    here, and ``friction`` [N m], along the motion.
+    here, with ``friction`` [N m] and viscous ``damping`` [N m], along the motion; the latter is 0 for an implicit step,
+    which finds it with its end.
     """
     moving = load_torque(0.0, angle, angular_velocity) - load_torque(0.0, angle, 0.0)
-    return driving - friction - moving
-
-
-def net_torque(driving: float, friction: float, viscous_damping: float, angle: float, angular_velocity: float) -> float:
-    """Torque [N m] that is left to accelerate the joint: the right-hand side of equation (1), and its only home."""
-    return undamped_torque(driving, friction, angle, angular_velocity) - viscous_damping * angular_velocity
+    return driving - friction - moving - damping
 
 
 def vane_acceleration(
     driving: float, friction: float, viscous_damping: float, inertia: float, angle: float, angular_velocity: float
 ) -> float:
     """Angular acceleration [rad/s^2] of a joint that moves; arguments as ``net_torque`` has them. Equation (1)."""
-    return net_torque(driving, friction, viscous_damping, angle, angular_velocity) / inertia
+    damping = viscous_torque(viscous_damping, angular_velocity)
+    return net_torque(driving, friction, damping, angle, angular_velocity) / inertia
 
 
 def sliding_friction(angular_velocity: float, dynamic_torque: float) -> float:

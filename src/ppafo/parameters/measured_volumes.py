@@ -216,7 +216,7 @@ def _check_grid(angle: Floats, pressure: Floats, file: str) -> None:
     lines = Counter(zip(angle.tolist(), pressure.tolist(), strict=True))
     repeated = next((pair for pair, count in lines.items() if count > 1), None)
     if repeated is not None:
-        raise ParameterError(f"{file}: there is more than one line for {_point_text(*repeated)}")
+        raise ParameterError(f"{file}: has more than one line for {_point_text(*repeated)}; keep one of them")
     for pair in product(angles.tolist(), pressures.tolist()):
         if pair not in lines:
             raise ParameterError(f"{file}: there is no line for {_point_text(*pair)}; every angle needs every pressure")

@@ -148,7 +148,9 @@ class Channel:
         object.__setattr__(self, "values", _read_only(self.values))
         if self.between is not None and self.between not in BETWEEN:
             hint = nearest_name(str(self.between), BETWEEN)
-            raise DataError(f"a channel is {' or '.join(BETWEEN)} between its samples, not {self.between!r}{hint}")
+            raise DataError(
+                f"between = {self.between!r}: a channel is {' or '.join(BETWEEN)} between its samples{hint}"
+            )
 
     def __eq__(self, other: object) -> bool:
         return (

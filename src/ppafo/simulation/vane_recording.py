@@ -15,7 +15,7 @@ from ppafo.metrics import evaluate
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import PlainFunction
 from ppafo.model.gas import energy_per_content
-from ppafo.model.plant import gravity_torque, loaded, net_torque, sliding_friction
+from ppafo.model.plant import gravity_torque, loaded, net_torque, sliding_friction, viscous_torque
 from ppafo.model.ports import friction_in_motion
 from ppafo.model.regulator import LineState, line_pressures
 from ppafo.parameters.device import Gas
@@ -125,7 +125,8 @@ def net_torques(run: Run, rows: Mapping[str, Floats], torque: Floats) -> Floats:
     angle, rate = rows["state.angle"], rows["state.angular_velocity"]
     friction = over_samples(sliding_friction, rate, 1.0) * _friction_sizes(run, rows)
     driving = _with_effects(run, rows, loaded, torque, angle)
-    return np.asarray(_with_effects(run, rows, net_torque, driving, friction, run.plant.viscous_damping, angle, rate))
+    damping = over_samples(viscous_torque, run.plant.viscous_damping, rate)
+    return np.asarray(_with_effects(run, rows, net_torque, driving, friction, damping, angle, rate))
 
 
 def _friction_sizes(run: Run, rows: Mapping[str, Floats]) -> Any:

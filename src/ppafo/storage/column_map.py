@@ -158,7 +158,7 @@ def check_sources(columns: ColumnMap) -> None:
     for name, mapped in columns.channels.items():
         for key in () if name == TIME else _KEYS_OF_TIME:
             if getattr(mapped, key) is not None:
-                raise DataError(f"channels.{name}.{key} is a key of channels.{TIME} alone")
+                raise DataError(f"channels.{name}.{key} belongs to channels.{TIME}; omit it here")
         sources = [key for key in ("column", "constant", "rate") if getattr(mapped, key) is not None]
         if not sources:
             allowed = "column, constant or rate" if name == TIME else "column or constant"

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
@@ -33,10 +34,15 @@ _OTHERS = (
 _HEADER = re.compile(r"\s*(\w+)\s*\[\s*([^\[\]]+?)\s*\]\s*(\w*)\s*", re.ASCII)
 _LEVEL = "Pa_a"
 _ONLY_SIMULATED = "supplied_mass"
-_OWN_COLUMNS = (
-    "; other columns are read through a column map: validate --columns FILE.toml:NAME, or columns = 'NAME' in a "
-    "problem file of identify"
-)
+
+
+def _own_columns() -> str:
+    """Return the remedy for columns of another form."""
+    named = argument_text("columns", "FILE.toml:NAME")
+    return (
+        f"; other columns are read through a column map: validate {named}, or columns = 'NAME' in a problem file of "
+        "identify"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +81,7 @@ def parse_header(cells: list[str]) -> list[HeaderColumn]:
                 remedy = f": write '{cell.strip()} [{known.unit}]'"
             raise DataError(
                 f"the header must name columns as 'name [unit]', separated by commas; '{one_line(shown)}' is not one"
-                f"{remedy or (_OWN_COLUMNS if cell.strip() else '; does the line end with a comma?')}"
+                f"{remedy or (_own_columns() if cell.strip() else '; does the line end with a comma?')}"
             )
         name, unit, word = match[1], match[2], match[3]
         # Time itself does nothing between its samples.

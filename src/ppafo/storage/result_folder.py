@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
 from ppafo.arguments import Pressure, Word, checked
+from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_document, json_text
 from ppafo.documents.regular_file import read_regular_file
@@ -370,13 +371,14 @@ def _read_file(file: Path, atmosphere: float) -> Recording:
     if file.suffix.lower() == ".mat":
         raise DataError(
             f"{file}: is a .mat file, whose variables have no units: name them in a column map, "
-            "--columns FILE.toml:NAME"
+            f"{argument_text('columns', 'FILE.toml:NAME')}"
         )
     if not file.exists():
         raise DataError(f"{file}: no such file or folder")
     from ppafo.storage.frames import remedy_for
 
-    other = "; a table of text of another suffix is read through a column map, --columns FILE.toml:NAME"
+    named = argument_text("columns", "FILE.toml:NAME")
+    other = f"; a table of text of another suffix is read through a column map, {named}"
     raise DataError(
         f"{file}: is no .nc, .parquet or {', '.join(TEXT_SUFFIXES)} file and no result folder"
         f"{remedy_for(file) or other}"

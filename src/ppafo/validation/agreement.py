@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import Recording
@@ -33,7 +34,7 @@ from ppafo.validation.compared import (
     Thresholds,
     parse_thresholds,
 )
-from ppafo.validation.initial import INITIAL_REMEDIES
+from ppafo.validation.initial import initial_remedies
 from ppafo.validation.measured import MeasuredRecording, supply_gauge
 from ppafo.validation.replay import Motion, Replay, Replayed, replay_recording
 
@@ -264,8 +265,9 @@ def replay_of(measured: MeasuredRecording, device: Device, settings: ReplaySetti
         device, beside = with_fixed_volume(device, settings.volume)
         motion, initial = "locked", {**initial, **beside}
     if motion == "measured" and not measured.has(ANGLE):
-        raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe (--motion measured)")
-    start = start_of(measured.recording, device, initial, measured.file, INITIAL_REMEDIES)
+        prescribed = argument_text("motion", "measured")
+        raise DataError(f"{measured.file}: there is no channel '{ANGLE}' to prescribe ({prescribed})")
+    start = start_of(measured.recording, device, initial, measured.file, initial_remedies())
     return Replay(measured, device, start, motion, settings.longest_delay, settings.leg)
 
 

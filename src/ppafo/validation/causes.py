@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ppafo.arguments.door import argument_text
 from ppafo.errors import PpafoError
 from ppafo.linear_algebra import on_one_thread
 from ppafo.parameters.device import Device
@@ -288,7 +289,7 @@ def _motions(records: Sequence[Record], settings: ReplaySettings) -> list[Candid
     angles = [record.values[record.channels.index(ANGLE)] for record in records if ANGLE in record.channels]
     if not angles or any(float(np.std(angle)) >= _AT_REST for angle in angles):
         return []
-    words = "the vane seems to be locked, for its recorded angle rests (--motion locked)"
+    words = f"the vane seems to be locked, for its recorded angle rests ({argument_text('motion', 'locked')})"
     return [CandidateCause("motion", words, lambda _: ModelChange(motion="locked"))]
 
 

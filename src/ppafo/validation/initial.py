@@ -2,14 +2,18 @@
 
 from collections.abc import Sequence
 
+from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
 from ppafo.units import parse_quantity
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
 
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 _EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}
-INITIAL_REMEDIES = {name: f'give its initial value, --initial "{example}"' for name, example in _EXAMPLES.items()}
-"""Remedy for an initial channel of a replay that was not recorded."""
+
+
+def initial_remedies() -> dict[str, str]:
+    """Return the remedy for each initial channel of a replay that was not recorded."""
+    return {name: f"give its initial value, {argument_text('initial', example)}" for name, example in _EXAMPLES.items()}
 
 
 def parse_initial(texts: Sequence[str], atmosphere: float) -> dict[str, float]:

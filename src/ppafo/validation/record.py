@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.arguments.door import argument_text
 from ppafo.parameters.device import Device
 from ppafo.signals.faults import correlated_noise_of, isolated_samples
 from ppafo.signals.recording import Floats, Recording
@@ -165,7 +166,8 @@ class _Wrong(NamedTuple):
 def _wrong_samples(values: Floats, residuals: Floats, channel: ChannelAgreement, time: Floats) -> _Wrong | None:
     """Return samples of a channel that no sensor made: constant, clipped, or isolated among samples or residuals."""
     if np.ptp(values) == 0.0:
-        held = "the vane was locked (--motion locked), or " if channel.channel == ANGLE else ""
+        locked = argument_text("motion", "locked")
+        held = f"the vane was locked ({locked}), or " if channel.channel == ANGLE else ""
         words = f"never changes: {held}its sensor is dead or not connected"
         return _Wrong(words, np.ones(len(values), dtype=bool))
     clipped = _clipped_samples(values)

@@ -9,6 +9,8 @@ import pytest
 
 import ppafo
 from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
+from ppafo.arguments.door import argument_text
+from ppafo.cli.main import main
 from ppafo.errors import ArgumentError, StudyError
 
 TASK = "torque-task-proportional"
@@ -132,3 +134,16 @@ def test_what_is_taken_is_said_once_and_what_is_at_hand_with_it() -> None:
     )
     with pytest.raises(ArgumentError, match=r"; its '\.recording' is one$"):
         ppafo.evaluate(run)  # type: ignore[arg-type]
+
+
+def test_a_message_names_arguments_in_python_and_options_on_the_command_line(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with pytest.raises(
+        ppafo.ParameterError, match=r"^give either a recording or gas_per_stride, .* gas_per_stride='0.3 g'$"
+    ):
+        ppafo.bottle()
+    assert main(["bottle"]) == 2
+    assert "a recording or --gas-per-stride, for example --gas-per-stride '0.3 g'" in capsys.readouterr().err
+    # A command leaves nothing behind for a caller in Python.
+    assert argument_text("peak_flow") == "peak_flow"

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from ppafo import read_result
 from ppafo.cli.main import main
 from ppafo.loading import load_scenario
 from ppafo.report.recording_figure import figure_files, recording_figure
@@ -23,7 +24,6 @@ from ppafo.running import simulate
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, Status, compile_models
-from ppafo.storage import read_result
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.storage.result_folder import check_owned_folder, marked_folder, write_marked_folder

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from ppafo import read_result
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, read_regular_file
 from ppafo.documents.toml_text import TomlKind
 from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError
 from ppafo.parameters import load_parameter_set
 from ppafo.simulation.loading import load_scenario
-from ppafo.storage import read_csv, read_recording, read_result
+from ppafo.storage import read_csv, read_recording
 from ppafo.storage.netcdf_reading import read_netcdf
 from ppafo.storage.result_folder import read_json
 

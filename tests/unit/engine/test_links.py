@@ -5,6 +5,8 @@ from typing import Annotated, Any, NamedTuple
 
 import pytest
 
+from ppafo.engine import linking
+from ppafo.engine.generator import StepText
 from ppafo.engine.linking import link_effects, link_program
 from ppafo.engine.source_text import SourceCollector, composed_lines
 from ppafo.errors import ProgramError
@@ -185,3 +187,38 @@ def test_a_name_that_other_rows_have_is_refused() -> None:
     program = plan_run(load_scenario("step-response")).program
     with pytest.raises(ProgramError, match="other rows of a program have this name"):
         link_program(replace(program, effects=(replace(FIRST, name="valve", laws={}),)), SourceCollector(""))
+
+
+def sprung(driving: float, friction: float, damping: float, angle: float, angular_velocity: float) -> float:
+    """Equation (1) with a spring in it."""
+    return driving - friction - damping - 2.0 * (angle - 1.0)
+
+
+def test_a_spring_in_equation_1_is_refused_with_the_place_where_friction_knows_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    program = plan_run(load_scenario("step-response")).program
+    monkeypatch.setattr(linking, "net_torque", sprung)
+    with pytest.raises(
+        ProgramError, match=r"test_links\.py:\d+: net_torque takes 1 N m of a joint at rest.*load_torque"
+    ):
+        link_program(program, SourceCollector("@inline"))
+
+
+def sets_more(parts: Any, lane: Any) -> None:
+    """A group that no component has."""
+    lane.more = lane.state.angle
+
+
+def asks_for_more(parts: Any, lane: Any) -> None:
+    """A later phase."""
+    lane.before = lane.more
+
+
+def test_a_group_that_nobody_hands_on_is_refused_whatever_the_loop_is() -> None:
+    step = StepText(plan_run(load_scenario("step-response")).program, SourceCollector("@inline"))
+    step.phase(sets_more)
+    with pytest.raises(
+        ProgramError, match=r"test_links\.py:\d+: 'lane\.more', which .*test_links\.py:\d+ sets, lives in"
+    ):
+        step.phase(asks_for_more)

@@ -7,8 +7,11 @@ import pytest
 
 from ppafo.engine.groups import Role, filled
 from ppafo.engine.run import batch_of
+from ppafo.errors import ProgramError
+from ppafo.exports import c_library
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation, PreparedLane
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation, PreparedLane, start
 from ppafo.loading import load_scenario
 from ppafo.simulation.plan import plan_runs
 
@@ -47,3 +50,11 @@ def test_a_library_prepares_a_run_with_the_numbers_that_python_plans(name: str, 
         own = {group: getattr(lane, group) for group in rows if hasattr(lane, group)}
         np.testing.assert_array_equal(filled(rows, own, 1, role), numbers)
     assert counted(Preparation(scenario, program), lane, settings)[1] == planned.clock.step_count
+
+
+def test_a_number_that_no_function_prepares_is_named_with_its_group(monkeypatch: pytest.MonkeyPatch) -> None:
+    unstarted = tuple(function for function in VANE_PREPARATION if function is not start)
+    monkeypatch.setattr(c_library, "VANE_PREPARATION", unstarted)
+    said = r"preparation\.py:\d+: no function of preparation gives 'result', a LaneResult of the program"
+    with pytest.raises(ProgramError, match=said):
+        library_files(library_of(load_scenario("torque-task-proportional")))

@@ -528,7 +528,7 @@ def test_settings_that_make_no_sense_are_refused(
         (
             "[shank_angle]\nterms = ['s']\n[ankle_angle]\nterms = ['a']\npositive = 'dorsiflexion'\n"
             "[knee]\nforward = ['x']\nup = ['y']\nthigh_length = '0.4 m'\n",
-            "thigh_length and thigh_unit have no meaning without thigh",
+            "thigh_length and thigh_unit are given without thigh; omit them or give thigh",
         ),
         ("[shank_angle\n", "is not valid TOML"),
         ("[shank_angle]\nterm = ['s']\n", "unknown key 'shank_angle.term', did you mean 'terms'"),

@@ -90,7 +90,7 @@ def test_a_curve_is_a_cubic_where_the_volume_is_one(angles: int) -> None:
         ((HEADER, "1,2,\uff13"), "line 2: volume_1 = '\uff13' is not a finite number"),
         ((HEADER, *GOOD, "100,90,1e9"), "line 8: volume_1 = 1e+09 mL is beyond"),
         ((HEADER, *GOOD[:-1]), "there is no line for 100 deg and 50 kPa_g"),
-        ((HEADER, *GOOD, GOOD[0]), "there is more than one line for 20 deg and 0 kPa_g"),
+        ((HEADER, *GOOD, GOOD[0]), "has more than one line for 20 deg and 0 kPa_g; keep one"),
         ((HEADER, *(line.replace(",0,", ",10,") for line in GOOD)), "volumes at 0 kPa_g, vented, are needed too"),
         ((HEADER.replace(",", ";"), *GOOD), "separated by semicolons; commas are needed"),
         ((HEADER, *GOOD[:2]), "has one angle only"),

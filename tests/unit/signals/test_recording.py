@@ -180,5 +180,7 @@ def test_a_channel_that_declares_it_is_held_or_runs_straight_against_the_habit_o
 
 
 def test_a_channel_that_is_neither_held_nor_straight_is_refused_with_the_nearest_word() -> None:
-    with pytest.raises(DataError, match="hold or linear between its samples, not 'held', did you mean 'hold'"):
+    with pytest.raises(
+        DataError, match="between = 'held': a channel is hold or linear between its samples, did you mean 'hold'"
+    ):
         Channel([1.0, 2.0], "-", "held")  # type: ignore[arg-type]

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import ppafo
+from ppafo import read_result
 from ppafo.documents.json_text import plain
 from ppafo.errors import DataError
 from ppafo.metrics import Metric
 from ppafo.signals import Channel, Recording
 from ppafo.simulation.scenario import Scenario, scenario_document
 from ppafo.simulation.simulate import DeferredResult, Result, RunMetrics, Status
-from ppafo.storage import read_result
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def result(step_response: Scenario) -> Result:
 def test_a_result_is_shown_with_its_status_and_a_line_for_every_metric(result: Result) -> None:
     assert repr(result).splitlines() == [
         "Result of 'step-response', 0.5 s: completed",
-        "  angle_range  0.1 rad",
+        "  angle_range  5.73 deg",
         "  broken       inf N m",
     ]
     diverged = dataclasses.replace(result, status=Status("diverged", 0.05, "diverged at t = 0.05 s"))

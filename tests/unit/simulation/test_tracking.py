@@ -216,6 +216,24 @@ def test_a_bladder_that_nothing_pulls_back_is_said_to_push_one_way_only() -> Non
     assert "where the actuator gives 0 N m at most: it pushes one way only" in verdict.sentence
 
 
+@pytest.mark.long
+def test_a_bladder_whose_material_pulls_too_little_is_given_a_load_that_helps() -> None:
+    bladder = Path(__file__).parents[2] / "actuators" / "measured-bladder.toml"
+    scenario = load_scenario(
+        "cylinder-servo",
+        [
+            *(f"device.set={bladder}", "actuator.passive_stiffness=10 N m/rad", "friction.static_torque=3 N m"),
+            *("reference.kind=ramp_hold", "reference.start_level=60 deg", "reference.level=30 deg"),
+            *("reference.ramp_time=0.3 s", "motion.angle=60 deg"),
+        ],
+    )
+    verdict = simulate(scenario).tracking
+    assert verdict is not None
+    assert "it needs -3 N m at 30 deg" in verdict.sentence
+    assert "pushes one way only" not in verdict.sentence
+    assert verdict.remedies[0].numbers["motion.external_torque"] > 0.0
+
+
 @pytest.mark.parametrize(("frequency", "most"), [("0.5 Hz", 20.0), ("6 Hz", 60.0)])
 def test_a_command_may_turn_with_a_reference_that_turns_itself(frequency: str, most: float) -> None:
     changes = ["reference.kind=sine", "reference.amplitude=1 N m", "reference.level=2 N m", "run.duration=2 s"]

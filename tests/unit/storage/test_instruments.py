@@ -155,7 +155,7 @@ def test_a_txt_file_is_a_table_of_what_separates_its_columns(tmp_path: Path, mar
 
 @pytest.mark.parametrize("header", ["time (s),angle (deg)", "Time,Angle", "t_s,phi"])
 def test_a_header_of_ones_own_names_the_option(tmp_path: Path, header: str) -> None:
-    with pytest.raises(DataError, match=r"--columns FILE\.toml:NAME"):
+    with pytest.raises(DataError, match=r"columns='FILE\.toml:NAME'"):
         read_recording(written(tmp_path, "a.csv", f"{header}\n0,1\n1,2\n"))
 
 
@@ -302,7 +302,7 @@ def test_what_is_no_matlab_file_is_one_line(tmp_path: Path, content: bytes) -> N
 
 
 def test_a_matlab_file_without_a_map_says_what_it_needs(matlab: Path) -> None:
-    with pytest.raises(DataError, match="column map, --columns"):
+    with pytest.raises(DataError, match="column map, columns="):
         read_recording(matlab)
 
 

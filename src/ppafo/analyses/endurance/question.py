@@ -66,6 +66,7 @@ def bottle(
     from ppafo.analyses.endurance.gas_demand import demand_of_numbers, demand_of_recording
     from ppafo.analyses.endurance.solve import BETWEEN_RESTS, STRIDE_TIME, endurance_of_walk_gas, follow_bottle
     from ppafo.analyses.endurance.walk_gas import WALK_FILE, read_walk_gas, walk_gas
+    from ppafo.arguments.door import argument_text
     from ppafo.arguments.words import units_given
     from ppafo.errors import ParameterError
     from ppafo.parameters.bottles.bottle import PAPER_BOTTLE, load_bottle
@@ -78,10 +79,12 @@ def bottle(
 
     given = (recordings,) if isinstance(recordings, str | Path | Recording | WalkResult) else tuple(recordings)
     if bool(given) == (gas_per_stride is not None):
-        raise ParameterError("give either a recording or --gas-per-stride, for example --gas-per-stride '0.3 g'")
+        example = argument_text("gas_per_stride", "0.3 g")
+        raise ParameterError(f"give either a recording or {argument_text('gas_per_stride')}, for example {example}")
     if walk is not None and rest is None:
         raise ParameterError(
-            "--walk is the walking time between two rests: give --rest too, or --longest for the total time"
+            f"{argument_text('walk')} is the walking time between two rests: give {argument_text('rest')} too, or "
+            f"{argument_text('longest')} for the total time"
         )
     schedule = Schedule(BETWEEN_RESTS if walk is None else walk, rest or 0.0, longest)
     named, changed = PAPER_BOTTLE if bottle is None else bottle, tuple(overrides)
@@ -92,7 +95,10 @@ def bottle(
         emptied = follow_bottle(load_bottle(named, changed), draw, schedule)
         return finding_of(replace(emptied, device_units=units))
     if peak_flow is not None:
-        raise ParameterError("--peak-flow belongs to --gas-per-stride; a recording has its own largest flow")
+        raise ParameterError(
+            f"{argument_text('peak_flow')} belongs to {argument_text('gas_per_stride')}; a recording has its own "
+            "largest flow"
+        )
     uses: dict[str, str | Path | Recording | WalkResult] = {}
     for use in given:
         if any(use is other or (isinstance(use, str | Path) and str(use) == str(other)) for other in uses.values()):

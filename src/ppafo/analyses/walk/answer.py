@@ -17,6 +17,7 @@ from ppafo.analyses.walk.task_sequence import (
     task_sequence_pictures,
     trust_remark,
 )
+from ppafo.arguments.door import argument_text
 from ppafo.control.walking.assistance import PEAKS
 from ppafo.documents.json_text import plain
 from ppafo.metrics import Metric
@@ -249,7 +250,7 @@ def _remarks(comparison: WalkComparison) -> list[str]:
     worn, bare = comparison.with_device, comparison.without_device
     bottle = "" if worn.supply is None else bottle_remark(worn)
     if worn.supply is None and "gas" in worn.metrics and worn.metrics["gas"].value > 0.0:
-        walk_on_it = f"walk on it, --bottle {PAPER_BOTTLE}"
+        walk_on_it = f"walk on it, {argument_text('bottle', PAPER_BOTTLE)}"
         bottle = f"how long a bottle lasts: {walk_on_it}; here its supply pressure stays as it is set"
     remarks = (
         *person_remarks(worn.scenario),

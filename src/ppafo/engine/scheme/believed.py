@@ -6,11 +6,12 @@ Its settings say how far they are from the device's: by the dead volumes, and by
 from typing import Any
 
 from ppafo.control.walking.observer import NominalDevice, believed_volumes, mean_volumes
+from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import clamp_angle
 from ppafo.model.actuators.kind import ActuatorModel, Chambers
 from ppafo.model.actuators.vane import MODEL as VANE
-from ppafo.model.actuators.vane import chambers
-from ppafo.model.plant import PlantParameters
+from ppafo.model.binding import made_of
+from ppafo.model.plant import ActuatorFunctions, PlantParameters
 
 
 def as_believed(plant: PlantParameters, nominal: NominalDevice, filled: Chambers) -> tuple[float, float]:
@@ -24,17 +25,23 @@ def as_believed(plant: PlantParameters, nominal: NominalDevice, filled: Chambers
 
 
 def kind_volumes(
-    plant: PlantParameters, nominal: NominalDevice, angle: float, pressure_1: float, pressure_2: float
+    plant: PlantParameters,
+    nominal: NominalDevice,
+    angle: float,
+    pressure_1: float,
+    pressure_2: float,
+    *,
+    parts: ActuatorFunctions,
 ) -> tuple[float, float]:
     """Volumes of both chambers [m^3] at a measured angle [rad], not beyond the stops, and two readings [Pa]."""
-    return as_believed(plant, nominal, chambers(plant, clamp_angle(plant, angle), pressure_1, pressure_2))
+    return as_believed(plant, nominal, parts.chambers(plant, clamp_angle(plant, angle), pressure_1, pressure_2))
 
 
 def kind_mean_volumes(
-    plant: PlantParameters, nominal: NominalDevice, pressure_1: float, pressure_2: float
+    plant: PlantParameters, nominal: NominalDevice, pressure_1: float, pressure_2: float, *, parts: ActuatorFunctions
 ) -> tuple[float, float]:
     """Gas content per pressure [m^3] of both chambers in the middle of the range, at two readings [Pa]."""
-    middle = chambers(plant, 0.5 * (plant.angle_min + plant.angle_max), pressure_1, pressure_2)
+    middle = parts.chambers(plant, 0.5 * (plant.angle_min + plant.angle_max), pressure_1, pressure_2)
     volume_1, volume_2 = as_believed(plant, nominal, middle)
     # What an error of a pressure is in content: p V changes by V, and by what the chamber gives.
     return volume_1 + pressure_1 * middle.compliance_1, volume_2 + pressure_2 * middle.compliance_2
@@ -42,8 +49,14 @@ def kind_mean_volumes(
 
 def links_of_observer(actuator: ActuatorModel) -> dict[Any, Any]:
     """Replacements of an observer's functions; empty for the vane."""
-    return {} if actuator is VANE else {believed_volumes: kind_volumes, mean_volumes: kind_mean_volumes}
+    if actuator == VANE:
+        return {}
+    own = functions_of_actuator(actuator)
+    return {
+        believed_volumes: made_of(kind_volumes, "kind_volumes", own),
+        mean_volumes: made_of(kind_mean_volumes, "kind_mean_volumes", own),
+    }
 
 
-ASKED = {kind_volumes: ("plant",), kind_mean_volumes: ("plant",)}
+ASKED = ("plant",)
 """Rows of a program that these ask for beside the arguments of what they stand for."""

@@ -20,8 +20,8 @@ from ppafo.model.plant import (
     holds_still,
     loaded,
     net_torque,
-    undamped_torque,
     vane_acceleration,
+    viscous_torque,
 )
 from ppafo.model.ports import friction_at_rest, friction_in_motion, rebound
 
@@ -225,8 +225,9 @@ def depart(
     duration = step * (1.0 - departure.fraction) * (1.0 - waits)
     velocity = departure.angular_velocity
     per_inertia = 1.0 / plant.inertia
-    first = net_torque(start_torque, sliding, plant.viscous_damping, departure.angle, velocity) * per_inertia
-    undamped = undamped_torque(next_torque, sliding, departure.angle, velocity + duration * first)
+    damping = viscous_torque(plant.viscous_damping, velocity)
+    first = net_torque(start_torque, sliding, damping, departure.angle, velocity) * per_inertia
+    undamped = net_torque(next_torque, sliding, 0.0, departure.angle, velocity + duration * first)
     last = undamped * per_inertia
     next_rate = next_velocity(plant, velocity, first, undamped, duration)
     # Exact for an acceleration that runs linearly from first to last.
@@ -293,7 +294,7 @@ def slide_part(
     next_torque = driving_torque(plant, begun.next_angle, next_1, next_2, parts=parts) + added_torque
     next_rate = velocity + begun.acceleration * length
     friction = friction_now(plant, next_rate, next_1, next_2)
-    sliding_torque = undamped_torque(next_torque, way * friction.in_motion, begun.next_angle, next_rate)
+    sliding_torque = net_torque(next_torque, way * friction.in_motion, 0.0, begun.next_angle, next_rate)
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, length)
     slides = way != 0.0 and full_velocity * way > 0.0
     thrown_back = rebound_velocity(plant, full_velocity, next_torque)
@@ -359,7 +360,8 @@ def part_error(
 ) -> float:
     """Error of the angle [rad] at which a part ends over what is allowed [-]."""
     friction, rate = begun.way * slid.friction.in_motion, slid.angular_velocity
-    last = net_torque(slid.torque, friction, plant.viscous_damping, begun.next_angle, rate) * (1.0 / plant.inertia)
+    damping = viscous_torque(plant.viscous_damping, rate)
+    last = net_torque(slid.torque, friction, damping, begun.next_angle, rate) * (1.0 / plant.inertia)
     # A change of acceleration over the part bends the path by a sixth of it times the length squared.
     bent = abs(last - begun.acceleration) * length * length * SIXTH if begun.way != 0.0 else 0.0
     # The gas worked against a motion that did not happen: that is an error although the vane is where it is.
@@ -457,7 +459,7 @@ def end_free(
     next_torque = loaded(parts.torque(plant, predicted, next_1, next_2), predicted) + added_torque
     next_rate = velocity + begun.acceleration * step
     friction = friction_now(plant, next_rate, next_1, next_2)
-    sliding_torque = undamped_torque(next_torque, way * friction.in_motion, predicted, next_rate)
+    sliding_torque = net_torque(next_torque, way * friction.in_motion, 0.0, predicted, next_rate)
     full_velocity = next_velocity(plant, velocity, begun.acceleration, sliding_torque, step)
     # '&' and no branch: the step of a walk runs on all lanes.
     slides_through = (way != 0.0) & (full_velocity * way > 0.0) & (begun.free_angle == predicted)

@@ -22,7 +22,7 @@ from ppafo.model.gait import (
     GaitTiming,
 )
 from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, loaded, net_torque
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, loaded, net_torque, viscous_torque
 from ppafo.model.ports import friction_in_motion
 
 
@@ -214,7 +214,8 @@ def external_torque(
     driving = loaded(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
-    net = net_torque(driving, way * friction, share.viscous_damping, state.angle, speed)
+    damping = viscous_torque(share.viscous_damping, speed)
+    net = net_torque(driving, way * friction, damping, state.angle, speed)
     return needed if angle_is_free else net - share.inertia * led.acceleration
 
 

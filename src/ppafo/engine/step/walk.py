@@ -52,7 +52,7 @@ def groups(parts: Program) -> Groups:
     }
 
 
-ASKED: Mapping[Any, tuple[str, ...]] = believed.ASKED
+ASKED = believed.ASKED
 """Groups of rows that what stands in ``links`` takes before its own arguments."""
 
 

@@ -5,7 +5,10 @@ from collections.abc import Sequence
 
 from ppafo.engine.entries import indent, parse_expression
 from ppafo.engine.generator import StepText
-from ppafo.engine.source_text import SourceCollector
+from ppafo.engine.reduction import names_in
+from ppafo.engine.rows import leaf_paths
+from ppafo.engine.source_text import SourceCollector, place_of
+from ppafo.errors import ProgramError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS
 from ppafo.exports.c_library.files import ExportParameter, c_identifier
@@ -29,11 +32,24 @@ def prepare_entry(
         settings: settings of the library, in the order of their places
         collector: functions of the module
         boundary: interface between the entry and its callers
+
+    Raises:
+        ProgramError: a group of the program that no function sets
     """
     program = preparation.program
     *lines, counts = StepText(program, collector).joined(functions, preparation, ["settings"])
     assert isinstance(counts, ast.Return), "the last function gives the numbers of the steps"
     assert isinstance(counts.value, ast.Tuple), "as many as there are names"
+    # Task sequence and meters begin with the first sample.
+    later = {"course", *program.meter_groups}
+    states = {name: row for name, row in program.state_rows().items() if name not in later}
+    made = {name.id for line in lines for name in names_in(line) if isinstance(name.ctx, ast.Store)}
+    for name, row in (program.parameter_rows() | states).items():
+        if name not in made and leaf_paths(row, name):
+            last = place_of(functions[-1])
+            raise ProgramError(
+                f"{last}: no function of preparation gives '{name}', a {row.__name__} of the program"
+            )
     cells = {setting.name: boundary.cell("settings", place, setting.name) for place, setting in enumerate(settings)}
 
     class FromSettings(ast.NodeTransformer):
@@ -47,9 +63,7 @@ def prepare_entry(
         return ast.unparse(ast.fix_missing_locations(FromSettings().visit(node)))
 
     body = [*map(written, lines), *boundary.given("parameters", program.parameter_rows())]
-    # Task sequence and meters begin with the first sample.
-    later = {"course", *program.meter_groups}
-    body += boundary.given("states", {name: row for name, row in program.state_rows().items() if name not in later})
+    body += boundary.given("states", states)
     body += [
         f"{boundary.cell('counts', place, name)} = {written(number)}"
         for place, (name, number) in enumerate(zip(COUNTS, counts.value.elts, strict=True))

@@ -399,7 +399,7 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     if program.feed is not None:
         lane.line_state = lines_at_start(lane.plant, lane.lines)
     if any(kind.start is not None for kind in program.stated.values()):
-        lane["at_start"] = moment_at_start(lane.plant, lane.state)
+        lane["at_start"] = moment_at_start(lane.plant, lane.state, parts=program.functions)
     for name, kind in program.stated.items():
         if kind.start is None:
             lane[f"{name}_state"] = parts.constant(kind.row())

@@ -123,7 +123,7 @@ class KneeMap(StrictTable):
     @model_validator(mode="after")
     def _thigh_has_a_lean(self) -> "KneeMap":
         if self.thigh is None and (self.thigh_length is not None or self.thigh_unit is not None):
-            raise ValueError("thigh_length and thigh_unit have no meaning without thigh")
+            raise ValueError("thigh_length and thigh_unit are given without thigh; omit them or give thigh")
         return self
 
 

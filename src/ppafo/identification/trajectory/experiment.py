@@ -68,7 +68,7 @@ def check_experiment(experiment: FittedExperiment) -> None:
     """Refuse an experiment that cannot be fitted; the message begins with its label. It is an IdentificationError."""
     said, recording, inputs = f"experiment '{experiment.label}'", experiment.recording, experiment.inputs
     if len(recording) < 2:
-        raise IdentificationError(f"{said}: {recording.label} has only one sample")
+        raise IdentificationError(f"{said}: {recording.label} has only one sample; a fit needs two or more")
     for name in experiment.channels:
         if name not in FITTED_CHANNELS:
             raise IdentificationError(f"{said}: channel '{name}' cannot be fitted; {', '.join(FITTED_CHANNELS)} can")

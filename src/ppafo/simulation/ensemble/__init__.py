@@ -82,7 +82,7 @@ def run_ensemble(
         _check_channel(base, name)
     interval = every or base.run.output_interval
     if not interval > 0.0:
-        raise ScenarioError(f"{base.name}: traces need a time above 0 between two samples, not {interval:g} s")
+        raise ScenarioError(f"{base.name}: the interval of traces is {interval:g} s; it must be above 0 s")
     checked = check_columns(base, columns, gauge)
     plan = plan_ensemble(checked)
     times: Floats = np.empty(0)

@@ -74,8 +74,11 @@ def load_beyond_reach(case: Case) -> TrackingCause | None:
     needed = supply_for(device, wanted, 1.3 * needed_torque)
     changes: list[dict[str, float]] = [] if needed is None else [{supply: needed}]
     advice = ""
-    if abs(reach) <= ONE_WAY * max(abs(lowest), abs(highest)):
-        text, advice = f"{text}: it pushes one way only", "let a spring or a weight pull it back"
+    is_one_way = abs(reach) <= ONE_WAY * max(abs(lowest), abs(highest))
+    if is_one_way or (needed is None and not outside):
+        # What its material pulls back is too little, and no pressure gives more.
+        text = f"{text}: it pushes one way only" if is_one_way else text
+        advice = "let a spring or a weight pull it back"
         back = reach + (1.5 if not is_high else -1.5) * holding + _PULLED_BACK * (highest + lowest)
         changes.append({"motion.external_torque": back - (load - outside)})
     elif outside:

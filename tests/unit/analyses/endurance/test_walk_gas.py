@@ -213,7 +213,7 @@ def test_every_door_says_how_long_a_device_lasts_in_the_same_words(
 
 
 def test_a_time_between_rests_without_a_rest_is_refused() -> None:
-    with pytest.raises(ParameterError, match="--walk is the walking time between two rests: give --rest too"):
+    with pytest.raises(ParameterError, match=r"^walk is the walking time between two rests: give rest too, or longest"):
         endurance(gas_per_stride=3.0e-4, walk=60.0)
 
 

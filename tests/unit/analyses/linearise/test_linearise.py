@@ -178,7 +178,7 @@ def test_which_side_was_taken_is_said(steady: LinearModel) -> None:
     assert at_stop.edges == (SlopeKink("command", is_above=False),)
     assert "the column of `command` is valid below 1 only; its slope differs above it" in text_of(finding_of(at_stop))
     assert at_stop.b[:, 0].any(), "of a valve that is fully open the side is taken on which it closes"
-    deaf = linear(TASK, 0.1, ["valve.dead_band=0.5"])
+    deaf = linear(TASK, 0.1, ["valve.dead_band=0.5", "controller.dead_band=0"])
     assert "the command's column is 0" in deaf.sides["valve"]
     assert not deaf.b[:, 0].any()
     assert not finding_of(deaf).figures

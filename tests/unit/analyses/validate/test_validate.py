@@ -157,7 +157,7 @@ def test_the_verb_of_python_takes_what_the_command_takes(
         ([*SET, "step.csv", "--longest-delay", "soon"], "--longest-delay soon"),
         (
             ["validate", "ppafo2011", "step.csv"],
-            'above the supply of ppafo2011, 50 psi_g: record it, or give --set "supply',
+            "above the supply of ppafo2011, 50 psi_g: record it, or give --set 'supply",
         ),
         ([*SET, "step.csv", "broken.csv"], "broken.csv: line 2"),
     ],
