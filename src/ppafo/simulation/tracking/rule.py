@@ -137,7 +137,9 @@ def settled_walk(recording: Recording, limit: float) -> SettledPart | None:
     if not has_reference(recording):
         peak = float(np.max(np.abs(recording["torque"])))
         numbers: dict[str, Any] = dict.fromkeys(("duration", "error", "missing", "swing", "turns", "moved"), 0.0)
-        return SettledPart(slice(None), wanted=limit, peak=peak, rests=False, **numbers) if limit > 0.0 else None
+        return (
+            SettledPart(samples=slice(None), wanted=limit, peak=peak, rests=False, **numbers) if limit > 0.0 else None
+        )
     asked = asked_samples(recording)
     reference, value = (series[asked] for series in followed(recording))
     wanted = float(np.sqrt(np.mean(reference**2))) if reference.size else 0.0
@@ -280,7 +282,8 @@ def excess_of_task(settled: SettledPart, only_switches: bool) -> TaskExcess:
     is_counted = rests & (not only_switches)
     peak = np.where(is_counted, settled.peak / (LARGEST_PEAK * settled.wanted), 0.0)
     is_still = (share > LARGEST_SHARE) & (settled.moved <= SMALLEST_MOVE * settled.wanted)
-    return TaskExcess(off=off, swings=swings, peak=peak, still=np.where(is_still, share / LARGEST_SHARE, 0.0))
+    still = np.where(is_still, share / LARGEST_SHARE, 0.0)
+    return TaskExcess(off=off, swings=swings, peak=peak, still=still)
 
 
 def failure_of_task(settled: SettledPart, turning: float, only_switches: bool) -> Failure | None:
