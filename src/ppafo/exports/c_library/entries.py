@@ -47,9 +47,7 @@ def prepare_entry(
     for name, row in (program.parameter_rows() | states).items():
         if name not in made and leaf_paths(row, name):
             last = place_of(functions[-1])
-            raise ProgramError(
-                f"{last}: no function of preparation gives '{name}', a {row.__name__} of the program"
-            )
+            raise ProgramError(f"{last}: no function of preparation gives '{name}', a {row.__name__} of the program")
     cells = {setting.name: boundary.cell("settings", place, setting.name) for place, setting in enumerate(settings)}
 
     class FromSettings(ast.NodeTransformer):
