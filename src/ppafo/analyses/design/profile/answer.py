@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.analyses.design.looks import COLOURS, RING
 from ppafo.analyses.design.profile.problem import SizingProblem
 from ppafo.analyses.design.profile.search import LIMITS, Limit
 from ppafo.analyses.parts.sections import doubts_data, part_titles, parts_to_check
@@ -17,7 +16,7 @@ from ppafo.report import finding
 from ppafo.report.finding import Cell, Finding, columns_of
 from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel
-from ppafo.report.style import BLACK, GREY, REFERENCE
+from ppafo.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, REFERENCE, VERMILION
 from ppafo.signals import Recording
 from ppafo.signals.recording import Floats
 from ppafo.storage.comma_separated import marked_csv_bytes
@@ -26,6 +25,11 @@ from ppafo.version import __version__
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+_COLOURS = (BLUE, VERMILION, GREEN, ORANGE, "#CC79A7", "#56B4E9", BLACK, GREY)
+"""One colour for each valve."""
+_RING = {"linestyle": "", "marker": "o", "markersize": 9, "markerfacecolor": "none", "markeredgewidth": 1.4}
+"""Ring around the suggested device."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,12 +206,12 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
     errors, gases = [Mark("level", (), limit, colour=BLACK, style={"linewidth": 1.0, "linestyle": "--"})], []
     for number, sized in enumerate(sizing.valves):
         pressure, error, gas = sized.curve
-        keeps, colour = error <= limit, COLOURS[number % len(COLOURS)]
+        keeps, colour = error <= limit, _COLOURS[number % len(_COLOURS)]
         errors.append(Mark("line", pressure, error, (), sized.valve.title, colour, _DOTTED))
         gases.append(Mark("line", pressure[keeps], gas[keeps], colour=colour, style=_DOTTED))
         if sized.works:
-            errors.append(Mark("line", [sized.pressure], [sized.error], colour=colour, style=RING))
-            gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=RING))
+            errors.append(Mark("line", [sized.pressure], [sized.error], colour=colour, style=_RING))
+            gases.append(Mark("line", [sized.pressure], [sized.gas], colour=colour, style=_RING))
 
     torque_kind = replace(_TORQUE, words="RMS error")
     highest = float(torque_kind.values(_MAXIMUM_OF_LIMIT * limit))
@@ -350,7 +354,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
     recording, choice = sizing.recording, sizing.choice
     if recording is not None and choice is not None:
         label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
-        colour = COLOURS[sizing.valves.index(choice) % len(COLOURS)]
+        colour = _COLOURS[sizing.valves.index(choice) % len(_COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
     return [Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
 
