@@ -11,8 +11,9 @@ CEILING = {"definitions": 6652, "code": 47380, "public": 74, "splinters": 23}
 """Functions and classes; lines of code; public names; short files with a single importer.
 
 Raised from 6,461 definitions and 45,170 lines by the verdict on what follows its reference, the angle law, loads,
-suction, forms of motion capture, figures for print and a meter of the settled part; CasADi's translator, the multi-objective search, the old names, tables of units
-shown, program text in quotes and the execution of composed text by Python left for them."""
+suction, forms of motion capture, figures for print and a meter of the settled part. CasADi's translator, the
+multi-objective search, the old names, tables of units shown, program text in quotes and the execution of composed text
+by Python left for them."""
 SHORT = 80
 """Lines below which a file with a single importer is a splinter."""
 

@@ -86,7 +86,7 @@ def test_a_spool_with_play_is_the_one_of_the_rig_and_lags_on_the_way_back() -> N
 
 @pytest.mark.parametrize(("text", "name"), [(PLAY[0], "spool_play"), ("effects.ice.blockage_per_gas=100 1/kg", "ice")])
 def test_a_linear_model_refuses_an_effect_with_a_state_in_one_line(text: str, name: str) -> None:
-    with pytest.raises(SimulationError, match=f"effect '{name}' has a state of its own.*switch it off"):
+    with pytest.raises(SimulationError, match=f"effect '{name}' has state variables, .*switch the effect off"):
         linearise("torque-task-proportional", at=0.2, overrides=("run.duration=0.3 s", text))
 
 

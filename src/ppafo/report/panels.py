@@ -1,5 +1,6 @@
 """Panels of a figure, as data, and drawn: what the shapes of marks look like; Matplotlib lays them out itself."""
 
+import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -68,6 +69,8 @@ _DASHED_SHAPES = ("line", "bars")
 """Shapes that have the dashes of their colours beside others."""
 _TITLE_SIZE, _SMALLEST_TITLE = 11.0, 0.72
 """Points of a title, and the fraction of them that it has at least."""
+_MARKUP = re.compile(r"\\[a-z]+|[${}_^]")
+"""Characters of a formula in a title that are not letters on the page."""
 _TITLE_LINE = 0.2
 """Inches of a line of the title."""
 _OF_LEGEND: Mapping[str, Any] = {
@@ -246,8 +249,8 @@ def _draw(axes: "Axes", panel: Panel, size: tuple[float, float]) -> Any:
         elif panel.legend == "inside":
             axes.legend(loc="best", frameon=True, framealpha=0.85, edgecolor="none", handlelength=2.2)
     # A long title is smaller before it is cut off at the next panel.
-    room = _LETTERS * (size[0] - _AXIS_ROOM)
-    axes.set_title(title, pad=pad, fontsize=_TITLE_SIZE * min(1.0, max(_SMALLEST_TITLE, room / max(1, len(title)))))
+    room, letters = _LETTERS * (size[0] - _AXIS_ROOM), len(_MARKUP.sub("", title))
+    axes.set_title(title, pad=pad, fontsize=_TITLE_SIZE * min(1.0, max(_SMALLEST_TITLE, room / max(1, letters))))
     # Last, so that it can undo what Matplotlib chose.
     if panel.then is not None:
         panel.then(axes)

@@ -343,7 +343,7 @@ def test_the_unit_holds_sources_that_build_it_without_a_warning(unit: str, tmp_p
 def test_what_nobody_has_run_is_asked_for_by_name_and_marked() -> None:
     with pytest.raises(ScenarioError, match="did you mean 'linux64'"):
         functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux46"])
-    with pytest.raises(ScenarioError, match="no name in FMI 2"):
+    with pytest.raises(ScenarioError, match="is not defined in FMI 2"):
         functional_unit(closed_loop(load_scenario("step-response")), 2, ["linux-aarch64"])
 
 

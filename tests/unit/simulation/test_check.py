@@ -110,7 +110,7 @@ def test_a_chaotic_loop_is_found_with_the_time_at_which_its_runs_part(chaotic: C
     assert chaotic.parts_at is not None
     assert 0.0 < chaotic.parts_at < 0.6
     assert chaotic.sentence.startswith("Numerically sensitive: rms_error")
-    assert f"part at t = {chaotic.parts_at:.4g} s" in chaotic.sentence
+    assert f"separate at t = {chaotic.parts_at:.4g} s" in chaotic.sentence
 
 
 def test_the_same_kind_of_loop_with_another_sensor_and_a_fine_step_is_determined() -> None:

@@ -223,7 +223,7 @@ def test_the_reach_of_a_suction_device_is_the_one_of_a_pressure_device_turned_ro
     [
         (
             ("supply.pressure=-60 kPa_g", "supply.dorsiflexion_pressure=60 kPa_g"),
-            "the other supply is above it, and both must be on one side",
+            "the other supply is above it, and both must be on the same side",
         ),
         ((*SUCTION, "supply.relieving=false"), "set it to true or leave it out"),
         ((*SUCTION, "controller.kind=pid_feedforward"), "take one of on_off, on_off_dead_zone, pid,"),

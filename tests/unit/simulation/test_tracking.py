@@ -133,6 +133,10 @@ def test_a_walk_with_an_actuator_that_pushes_one_way_is_told_to_ask_for_no_dorsi
 def test_a_run_that_ends_on_its_ramp_is_not_judged_by_its_lag() -> None:
     assert simulate(TASK, ["run.duration=0.3 s"]).tracking is None
     assert simulate(TASK, ["reference.level=4 N m"]).tracking is None
+    # Nor where what lies beyond reach is asked for after the end only.
+    base = load_scenario(TASK, ["run.duration=0.3 s"])
+    columns = {"supply.pressure": np.array([3.0e5, 4.0e5])}
+    assert (follows(run_ensemble(base, columns, with_companions([], base)).metrics, base, columns) == 1.0).all()
 
 
 @pytest.mark.parametrize(

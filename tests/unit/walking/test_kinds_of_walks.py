@@ -39,5 +39,5 @@ def test_a_kind_that_is_not_there_is_refused_with_those_that_are() -> None:
 
 
 def test_the_motion_of_a_vane_is_none_of_a_walk() -> None:
-    with pytest.raises(ScenarioError, match="this is the file of a walk"):
+    with pytest.raises(ScenarioError, match="a walk file needs the motion 'walk'"):
         load_walk("proportional", ["motion.kind=free"])

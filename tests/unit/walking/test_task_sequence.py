@@ -84,7 +84,7 @@ def test_a_cadence_beyond_the_speeds_of_a_task_sequence_is_refused(tmp_path: Pat
 
 def test_more_segments_than_a_task_sequence_has_room_for_are_refused(tmp_path: Path) -> None:
     sequence = sequence_of(tmp_path, *([STAND, WALK] * 20))
-    with pytest.raises(ScenarioError, match="32 is the most"):
+    with pytest.raises(ScenarioError, match="32 are allowed"):
         planned_task_sequence(sequence, GAIT)
 
 

@@ -124,7 +124,7 @@ def test_a_misspelt_motion_is_told_of_walks_too(tmp_path: Path) -> None:
 
 def test_a_walk_takes_its_own_motion_and_names_the_kinds_that_exist(tmp_path: Path) -> None:
     assert load_walk(NAME, ["motion.kind=walk"]).controller == load_walk(NAME).controller
-    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': this is the file of a walk"):
+    with pytest.raises(ScenarioError, match=r"override 'motion\.kind=free': a walk file needs the motion 'walk'"):
         load_walk(NAME, ["motion.kind=free"])
     misspelt = written(tmp_path, (text_of(NAME) + MOTION).replace('"walk"', '"wlak"'))
     with pytest.raises(

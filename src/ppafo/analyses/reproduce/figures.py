@@ -110,7 +110,7 @@ def _measurement(times: Floats, values: Floats) -> list[Mark]:
     """Return a measurement over times [ms] as a line, with the band of its readings."""
     first = np.flatnonzero(np.diff(np.floor(times / _BIN), prepend=-np.inf) > 0.0)
     ends = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
-    thin = {"linewidth": 0.8, "zorder": 2}
+    thin = {"linestyle": "-", "linewidth": 0.8, "zorder": 2}
     return [
         Mark("line", times, values, label="synthetic measurement", colour=EXPERIMENT.colour, style=thin),
         Mark("band", times[first] + 0.5 * _BIN, ends, colour=EXPERIMENT.colour, style={"alpha": 0.3, "zorder": 1}),
@@ -212,7 +212,7 @@ def _torque_marks(recording: Recording, look: DrawingStyle, ceiling: float, synt
     if synthetic is not None:
         named: dict[str, Any] = {"label": "torque, synthetic experiment", "colour": EXPERIMENT.colour}
         # Broader than what is simulated and darker than the grid: seen where both agree, too.
-        broad = {"linewidth": 4.5, "alpha": 0.75}
+        broad = {"linestyle": "-", "linewidth": 4.5, "alpha": 0.75}
         marks.insert(2, Mark("line", synthetic.time, synthetic["torque"], style=broad, **named))
     return marks
 

@@ -109,7 +109,7 @@ def _estimate(fitted: Fit, reported: ReportedNumber, origin: tuple[str, ...]) ->
     return Estimate(reported.path, value, reported.unit, low, high, verdict, sentence, origin, fitted.confidence)
 
 
-_SIZE = (3.1, 2.7)
+_SIZE = (4.1, 3.3)
 
 
 def bench_figure(panels: Sequence[Panel], kind: RecordingKind) -> "Figure":

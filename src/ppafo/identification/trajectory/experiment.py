@@ -9,6 +9,7 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.source import UsedRecording
+from ppafo.parameters.graph import outside
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.channels import (
     ANGLE,
@@ -130,7 +131,9 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
         # Nobody measures for a controller that nobody asks.
-        scenario = replace(scenario, controller=replay_control(recording), sensors=Sensors())
+        # The settings of the law that leaves follow nothing any more.
+        links = outside(scenario.links, "controller", "timing")
+        scenario = replace(scenario, controller=replay_control(recording), sensors=Sensors(), links=links)
     said = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes the vane's.

@@ -67,7 +67,9 @@ def tracking_excess(scenario: Scenario, metrics: Mapping[str, Floats], most_reve
         law = scenario.law
         found = excess_of_task(settled, law is not None and law.only_switches)
         # A pair swings so far by design that the mean error tells more of a torque beyond reach than the RMS does.
-        missing = np.where(shortfall(scenario) > 0.0, np.abs(settled.missing) / (LARGEST_SHARE * settled.wanted), 0.0)
+        # On the ramp every loop is behind, and what lies beyond reach may not have been asked for yet.
+        is_short = (shortfall(scenario) > 0.0) & ~np.asarray(settled.ends_on_ramp)
+        missing = np.where(is_short, np.abs(settled.missing) / (LARGEST_SHARE * settled.wanted), 0.0)
     known = np.isfinite(numbers["settled_error"])
     return np.where(known, np.max([turning, *found, missing], axis=0), np.nan)
 
