@@ -40,8 +40,9 @@ def words_of(path: str, value: float) -> str:
 
 
 def rule_in(said: str) -> str:
-    """What a message says must be, without the numbers, whose unit is that of the file."""
-    return re.sub(r"= .*", "", "must" + said.partition("must")[2])
+    """What a message says must be, without the numbers: a unit that is given is that in which they are shown."""
+    rule = re.sub(r"= .*", "", "must" + said.partition("must")[2])
+    return re.sub(r"-?[\d.]+(e[-+]?\d+)? [^\s,]+", "(number)", rule)
 
 
 @refused
