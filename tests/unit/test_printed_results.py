@@ -14,13 +14,13 @@ FEWEST_ANALYSES = 14
 
 @pytest.mark.parametrize("name", ["step-response", "torque-task-solenoid"])
 def test_a_printed_run_is_what_its_command_prints(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     assert main(["simulate", name, "--out", str(tmp_path / "run")]) == 0
     result = ppafo.simulate(name)
     printed = capsys.readouterr()
     # The command tells of coarse valves before the run, beside its output.
-    lines = "\n".join(line for line in str(result).splitlines() if not line or line not in printed.err)
+    lines = "\n".join(line for line in str(result).splitlines() if not line or line not in caplog.text)
     assert printed.out.startswith(f"{lines}\n\n{result.error().sentence}\n\nwritten: ")
 
 

@@ -175,9 +175,7 @@ def test_an_object_without_update_is_no_controller() -> None:
 
 
 def test_a_class_in_the_place_of_an_object_is_refused_with_the_remedy() -> None:
-    with pytest.raises(
-        ScenarioError, match=r"Relay is a class; give an instance of it, as in controlled_by\(Relay\(\)\)"
-    ):
+    with pytest.raises(ScenarioError, match=r"Relay is a class; give an instance, as in controlled_by\(Relay\(\)\)"):
         small().controlled_by(Relay)  # type: ignore[arg-type]
 
 

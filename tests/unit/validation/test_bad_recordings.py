@@ -65,7 +65,7 @@ def written(folder: Path, *lines: str) -> Path:
         ([HEADER, *(ROWS[0].replace("0.000", f"{0.001 * n:.3f}") for n in range(60))], ["nothing happens in it"]),
         ([HEADER.replace("psi_g", "psi_a"), *ROWS], ["'pressure_1' is 0 Pa absolute", "gauge"]),
         ([HEADER, ROWS[0], ROWS[1].replace("21", "1e9"), *ROWS[2:]], ["'angle' is", "(sample 2), more than 20 times"]),
-        ([HEADER.replace("psi_g", "bar_g"), *ROWS], ["above the supply", "--set"]),
+        ([HEADER.replace("psi_g", "bar_g"), *ROWS], ["above the supply", "overrides="]),
     ],
     ids=[
         "psi without gauge",
