@@ -228,7 +228,7 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
             torque_kind,
             errors,
             "RMS error, limit dashed",
-            legend="inside",
+            legend="figure",
             then=lambda axes: axes.set_ylim(0.0, highest),
         ),
         Panel(_PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
