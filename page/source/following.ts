@@ -77,7 +77,7 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "clock.step_unless_given": (duration = 0, period = 0) => stepUnlessGiven(duration, period),
   "clock.step_with_output": (duration = 0, period = 0, output = 0) => Math.min(stepUnlessGiven(duration, period), output),
   "clock.output_unless_given": (duration = 0, period = 0, step = 0) => duration / Math.max(1, nearestWhole(duration / dividingStep(period, step))),
-  "walk.record_interval": (seconds = 0) => (seconds <= 61 ? 1e-3 : seconds <= 601 ? 5e-3 : 2e-2),
+  "motion.record_interval": (seconds = 0) => (seconds <= 61 ? 1e-3 : seconds <= 601 ? 5e-3 : 2e-2),
   "loading.lag_of_bandwidth": (bandwidth = 0) => lagOfBandwidth(bandwidth),
   "solenoid.lag": (_opening = 0, closing = 0, interval = 0) => closing + interval,
   "solenoid.no_dead_time": () => 0,
@@ -94,6 +94,15 @@ const RULES: Readonly<Record<string, (...given: number[]) => number>> = {
   "nominal.no": () => 0,
   "proportional.dead_time": (_band = 0, delay = 0) => delay,
   "torque_loop.learning_gain": (proportional = 0) => 0.5 * proportional,
+  "wearer.shank_length_of": (stature = 0) => 0.246 * stature,
+  "wearer.shank_mass_centre_of": (stature = 0) => 0.10642173913043478 * stature,
+  "wearer.foot_mass_centre_of": (stature = 0) => 0.048130434782608686 * stature,
+  "wearer.heel_lever_of": (stature = 0) => 0.02673913043478261 * stature,
+  "wearer.toe_lever_of": (stature = 0) => 0.09626086956521737 * stature,
+  "wearer.shank_mass_of": (_stature = 0, mass = 0) => 0.06206896551724138 * mass,
+  "wearer.foot_mass_of": (_stature = 0, mass = 0) => 0.013793103448275862 * mass,
+  "wearer.shank_inertia_of": (stature = 0, mass = 0) => 0.0003944723290528648 * mass * stature * stature,
+  "wearer.foot_inertia_of": (stature = 0, mass = 0) => 3.944723290528648e-6 * mass * stature * stature,
 };
 
 const RIGHT_ANGLE = 1.5707963267948966;
@@ -167,6 +176,8 @@ function numberOfLoop(rule: string, sources: readonly string[], valueOf: (key: s
 export interface Made {
   readonly terms: readonly { readonly rule: string; readonly sources: readonly string[] }[];
   readonly gap: number;
+  /** Only once its first source is given itself. */
+  readonly when_set: boolean;
 }
 
 /** What a setting is made to by others; null for a rule that the page does not know: then it stays as it is. */

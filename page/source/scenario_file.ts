@@ -1,6 +1,7 @@
 /** A configuration as a scenario file that `ppafo simulate` runs to the same bits. */
 
 import { type Content, type Json, programNamed, type Setting, type Table } from "./content";
+import { madeOf } from "./following";
 import { type Configuration, normalText, valuesOf } from "./settings";
 
 const SI_PRESSURE = "Pa_a";
@@ -33,7 +34,10 @@ function writtenTexts(content: Content, configuration: Configuration): [Setting,
   const values = valuesOf(content, configuration);
   const isLevelChanged = program.settings.some(({ key, unit, value }) => unit === SI_PRESSURE && values.get(key) !== value);
   // What nobody gave a controller of walks may come from other settings: all of it is written, so that nothing moves.
-  const isPinned = ({ key, origin }: Setting) => program.kind === "walk" && origin === "default" && key.startsWith("controller.");
+  const isOfWalk = ({ key, origin }: Setting) => program.kind === "walk" && origin === "default" && key.startsWith("controller.");
+  // By a rule that the page does not know a setting stays as it is here, and would follow in Python.
+  const isUnknown = ({ made }: Setting) => made !== null && madeOf(made, (key) => values.get(key) ?? NaN) === null;
+  const isPinned = (setting: Setting) => isOfWalk(setting) || isUnknown(setting);
   const found: [Setting, string][] = [];
   for (const setting of program.settings) {
     if (program.kind === "walk" && NOT_OF_WALKS.includes(setting.key)) continue;

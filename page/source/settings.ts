@@ -77,6 +77,8 @@ export function madeFrom(program: Program, { changes }: Configuration, values: V
   const found = new Map<string, number>();
   for (const { key, made } of program.settings) {
     if (made === null || changes[key] !== undefined) continue;
+    const source = made.terms[0]?.sources[0] ?? "";
+    if (made.when_set && changes[source] === undefined && values.get(source) === firstOf(program, source)) continue;
     const value = madeOf(made, (source) => found.get(source) ?? values.get(source) ?? NaN);
     if (value !== null) found.set(key, value);
   }

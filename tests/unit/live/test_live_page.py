@@ -20,7 +20,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.units import parse_quantity
 from ppafo.walking import list_walks, load_walk
 from scripts.known_intervals import known_intervals as intervals_of_study
-from scripts.live_page import check_bits, check_damage, check_refusals, missing, opened, programs_by_tab
+from scripts.live_page import check_bits, check_damage, check_refusals, differences, missing, opened, programs_by_tab
 from scripts.page_states import address_of
 
 MOST_BYTES = 250_000
@@ -458,3 +458,15 @@ def test_the_bundle_is_what_its_sources_make(tmp_path: Path) -> None:
 def test_the_vendored_library_has_its_licence() -> None:
     assert "Leon Sorokin" in (SOURCES / "vendor" / "uplot" / "LICENSE").read_text(encoding="utf-8")
     assert "Leon Sorokin" in pages.bundled("page.js")
+
+
+@has_browser
+def test_what_follows_on_the_page_and_what_stays_is_what_its_file_gives_python(chromium: Any, tmp_path: Path) -> None:
+    """Segments follow a stature once it is given; gains of an angle, whose rules the page does not know, stay."""
+    file = tmp_path / "page.html"
+    file.write_bytes(workbench(["swing-foot-angle", "solenoid"]))
+    page = opened(chromium, file)
+    changes = {"swing-foot-angle": {"supply.pressure": "4 bar_g"}, "solenoid": {"wearer.stature": "1.5 m"}}
+    for tab, program in programs_by_tab(page):
+        given = {"run.duration": "0.5 s" if program["kind"] == "scenario" else "7 s", **changes[program["name"]]}
+        assert differences(page, tab, program, given, tmp_path) == ""

@@ -47,7 +47,7 @@ What a page must know of a module: settings with range, unit and origin, channel
                    "display": {"unit": "mm^2", "factor": 1e-06, "zero": 0.0}, "description": ..., "origin": "published",
                    "source": ..., "note": ..., "half_width": 95 % interval in SI or null,
                    "follows": key or null,
-                   "made": {"terms": [{"rule": ..., "sources": [keys]}], "gap": ...} or null,
+                   "made": {"terms": [{"rule": ..., "sources": [keys]}], "gap": ..., "when_set": false} or null,
                    "kept": "zero", "above zero" or null}, ...],
      "channels": [{"name": "time", "unit": "s", "display": {...}, "description": ...}, ...],
      "metrics": [{"name": ..., "unit": ..., "display": {...}, "description": ...}, ...],
@@ -131,6 +131,7 @@ def description_of(scenario: Scenario, library: Library) -> dict[str, Any]:
                 for term in links[0].terms
             ],
             "gap": links[0].gap,
+            "when_set": links[0].when_set,
         }
         for path, links in library.links.items()
         if any(term.function is not itself for term in links[0].terms)
