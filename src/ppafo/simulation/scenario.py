@@ -418,9 +418,11 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
-        # The settings of the law that leaves follow nothing any more.
-        links = outside(self.links, "controller", "timing")
-        return replace(self, controller=Control(PYTHON_CONTROLLER, {}, self.controller.period, controller), links=links)
+        return self.with_control(Control(PYTHON_CONTROLLER, {}, self.controller.period, controller))
+
+    def with_control(self, control: Control) -> "Scenario":
+        """Return the scenario with another control; settings of the previous law no longer follow other numbers."""
+        return replace(self, controller=control, links=outside(self.links, "controller", "timing"))
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:

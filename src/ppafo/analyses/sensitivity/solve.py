@@ -114,8 +114,7 @@ def analyse(
 ) -> Influences:
     """Return the indices of the metrics; StudyError for bad settings, dependent values or too many failures.
 
-    ``scenario`` is whose runs they are, None for a model, and ``metrics`` those of the runs that are asked for, () for
-    all.
+    ``scenario`` is the scenario of the runs, None for a model; ``metrics`` are the metrics to analyse, () for all.
     """
     if uncertainty.scores is not None and not method.takes_dependent:
         raise StudyError(

@@ -88,7 +88,7 @@ def judge(runs: CandidateMetrics, problem: Problem, scales: Mapping[str, float])
         beyond = reached - constraint.limit if constraint.is_most else constraint.limit - reached
         # As a fraction of the limit, so that constraints in different units add up; a limit of 0 has no fractions.
         violation += np.maximum(0.0, beyond) / (abs(constraint.limit) or 1.0)
-    # A loop that does not follow its reference breaks a constraint that nobody has to write.
+    # A loop that does not follow its reference violates a constraint that holds in every tuning.
     off = np.maximum(0.0, bad_ends(runs.off, spread, True))
     return _CandidateScores(objective=objective, violation=violation, off=off, without_value=failing)
 

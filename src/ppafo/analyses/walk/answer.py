@@ -72,7 +72,7 @@ def safety_remarks(worn: WalkResult) -> list[str]:
     cut = [f"controller.{name} = {_TORQUE.text(settings[name])}" for name in PEAKS if settings.get(name, 0.0) > limit]
     if cut:
         shown = _TORQUE.text(limit)
-        # A limit that nobody gave is what the device can do.
+        # The default limit is the largest torque of the device.
         is_given = "controller.largest_torque" not in scenario.links
         advice = "raise that too" if is_given else "the actuator gives no more at this supply"
         remarks.append(f"{', '.join(cut)}: the request is limited by controller.largest_torque = {shown}; {advice}")

@@ -85,15 +85,11 @@ def run_at(
                 f"give --set controller.rate={rate}Hz here and to 'ppafo export controller'"
             )
         say(f"calling the controller at {port_name} ...")
-        pace: Callable[[float], LoopPacing] = _lock_step if in_lock_step else RealTime
+        # In lock step the pace waits for each answer, whatever the sample period is.
+        pace: Callable[[float], LoopPacing] = (lambda _: LockStep()) if in_lock_step else RealTime
         return run_plant(plant, port, pace, patience, is_stopped)
     finally:
         port.close()
-
-
-def _lock_step(_period: float) -> LoopPacing:
-    """The pace that waits for each answer, whatever the sample period is."""
-    return LockStep()
 
 
 def load_now() -> float | None:

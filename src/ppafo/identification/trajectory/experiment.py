@@ -9,7 +9,6 @@ import numpy as np
 
 from ppafo.errors import IdentificationError, nearest_name
 from ppafo.identification.source import UsedRecording
-from ppafo.parameters.graph import outside
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.channels import (
     ANGLE,
@@ -130,10 +129,8 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
     if {SUPPLY, DORSIFLEXION_SUPPLY} & set(experiment.inputs):
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
-        # Nobody measures for a controller that nobody asks.
-        # The settings of the law that leaves follow nothing any more.
-        links = outside(scenario.links, "controller", "timing")
-        scenario = replace(scenario, controller=replay_control(recording), sensors=Sensors(), links=links)
+        # A recorded command needs no sensors.
+        scenario = replace(scenario.with_control(replay_control(recording)), sensors=Sensors())
     said = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes the vane's.

@@ -46,7 +46,8 @@ def size_for_wearer(
     """Return the lightest device that meets the requirements, or the alternatives; ``catalogue`` is a name or a file.
 
     ``bottle``, a name or a file, takes the place of those of the catalogue; the device is fed with its gas. ``report``
-    is told of each walk. Raises StudyError for impossible requirements, ParameterError for a bad catalogue or bottle.
+    receives a line for each walk. Raises StudyError for impossible requirements, ParameterError for a bad catalogue or
+    bottle.
     """
     check_requirements(requirements)
     shelf, walking = shelf_of(catalogue), load_walk(next(iter(WALKS.values())), of_wearer(requirements))
