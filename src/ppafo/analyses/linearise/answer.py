@@ -91,8 +91,7 @@ def _value_at_point(model: LinearModel, name: str) -> float:
 def _torque(model: LinearModel, command: float) -> Floats:
     """Torque [N m] (times,) of a run that begins in the steady state, under another constant command [-]."""
     scenario = replace(
-        model.scenario,
-        controller=Control(PYTHON_CONTROLLER, {}, INTERVAL),
+        model.scenario.with_control(Control(PYTHON_CONTROLLER, {}, INTERVAL)),
         run=replace(model.scenario.run, duration=DURATION, step=INTERVAL, output_interval=INTERVAL),
         initial=Initial(_value_at_point(model, "pressure_1"), _value_at_point(model, "pressure_2")),
     )

@@ -38,10 +38,9 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
         )
     period = 1.0 / rate
     chosen = replace(
-        scenario,
+        scenario.with_control(Control(PYTHON_CONTROLLER, {}, period)),
         # No step may be longer than a sample: a command acts from its sample on.
         run=replace(scenario.run, step=min(scenario.run.step, period)),
-        controller=Control(PYTHON_CONTROLLER, {}, period),
     )
     run = plan_run(chosen)
     # A controller at the wire may vent both chambers.
