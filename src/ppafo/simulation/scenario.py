@@ -418,11 +418,7 @@ class Scenario:
                     f"{self.name}: a controller of type {kind} has no method '{method}'; it needs 'reset()' and "
                     f"'update(time, reference, measurement)', the latter returning a command from -1 to 1"
                 )
-        return self.with_control(Control(PYTHON_CONTROLLER, {}, self.controller.period, controller))
-
-    def with_control(self, control: Control) -> "Scenario":
-        """Return the scenario with another control; settings of the previous law no longer follow other numbers."""
-        return replace(self, controller=control, links=outside(self.links, "controller", "timing"))
+        return with_control(self, Control(PYTHON_CONTROLLER, {}, self.controller.period, controller))
 
 
 def vane_motion(scenario: Scenario) -> VaneMotion:
@@ -435,3 +431,8 @@ def vane_motion(scenario: Scenario) -> VaneMotion:
 def scenario_document(scenario: Scenario) -> dict[str, Any]:
     """Return the whole scenario with every number of the device, in SI units, as data that JSON can hold."""
     return {"units": UNITS, **plain(scenario)}
+
+
+def with_control(scenario: Scenario, control: Control) -> Scenario:
+    """Return a scenario with another control; settings of the previous law no longer follow other numbers."""
+    return replace(scenario, controller=control, links=outside(scenario.links, "controller", "timing"))

@@ -10,7 +10,7 @@ from ppafo.exports.hil import wire
 from ppafo.model.controlled import TORQUE
 from ppafo.parameters.plant import venting_valve
 from ppafo.simulation.plan import plan_run
-from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario
+from ppafo.simulation.scenario import PYTHON_CONTROLLER, Control, Scenario, with_control
 
 CHANNELS_SENT = 5
 
@@ -38,7 +38,7 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
         )
     period = 1.0 / rate
     chosen = replace(
-        scenario.with_control(Control(PYTHON_CONTROLLER, {}, period)),
+        with_control(scenario, Control(PYTHON_CONTROLLER, {}, period)),
         # No step may be longer than a sample: a command acts from its sample on.
         run=replace(scenario.run, step=min(scenario.run.step, period)),
     )

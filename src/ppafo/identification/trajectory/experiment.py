@@ -23,7 +23,7 @@ from ppafo.simulation.recorded.channels import (
 from ppafo.simulation.recorded.inputs import between_stops, with_highest_supply
 from ppafo.simulation.recorded.replay import replay_control
 from ppafo.simulation.recorded.rest import value_at_rest
-from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion
+from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion, with_control
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """Channels compared with a recording [rad], [Pa], [Pa]."""
@@ -130,7 +130,7 @@ def scenario_of(experiment: FittedExperiment) -> Scenario:
         scenario = replace(scenario, device=with_highest_supply(scenario.device, recording, experiment.inputs))
     if COMMAND in experiment.inputs:
         # A recorded command needs no sensors.
-        scenario = replace(scenario.with_control(replay_control(recording)), sensors=Sensors())
+        scenario = replace(with_control(scenario, replay_control(recording)), sensors=Sensors())
     said = f"experiment '{experiment.label}'"
     if ANGLE in experiment.inputs:
         # From here the recorded angle prescribes the vane's.
