@@ -98,15 +98,6 @@ SETTINGS = (
 """Settings of the converter of an integer controller."""
 
 
-class Converter(NamedTuple):
-    """Pressure and torque of one count [Pa], [N m]; the largest reading, and the one that stands for a torque of 0."""
-
-    pressure_step: float
-    torque_step: float
-    top: float
-    middle: float
-
-
 class ConverterLimits(NamedTuple):
     """The largest reading of a converter, and the one that stands for a reference of 0 N m."""
 
@@ -137,26 +128,19 @@ OF_LIMITS = (
     Quantity("top", "", "largest reading of the converter", None, 0.0, float(LARGEST_READING)),
     Quantity("middle", "", "reading that stands for a reference of 0 N m", None, 0.0, float(2 ** (MOST_BITS - 1))),
 )
-"""The numbers of ``Converter``, in order: its steps, and then its limits."""
+"""Fields of ``CountResolution`` and of ``ConverterLimits``, in order."""
 
 
-def converter_of(bits: float, pressure_range: float, torque_constant: float) -> Converter:
-    """The converter with some bits that shows ``pressure_range`` [Pa] as its largest number.
+def converter_of(
+    bits: float, pressure_range: float, torque_constant: float
+) -> tuple[CountResolution, tuple[float, float]]:
+    """Steps and limits of a converter with some bits that shows ``pressure_range`` [Pa] as its largest number.
 
     The reference has its 0 N m in the middle, and a count of it is the torque of a count of pressure.
     """
-    top = float(2 ** int(bits) - 1)
+    top, middle = float(2 ** int(bits) - 1), float(2 ** (int(bits) - 1))
     step = pressure_range / top
-    return Converter(
-        pressure_step=step, torque_step=torque_constant * step, top=top, middle=float(2 ** (int(bits) - 1))
-    )
-
-
-def converter_with(steps: CountResolution, limits: ConverterLimits) -> Converter:
-    """The converter with these steps and limits, as the lanes keep both."""
-    return Converter(
-        pressure_step=steps.pressure_step, torque_step=steps.torque_step, top=limits.top, middle=limits.middle
-    )
+    return CountResolution(pressure_step=step, torque_step=torque_constant * step), (top, middle)
 
 
 def count_of(value: float, step: float, top: float) -> int:
@@ -165,12 +149,14 @@ def count_of(value: float, step: float, top: float) -> int:
     return int(max(0.0, min(top, value / step + 0.5)))
 
 
-def read(converter: Converter, reference: float, measurement: Measurement) -> ConverterCounts:
+def read(
+    steps: CountResolution, limits: ConverterLimits, reference: float, measurement: Measurement
+) -> ConverterCounts:
     """Converter readings of a reference [N m] and of the measured pressures [Pa]."""
     return ConverterCounts(
-        reference=count_of(reference + converter.middle * converter.torque_step, converter.torque_step, converter.top),
-        pressure_1=count_of(measurement.pressure_1, converter.pressure_step, converter.top),
-        pressure_2=count_of(measurement.pressure_2, converter.pressure_step, converter.top),
+        reference=count_of(reference + limits.middle * steps.torque_step, steps.torque_step, limits.top),
+        pressure_1=count_of(measurement.pressure_1, steps.pressure_step, limits.top),
+        pressure_2=count_of(measurement.pressure_2, steps.pressure_step, limits.top),
     )
 
 

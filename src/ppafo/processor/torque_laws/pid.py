@@ -24,7 +24,6 @@ from ppafo.processor.fixed_point import (
     ConverterLimits,
     CountResolution,
     beyond_band,
-    converter_with,
     error_of,
     fraction_of,
     gain_of,
@@ -33,8 +32,7 @@ from ppafo.processor.fixed_point import (
     shifted,
     still_sound,
 )
-from ppafo.processor.planning import Numbers, fixed_point_kind
-from ppafo.processor.torque_laws.law import FixedLaw
+from ppafo.processor.torque_laws.law import FixedLaw, Numbers, fixed_point_kind
 
 PART_BITS = 6
 HALF_STEP = 2 ** (PART_BITS - 1)
@@ -123,7 +121,7 @@ def pid_update(
     parameters: PidRows, state: PidCounts, reference: float, measurement: Measurement, period: float
 ) -> tuple[float, PidCounts]:
     """Command from -1 to 1 that ``pid_sample`` gives for what the converter shows, once every ``period`` [s]."""
-    readings = read(converter_with(parameters.steps, parameters.numbers.limits), reference, measurement)
+    readings = read(parameters.steps, parameters.numbers.limits, reference, measurement)
     command, after = pid_sample(each(int, parameters.numbers), each(int, state), readings)
     return float(command) / COMMAND_STEPS, each(float, after)
 
