@@ -46,20 +46,10 @@ def export_firmware(
     from ppafo.processor.catalog import TARGETS, target_of
 
     chosen = target_of(target or TARGETS[0]).name
-    is_tried = try_ or table or samples is not None
     trial = argument_text("try_", option="--try")
-    if not is_tried and (len(scenarios) != 1 or out is None):
-        raise ScenarioError(f"give one scenario and {argument_text('out')}, or {trial}")
-    if is_tried and not (scenarios or table):
-        raise ScenarioError(f"{trial} needs a scenario, or {argument_text('table')}")
-    if table and (scenarios or overrides):
-        sets = argument_text("overrides", option="--set")
-        raise ScenarioError(f"{argument_text('table')} has scenarios of its own: give no scenario and no {sets}")
-    if samples is not None and samples > MOST_SAMPLES:
-        raise ScenarioError(f"{argument_text('samples', str(samples))}: must be 1 to {MOST_SAMPLES}")
-    if samples is not None and len(scenarios) > 1:
-        raise ScenarioError(f"{argument_text('samples')} takes one scenario; without it several are drawn together")
-    if not is_tried and out is not None:
+    if not (try_ or table or samples is not None):
+        if len(scenarios) != 1 or out is None:
+            raise ScenarioError(f"give one scenario and {argument_text('out')}, or {trial}")
         from ppafo.processor.firmware import firmware
         from ppafo.simulation.loading import load_scenario
 
@@ -70,6 +60,15 @@ def export_firmware(
             lambda _: f"make -C {shlex.quote(str(out))}",
             target=chosen,
         )
+    if not (scenarios or table):
+        raise ScenarioError(f"{trial} needs a scenario, or {argument_text('table')}")
+    if table and (scenarios or overrides):
+        sets = argument_text("overrides", option="--set")
+        raise ScenarioError(f"{argument_text('table')} has scenarios of its own: give no scenario and no {sets}")
+    if samples is not None and samples > MOST_SAMPLES:
+        raise ScenarioError(f"{argument_text('samples', str(samples))}: must be 1 to {MOST_SAMPLES}")
+    if samples is not None and len(scenarios) > 1:
+        raise ScenarioError(f"{argument_text('samples')} takes one scenario; without it several are drawn together")
     output.check_output(out, COMMAND)
     from ppafo.processor import words
 

@@ -28,6 +28,8 @@ class FaultFlag:
 
 
 NO_FLAG = 0.0
+NOT_RAISED = 1.0e3
+"""Beyond every flag, so that of several checks the least number is the flag that comes first."""
 
 FAULT_FLAGS = {
     (FORCE_RANGE := 1.0): FaultFlag(
@@ -188,7 +190,6 @@ def level_of(flag: float) -> float:
     return level if flag > NO_FLAG else HELPS
 
 
-def first_flag(some: float, others: float) -> float:
-    """The flag of two that comes first: one that stops before one that pauses, either before none."""
-    lower = min(some, others)
-    return lower if lower > NO_FLAG else max(some, others)
+def raised(flag: float, is_contradicted: bool) -> float:
+    """A flag where its check is contradicted, else ``NOT_RAISED``: the least of several is the most urgent one."""
+    return flag if is_contradicted else NOT_RAISED

@@ -20,7 +20,7 @@ from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.controlled import TORQUE
 from ppafo.model.declaration import row_with
-from ppafo.model.sensors import GaitMeasurement
+from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
 class LawParameters(NamedTuple):
@@ -86,7 +86,12 @@ def law_that_walks_update(
     requested = assessment.request.torque
     # Before the update: what the law remembers of another task must not act on this one.
     law = parts.restart(state.law, requested, assessment.continues)
-    sample = assistance.torque_measurement(measurement)
+    sample = Measurement(
+        angle=measurement.angle,
+        pressure_1=measurement.pressure_1,
+        pressure_2=measurement.pressure_2,
+        torque=measurement.torque,
+    )
     command, law = parts.update(parameters.law, law, requested, sample, period)
     command, watch = assistance.valve_command(assessment, command, period)
     following: LawState = parts.state(

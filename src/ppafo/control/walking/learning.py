@@ -56,13 +56,9 @@ class LearningRules(NamedTuple):
     ]
 
 
-class LearntTable(NamedTuple):
-    """Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
-
-    knots: Annotated[tuple[float, ...], KNOTS]
-
-
-EMPTY = LearntTable(knots=(0.0,) * KNOTS)
+Knots = Annotated[tuple[float, ...], KNOTS]
+"""Learnt commands [-] at knots that lie evenly from the beginning to the end of the torque profile."""
+EMPTY = (0.0,) * KNOTS
 
 
 def near(place: float, knot: float) -> float:
@@ -70,25 +66,25 @@ def near(place: float, knot: float) -> float:
     return max(0.0, 1.0 - abs(place - knot))
 
 
-def command_at(table: LearntTable, place: float) -> float:
+def command_at(table: Knots, place: float) -> float:
     """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
     return (
-        table.knots[0] * near(place, 0.0)
-        + table.knots[1] * near(place, 1.0)
-        + table.knots[2] * near(place, 2.0)
-        + table.knots[3] * near(place, 3.0)
-        + table.knots[4] * near(place, 4.0)
-        + table.knots[5] * near(place, 5.0)
-        + table.knots[6] * near(place, 6.0)
-        + table.knots[7] * near(place, 7.0)
-        + table.knots[8] * near(place, 8.0)
-        + table.knots[9] * near(place, 9.0)
-        + table.knots[10] * near(place, 10.0)
-        + table.knots[11] * near(place, 11.0)
-        + table.knots[12] * near(place, 12.0)
-        + table.knots[13] * near(place, 13.0)
-        + table.knots[14] * near(place, 14.0)
-        + table.knots[15] * near(place, 15.0)
+        table[0] * near(place, 0.0)
+        + table[1] * near(place, 1.0)
+        + table[2] * near(place, 2.0)
+        + table[3] * near(place, 3.0)
+        + table[4] * near(place, 4.0)
+        + table[5] * near(place, 5.0)
+        + table[6] * near(place, 6.0)
+        + table[7] * near(place, 7.0)
+        + table[8] * near(place, 8.0)
+        + table[9] * near(place, 9.0)
+        + table[10] * near(place, 10.0)
+        + table[11] * near(place, 11.0)
+        + table[12] * near(place, 12.0)
+        + table[13] * near(place, 13.0)
+        + table[14] * near(place, 14.0)
+        + table[15] * near(place, 15.0)
     )
 
 
@@ -106,13 +102,13 @@ def place_in_table(profile: TorqueProfile, since_strike: float, stride_time: flo
 
 def learn(
     rules: LearningRules,
-    table: LearntTable,
+    table: Knots,
     profile: TorqueProfile,
     since_strike: float,
     stride_time: float,
     error: float,
     duration: float,
-) -> LearntTable:
+) -> Knots:
     """The table after a sample with a torque error [N m] that lasted ``duration`` [s], 0 where nothing is learnt.
 
     While a stride passes over a knot, the weights of its samples add up to 1.
@@ -124,30 +120,28 @@ def learn(
     return next_table(table, place, duration / knot_time, rules.learning_gain * error, rules.forgetting)
 
 
-def next_table(table: LearntTable, place: float, weight: float, step: float, forgetting: float) -> LearntTable:
+def next_table(table: Knots, place: float, weight: float, step: float, forgetting: float) -> Knots:
     """The table after a sample at a place, counted in knots.
 
     The two knots beside the place move, each by its part of the sample's ``weight`` [-] and of ``step`` [-].
     """
-    return LearntTable(
-        knots=(
-            next_knot(table.knots[0], near(place, 0.0) * weight, step, forgetting),
-            next_knot(table.knots[1], near(place, 1.0) * weight, step, forgetting),
-            next_knot(table.knots[2], near(place, 2.0) * weight, step, forgetting),
-            next_knot(table.knots[3], near(place, 3.0) * weight, step, forgetting),
-            next_knot(table.knots[4], near(place, 4.0) * weight, step, forgetting),
-            next_knot(table.knots[5], near(place, 5.0) * weight, step, forgetting),
-            next_knot(table.knots[6], near(place, 6.0) * weight, step, forgetting),
-            next_knot(table.knots[7], near(place, 7.0) * weight, step, forgetting),
-            next_knot(table.knots[8], near(place, 8.0) * weight, step, forgetting),
-            next_knot(table.knots[9], near(place, 9.0) * weight, step, forgetting),
-            next_knot(table.knots[10], near(place, 10.0) * weight, step, forgetting),
-            next_knot(table.knots[11], near(place, 11.0) * weight, step, forgetting),
-            next_knot(table.knots[12], near(place, 12.0) * weight, step, forgetting),
-            next_knot(table.knots[13], near(place, 13.0) * weight, step, forgetting),
-            next_knot(table.knots[14], near(place, 14.0) * weight, step, forgetting),
-            next_knot(table.knots[15], near(place, 15.0) * weight, step, forgetting),
-        )
+    return (
+        next_knot(table[0], near(place, 0.0) * weight, step, forgetting),
+        next_knot(table[1], near(place, 1.0) * weight, step, forgetting),
+        next_knot(table[2], near(place, 2.0) * weight, step, forgetting),
+        next_knot(table[3], near(place, 3.0) * weight, step, forgetting),
+        next_knot(table[4], near(place, 4.0) * weight, step, forgetting),
+        next_knot(table[5], near(place, 5.0) * weight, step, forgetting),
+        next_knot(table[6], near(place, 6.0) * weight, step, forgetting),
+        next_knot(table[7], near(place, 7.0) * weight, step, forgetting),
+        next_knot(table[8], near(place, 8.0) * weight, step, forgetting),
+        next_knot(table[9], near(place, 9.0) * weight, step, forgetting),
+        next_knot(table[10], near(place, 10.0) * weight, step, forgetting),
+        next_knot(table[11], near(place, 11.0) * weight, step, forgetting),
+        next_knot(table[12], near(place, 12.0) * weight, step, forgetting),
+        next_knot(table[13], near(place, 13.0) * weight, step, forgetting),
+        next_knot(table[14], near(place, 14.0) * weight, step, forgetting),
+        next_knot(table[15], near(place, 15.0) * weight, step, forgetting),
     )
 
 
@@ -171,7 +165,7 @@ class EventDampedLearningState(NamedTuple):
     safety: SafetyState
     request: TorqueRequest
     law: TorqueSlope
-    table: LearntTable
+    table: Knots
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventDampedLearningState)

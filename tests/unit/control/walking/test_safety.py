@@ -199,8 +199,8 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
 
     assert after(0.0) == fault_flags.FORCE_GONE
     assert fault_flags.level_of(fault_flags.FORCE_GONE) == STOPPED
-    assert after(100.0) == fault_flags.NO_FLAG, "no step of a foot that falls flat"
-    assert after(0.0, period=0.01) == fault_flags.NO_FLAG, (
+    assert after(100.0) == fault_flags.NOT_RAISED, "no step of a foot that falls flat"
+    assert after(0.0, period=0.01) == fault_flags.NOT_RAISED, (
         "a slow controller sees a foot leave the ground in one sample"
     )
 
