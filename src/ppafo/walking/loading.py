@@ -13,7 +13,7 @@ from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, at_fault, one_line, refused_as
+from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, at_fault, refused_as
 from ppafo.gait import NORMATIVE, Gait, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.fault_catalogue import PLANT_FAULTS
@@ -80,6 +80,7 @@ from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import TaskSequence, load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
+from ppafo.wording import one_line
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3

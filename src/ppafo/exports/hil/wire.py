@@ -18,7 +18,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, final
 
-from ppafo.errors import ScenarioError, one_line, reason
+from ppafo.errors import ScenarioError
+from ppafo.wording import one_line, reason
 
 RATE = 1000
 """Samples per second unless another rate is asked for [Hz]."""
