@@ -9,10 +9,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 class PpafoError(Exception):
     """Something a user can put right; the message is one line that says what and how.
 
-    ``parts`` are its statements one by one, where there are several.
+    ``parts`` are its statements one by one, where there are several; ``argument`` is the one of the call that is at
+    fault, where the message does not say so itself.
     """
 
     parts: tuple[str, ...] = ()
+    argument: str = ""
 
 
 class ArgumentError(PpafoError):
@@ -53,6 +55,19 @@ class StudyError(PpafoError):
 
 class IdentificationError(PpafoError):
     """A recording does not allow the requested estimate."""
+
+
+@contextlib.contextmanager
+def at_fault(argument: str) -> Iterator[None]:
+    """Note on an error raised within a ``with`` block the argument that is at fault; an outer block has the last word.
+
+    The door of the function that was called puts its name before the message.
+    """
+    try:
+        yield
+    except PpafoError as error:
+        error.argument = argument
+        raise
 
 
 @contextlib.contextmanager

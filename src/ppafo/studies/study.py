@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.engine.channels import TRACED
-from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
+from ppafo.errors import StudyError, UnitError, at_fault, first_twice, nearest_name, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
@@ -221,7 +221,8 @@ def choose_configurations(
                 "compare the study's own configurations"
             )
         named = configurations.values() if isinstance(configurations, Mapping) else configurations
-        scenarios = [scenario_or_load(named_scenario) for named_scenario in named]
+        with at_fault("configurations"):
+            scenarios = [scenario_or_load(named_scenario) for named_scenario in named]
         names = (
             list(configurations) if isinstance(configurations, Mapping) else [scenario.name for scenario in scenarios]
         )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
+from ppafo.errors import ScenarioError, StudyError, UnitError, at_fault, one_line, refused_as
 from ppafo.progress import Report
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
@@ -186,8 +186,10 @@ def outermost(
     ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; ``grid`` values
     are tried first, the highest that meets the condition is sought, or else the lowest.
     """
-    searched = range_of(vary, base)
-    condition = condition_of(such_that, base, searched.path.path)
+    with at_fault("vary"):
+        searched = range_of(vary, base)
+    with at_fault("such_that"):
+        condition = condition_of(such_that, base, searched.path.path)
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.
