@@ -4,11 +4,12 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, final
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.processor.console import UNTOUCHED, Console, depth_of_stack
 from ppafo.processor.images import Decision, Image, Target
 from ppafo.processor.qemu import QemuSimulator
 from ppafo.storage.files import write_file
+from ppafo.wording import nearest_name
 
 # mspdebug's simulator of an MSP430, driven by its console.
 

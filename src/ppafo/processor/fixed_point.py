@@ -6,7 +6,7 @@ A gain is a fraction of 15 bits and a number of places: ``(value * fraction >> 1
 import math
 from typing import NamedTuple
 
-from ppafo.control.kind import NOMINAL
+from ppafo.control.kind import nominal_term
 from ppafo.control.torque_loop import SHARPNESS
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
@@ -92,7 +92,7 @@ SETTINGS = (
         None,
         1.0e4,
         1.0e8,
-        follows=(NOMINAL["converter_range"],),
+        follows=(nominal_term("converter_range"),),
     ),
 )
 """Settings of the converter of an integer controller."""

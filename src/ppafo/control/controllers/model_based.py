@@ -7,8 +7,8 @@ number is the controller's own, so that it can be wrong about the device as a re
 import math
 from typing import Annotated, NamedTuple
 
-from ppafo.control.controllers.feedback import PidGains, PidState, pid_command, pid_restart
-from ppafo.control.kind import NOMINAL, BelievedBand, ControllerKind
+from ppafo.control.controllers.pid import PidGains, PidState, pid_command, pid_restart
+from ppafo.control.kind import BelievedBand, ControllerKind, nominal_term
 from ppafo.control.torque_loop import CONVERGENCE, beyond_dead_band
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.plant import chamber_1_volume, chamber_2_volume
@@ -20,7 +20,7 @@ SMALLEST_GAIN = 1.0e-3
 
 def _believed(name: str, unit: str, what: str, minimum: float, maximum: float) -> Quantity:
     """A number of the device that a law believes, the device's own unless it is given."""
-    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(NOMINAL[name],))
+    return Quantity("", unit, f"believed {what}", None, minimum, maximum, follows=(nominal_term(name),))
 
 
 class NominalChambers(NamedTuple):
@@ -133,15 +133,6 @@ class PidFeedforwardState(NamedTuple):
     reference: float
 
 
-def rates_on_reference(nominal: NominalChambers, reference: float, angle: float) -> TorqueRates:
-    """Believed torque rates of a vane at rest whose torque is the reference [N m] with the other chamber vented."""
-    ambient = nominal.atmospheric_pressure
-    above = reference / nominal.torque_constant
-    pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
-    pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
-    return torque_rates(nominal, angle, 0.0, pressure_1, pressure_2)
-
-
 def feedforward_update(
     parameters: PidFeedforwardParameters,
     state: PidFeedforwardState,
@@ -151,12 +142,17 @@ def feedforward_update(
 ) -> tuple[float, PidFeedforwardState]:
     """Command from -1 to 1: PID of the torque error [N m], equation (13), and the opening for the reference's rate."""
     rate = (reference - state.reference) / period * state.feedback.started
-    # Along the reference, not at the measured state: the feed-forward must not see the noise.
-    rates = rates_on_reference(parameters.nominal, reference, measurement.angle)
+    # Along the reference, with the other chamber vented, not at the measured state: the feed-forward must not see the
+    # noise.
+    nominal = parameters.nominal
+    ambient, above = nominal.atmospheric_pressure, reference / nominal.torque_constant
+    pressure_1 = min(ambient + max(above, 0.0), NEARLY_SUPPLY * nominal.supply_pressure)
+    pressure_2 = min(ambient + max(-above, 0.0), NEARLY_SUPPLY * nominal.dorsiflexion_pressure)
+    rates = torque_rates(nominal, measurement.angle, 0.0, pressure_1, pressure_2)
     ahead = parameters.feedforward * opening_for_rate(rates, rate)
     error = reference - measurement.torque
     opening, feedback = pid_command(parameters.feedback, state.feedback, error, ahead, period)
-    command = beyond_dead_band(opening, parameters.nominal.dead_band)
+    command = beyond_dead_band(opening, nominal.dead_band)
     return command, PidFeedforwardState(feedback, reference)
 
 

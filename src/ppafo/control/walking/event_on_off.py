@@ -7,7 +7,7 @@ the ground, so that its gas does not hold the foot down in the swing. The functi
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import ControllerKind
+from ppafo.control.kind import ControllerKind, EmptyRow
 from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
@@ -61,11 +61,6 @@ class EventOnOffState(NamedTuple):
     resting: float
 
 
-def is_resting(largest_torque: float, before: float, torque: float) -> bool:
-    """Return whether a torque [N m] is let go: from the largest one on, until half of it is left."""
-    return abs(torque) > (0.5 * largest_torque if before > 0.5 else largest_torque)
-
-
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventOnOffState)
 """Parts of the law unless another timing is chosen."""
 
@@ -92,8 +87,10 @@ def update(
     # Vented before toe-off, so that the gas does not hold the foot down in the swing.
     in_time = time.since_strike < parameters.push_off_end * phase.stride_time
     command = 1.0 if phase.phase == PUSH_OFF and in_time else command
-    # Of what the valve feeds alone: a torque against it is the wearer's.
-    rests = is_resting(parameters.largest_torque, state.resting, measurement.torque)
+    # A torque is let go from the largest one on, until half of it is left; of what the valve feeds alone: a torque
+    # against it is the wearer's.
+    largest = parameters.largest_torque
+    rests = abs(measurement.torque) > (0.5 * largest if state.resting > 0.5 else largest)
     command = VENT if rests and command * measurement.torque > 0.0 else command
     command, watch = safety.safe_command(watch, phase.phase, command, period)
     following: EventOnOffState = parts.state(
@@ -114,17 +111,9 @@ EVENT_ON_OFF = ControllerKind(
 )
 
 
-class OffParameters(NamedTuple):
-    """A device that is switched off has nothing to set."""
-
-
-class OffState(NamedTuple):
-    """A device that is switched off remembers nothing."""
-
-
 def off_update(
-    parameters: OffParameters, state: OffState, reference: float, measurement: GaitMeasurement, period: float
-) -> tuple[float, OffState]:
+    parameters: EmptyRow, state: EmptyRow, reference: float, measurement: GaitMeasurement, period: float
+) -> tuple[float, EmptyRow]:
     """Command of a device that is switched off: always ``VENT``, and the state."""
     return VENT, state
 
@@ -134,8 +123,8 @@ OFF = ControllerKind(
     summary="Both chambers vented.",
     source="comparison without assistance",
     quantities=(),
-    parameters=OffParameters,
-    initial=OffState(),
+    parameters=EmptyRow,
+    initial=EmptyRow(),
     update=off_update,
     only_switches=True,
 )

@@ -12,8 +12,8 @@ straight line of arithmetic for all runs at once.
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.controllers import feedback
-from ppafo.control.controllers.feedback import DampedGains, TorqueSlope, damped_command
+from ppafo.control.controllers import damped_proportional
+from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import LEAD, LEARNING_GAIN, beyond_dead_band
 from ppafo.control.walking import assistance, phases, safety
@@ -217,9 +217,9 @@ def update(
 KIND = ControllerKind(
     name="event_damped_learning",
     summary="Event-based torque profiles for each phase, tracked by damped control that learns the push-off.",
-    source=f"the paper, figure 1A (phases); {feedback.DAMPED_PROPORTIONAL.source}",
+    source=f"the paper, figure 1A (phases); {damped_proportional.DAMPED_PROPORTIONAL.source}",
     quantities=(
-        *feedback.GAIN_QUANTITIES,
+        *damped_proportional.GAIN_QUANTITIES,
         *quantities_of(LearningRules),
         DEAD_BAND,
         *ASSISTING_QUANTITIES,

@@ -16,7 +16,7 @@ Every number is a setting whose default follows the device; ``nominal_flow`` 0 s
 import math
 from typing import NamedTuple
 
-from ppafo.control.kind import NOMINAL, PRESSURE_LAG
+from ppafo.control.kind import PRESSURE_LAG, nominal_term
 from ppafo.control.walking.fault_flags import (
     LEAK,
     NOT_RAISED,
@@ -74,7 +74,7 @@ _CHAMBERS = {
 
 
 def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float = 0.0) -> Quantity:
-    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (NOMINAL[_CHAMBERS.get(name, name)],)
+    follows = (PRESSURE_LAG,) if name == "sensor_lag" else (nominal_term(_CHAMBERS.get(name, name)),)
     return Quantity(
         f"nominal_{name}", unit, f"{summary}; the device's unless given", 0.0, lowest, maximum, follows=follows
     )
@@ -89,7 +89,7 @@ NOMINAL_QUANTITIES = (
         0.0,
         0.0,
         1.0,
-        follows=(NOMINAL["flow"],),
+        follows=(nominal_term("flow"),),
     ),
     _nominal("critical_ratio", "", "critical pressure ratio of the valve", 0.95),
     _nominal("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e8),

@@ -8,7 +8,7 @@ commands, the slope at 8191 counts a sample, what anti-windup pulls back by at 3
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ppafo.control.controllers.feedback import PID as FLOAT_PID
+from ppafo.control.controllers.pid import PID as FLOAT_PID
 from ppafo.engine.source_text import each
 from ppafo.model.declaration import Quantity
 from ppafo.model.sensors import Measurement
