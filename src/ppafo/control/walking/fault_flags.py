@@ -29,7 +29,7 @@ class FaultFlag:
 
 NO_FLAG = 0.0
 NOT_RAISED = 1.0e3
-"""Beyond every flag, so that of several checks the least number is the flag that comes first."""
+"""Number beyond every flag: the least of several checks is the flag that comes first."""
 
 FAULT_FLAGS = {
     (FORCE_RANGE := 1.0): FaultFlag(
