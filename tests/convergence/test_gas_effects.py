@@ -9,7 +9,8 @@ from ppafo.model.effects.laminar_leak import LaminarLeak, with_gap
 from ppafo.model.effects.leak_opening import LeakOpening, lifted
 from ppafo.model.effects.line_resistance import LineSettings, fed_through_line, prepare
 from ppafo.model.effects.spool_play import SpoolPlace, SpoolPlay, behind_play, settle, spool_position
-from ppafo.model.orifice import area_conductance, isentropic_curve, orifice_flow
+from ppafo.model.flow_curve import isentropic_curve
+from ppafo.model.orifice import area_conductance, orifice_flow
 from ppafo.parameters.loading import load_device
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.plan import plan_run

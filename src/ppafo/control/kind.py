@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple, Protocol
+from typing import Annotated, Any, Protocol
 
 from ppafo.model.columns import Problem
 from ppafo.model.controlled import TORQUE
@@ -38,10 +38,6 @@ BelievedBand = Annotated[float, DEAD_BAND]
 
 Plan = Callable[[Mapping[str, Any], Any, Any, tuple[Any, Any]], tuple[dict[str, Any], tuple[Problem, ...]]]
 """Function that computes the numbers of a law from its settings."""
-
-
-class EmptyRow(NamedTuple):
-    """Row without a number: settings of a law that has none, or state of one that remembers nothing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -128,8 +128,14 @@ def gravity_torques(
     return LegTorques(shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot)
 
 
+def foot_load(leg: LegParameters) -> FootLoad:
+    """Foot of a leg about its ankle, without a device."""
+    moment = leg.foot_mass * leg.foot_mass_centre
+    return FootLoad(moment, foot_inertia_about_ankle(leg), leg.shank_length, leg.gravity)
+
+
 def torque_of_shank(
-    leg: LegParameters,
+    load: FootLoad,
     sine_phi: float,
     cosine_phi: float,
     sine_alpha: float,
@@ -139,68 +145,31 @@ def torque_of_shank(
     knee_forward: float,
     knee_up: float,
 ) -> float:
-    """Torque [N m] of shank, knee and weight about the ankle, beside the foot's own acceleration.
+    """Torque [N m] that shank, knee and weight ask of a body that turns with the foot, beside its own acceleration.
 
     The ankle's row of equation (11) without the term in theta''; angles as in ``gravity_torques``, rates [rad/s],
     accelerations [rad/s^2], [m/s^2].
     """
-    return torque_of_shank_on(
-        leg.foot_mass * leg.foot_mass_centre,
-        foot_inertia_about_ankle(leg),
-        leg.shank_length,
-        leg.gravity,
-        sine_phi,
-        cosine_phi,
-        sine_alpha,
-        cosine_alpha,
-        shank_rate,
-        shank_acceleration,
-        knee_forward,
-        knee_up,
-    )
-
-
-def torque_of_shank_on(
-    mass_moment: float,
-    inertia: float,
-    shank_length: float,
-    gravity: float,
-    sine_phi: float,
-    cosine_phi: float,
-    sine_alpha: float,
-    cosine_alpha: float,
-    shank_rate: float,
-    shank_acceleration: float,
-    knee_forward: float,
-    knee_up: float,
-) -> float:
-    """Torque [N m] that shank, knee and weight ask of a body that turns with the foot. Equation (11), ankle's row.
-
-    ``mass_moment`` [kg m] is its mass times the distance along the foot, ``inertia`` [kg m^2] about the ankle.
-    """
     # theta is phi less alpha, plus 90 deg.
     sine_theta = cosine_phi * cosine_alpha + sine_phi * sine_alpha
     cosine_theta = cosine_phi * sine_alpha - sine_phi * cosine_alpha
-    product = mass_moment * shank_length
-    weight = cosine_alpha * (gravity + knee_up) - sine_alpha * knee_forward
-    turning = (product * cosine_theta - inertia) * shank_acceleration
-    return turning - product * sine_theta * shank_rate * shank_rate - mass_moment * weight
+    product = load.mass_moment * load.shank_length
+    weight = cosine_alpha * (load.gravity + knee_up) - sine_alpha * knee_forward
+    turning = (product * cosine_theta - load.inertia) * shank_acceleration
+    return turning - product * sine_theta * shank_rate * shank_rate - load.mass_moment * weight
 
 
 def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
     """Torque [N m] that shank, knee and weight put on what turns about the ankle, positive in plantarflexion.
 
-    T_shank of docs/equations.md: equation (11), its ankle's row without the term in theta''. ``angle`` [rad] of
-    the ankle. It is the torque of ``torque_of_shank_on`` about the ankle, with the sign of a torque that drives.
+    T_shank of docs/equations.md: ``torque_of_shank`` at an angle [rad] of the ankle, with the sign of a torque that
+    drives.
     """
     # alpha = phi - theta + a quarter turn: the foot is level at an ankle angle of 90 deg below an upright shank.
     sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)
     sine_alpha, cosine_alpha = sine_and_cosine_of_turns((now.angle - angle) * TURNS_OF_RADIAN + 0.25)
-    return -torque_of_shank_on(
-        load.mass_moment,
-        load.inertia,
-        load.shank_length,
-        load.gravity,
+    return -torque_of_shank(
+        load,
         sine_phi,
         cosine_phi,
         sine_alpha,
@@ -215,7 +184,7 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
 def torque_on_resting_foot(load: FootLoad, shank: float, angle: float) -> float:
     """Torque [N m] of the weight on a foot whose shank rests at an angle [rad]; to the bit as ``torque_on_foot``."""
     _, cosine_alpha = sine_and_cosine_of_turns((shank - angle) * TURNS_OF_RADIAN + 0.25)
-    # Grouped as torque_of_shank_on groups it, or the last bits would differ.
+    # Grouped as torque_of_shank groups it, or the last bits would differ.
     return load.mass_moment * (cosine_alpha * load.gravity)
 
 

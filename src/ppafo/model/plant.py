@@ -165,11 +165,6 @@ def gravity_torque(angle: float, largest_torque: float) -> float:
     return (largest_torque if is_upside_down else -largest_torque) * cosine
 
 
-def net_driving_torque(actuator: float, gravity: float, external: float) -> float:
-    """Torque [N m] that drives the vane before friction and damping: actuator less gravity less T_ex. Equation (1)."""
-    return actuator - gravity - external
-
-
 def loaded(torque: float, angle: float) -> float:
     """Torque [N m] less what loads take at an angle [rad] from a joint at rest. Equation (1)."""
     return torque - load_torque(0.0, angle, 0.0)
@@ -221,7 +216,7 @@ def driving_torque(
     """Torque on a vane at rest before friction [N m], positive in plantarflexion. Equations (1), (2)."""
     actuator = parts.torque(plant, angle, pressure_1, pressure_2)
     gravity = gravity_torque(angle, plant.gravity_torque)
-    return loaded(net_driving_torque(actuator, gravity, plant.external_torque), angle)
+    return loaded(actuator - gravity - plant.external_torque, angle)
 
 
 def chamber_1_volume(angle: Numeric, angle_min: float, displacement_per_radian: float, dead_volume: float) -> Numeric:

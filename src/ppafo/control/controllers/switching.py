@@ -5,10 +5,10 @@ Units are those of a torque; of what else is controlled, its unit stands in the 
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import BelievedBand, ControllerKind, EmptyRow
+from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import BOUNDARY, DEAD_ZONE, INTEGRAL_RATE, OPENING, RELEASE, beyond_dead_band
 from ppafo.model.controlled import ANYTHING, seen_error
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.sensors import Measurement
 
 

@@ -7,7 +7,7 @@ the ground, so that its gas does not hold the foot down in the swing. The functi
 
 from typing import Annotated, NamedTuple
 
-from ppafo.control.kind import ControllerKind, EmptyRow
+from ppafo.control.kind import ControllerKind
 from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
@@ -16,7 +16,7 @@ from ppafo.control.walking.observer import NOMINAL_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT

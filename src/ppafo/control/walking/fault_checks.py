@@ -144,19 +144,7 @@ class Emptying(NamedTuple):
 
 AIRBORNE = LandingCheck(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
 NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
-NOTHING_READ = LastReadings(
-    heel_force=0.0,
-    toe_force=0.0,
-    angle=0.0,
-    pressure_1=0.0,
-    pressure_2=0.0,
-    heel_unchanged=0.0,
-    toe_unchanged=0.0,
-    angle_unchanged=0.0,
-    slow_heel=0.0,
-    slow_toe=0.0,
-    slow_angle=0.0,
-)
+NOTHING_READ = LastReadings._make((0.0,) * len(LastReadings._fields))
 
 SLOW_TIME = 0.08
 """Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""

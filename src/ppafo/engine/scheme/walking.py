@@ -21,7 +21,7 @@ from ppafo.model.gait import (
     GaitNow,
     GaitTiming,
 )
-from ppafo.model.leg import LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank_on
+from ppafo.model.leg import FootLoad, LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank
 from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, loaded, net_torque, viscous_torque
 from ppafo.model.ports import friction_in_motion
 
@@ -89,12 +89,9 @@ def carried_foot(leg: LegParameters, share: DeviceShare, now: GaitNow, foot: Dir
 def torque_of_body_on_foot(
     leg: LegParameters, mass_moment: float, inertia: float, now: GaitNow, foot: Direction
 ) -> float:
-    """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank_on``."""
-    return torque_of_shank_on(
-        mass_moment,
-        inertia,
-        leg.shank_length,
-        leg.gravity,
+    """Torque [N m] of shank, knee and weight about the ankle, on a body on the foot: see ``torque_of_shank``."""
+    return torque_of_shank(
+        FootLoad(mass_moment, inertia, leg.shank_length, leg.gravity),
         now.sine_shank,
         now.cosine_shank,
         foot.sine,

@@ -90,16 +90,6 @@ def advance_ideal(
     return opening, NoValveState(opening)
 
 
-def slew_opening(requested: float, target: float, slew_limit: float, step: float) -> tuple[float, float]:
-    """Requested opening after a step [s], and its rate [1/s], on the way to a target at the slew limit [1/s]."""
-    distance = target - requested
-    # The sign by two selects, 0 at the target.
-    way = (1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)
-    arrives = abs(distance) <= slew_limit * step
-    rate = way * slew_limit
-    return (target if arrives else requested + rate * step), rate
-
-
 def towards_chamber_1(opening: float, next_opening: float, mean: float) -> float:
     """Mean over a step of the positive part of an opening [-]; exact where it runs straight or keeps its sign."""
     higher = max(opening, next_opening)
@@ -117,7 +107,11 @@ def advance_moving(
     """Mean openings [-] in a step [s] and the spool at its end; the request changes its rate at the beginning only."""
     settled = settle_moving(valve, state, command, time)
     target = opening_of_command(command, valve.dead_band)
-    requested, slew = slew_opening(settled.requested, target, valve.slew_limit, step)
+    # The request moves at the slew limit, with the sign by two selects, 0 at the target.
+    distance = target - settled.requested
+    slew = ((1.0 if distance > 0.0 else 0.0) - (1.0 if distance < 0.0 else 0.0)) * valve.slew_limit
+    arrives = abs(distance) <= valve.slew_limit * step
+    requested = target if arrives else settled.requested + slew * step
     requested_mean = 0.5 * (settled.requested + requested)
     has_spool = valve.frequency > 0.0
     angular = 2.0 * math.pi * valve.frequency
