@@ -41,12 +41,7 @@ class LearningRules(NamedTuple):
     learning_gain: Annotated[
         float,
         Number(
-            "1/(N m)",
-            "command learnt per mean torque error of a stride",
-            None,
-            0.0,
-            1.0e3,
-            follows=(LEARNING_GAIN,),
+            "1/(N m)", "command learnt per mean torque error of a stride", None, 0.0, 1.0e3, follows=(LEARNING_GAIN,)
         ),
     ]
     forgetting: Annotated[float, Number("1", "fraction of what was learnt that a stride forgets", 0.005, 0.0, 1.0)]
