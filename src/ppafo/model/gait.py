@@ -339,7 +339,7 @@ class TimedSequence(NamedTuple):
     parts: Annotated[tuple[SequencePart, ...], PARTS]
 
 
-class Motion(NamedTuple):
+class Kinematics(NamedTuple):
     """A value with its first and second derivative: an angle [rad] with its own by time, or a fraction."""
 
     value: float
@@ -360,7 +360,7 @@ class PhaseMotion(NamedTuple):
     stride_rate: float
     stride_acceleration: float
     load: float
-    slope: Motion
+    slope: Kinematics
     tilt: float
     scuff: float
 
@@ -372,11 +372,11 @@ class Marks(NamedTuple):
     forefoot: float
 
 
-def blend(fraction: float) -> Motion:
+def blend(fraction: float) -> Kinematics:
     """Rise from 0 to 1 over a fraction from 0 to 1, with both derivatives 0 at both ends."""
     rest = 1.0 - fraction
     square = fraction * fraction
-    return Motion(
+    return Kinematics(
         value=square * fraction * (10.0 + fraction * (6.0 * fraction - 15.0)),
         rate=30.0 * square * rest * rest,
         acceleration=60.0 * fraction * rest * (1.0 - 2.0 * fraction),
@@ -423,7 +423,7 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
         stride_rate=part.stride_gain * shape.rate / part.length,
         stride_acceleration=part.stride_gain * shape.acceleration / (part.length * part.length),
         load=part.load + part.load_gain * shape.value,
-        slope=Motion(
+        slope=Kinematics(
             value=part.slope + part.slope_gain * shape.value,
             rate=part.slope_gain * shape.rate / part.length,
             acceleration=part.slope_gain * shape.acceleration / (part.length * part.length),
@@ -433,20 +433,20 @@ def pace_in(part: SequencePart, time: float) -> PhaseMotion:
     )
 
 
-def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> Motion:
+def blended_angle(series: Series, at: tuple[Harmonic, ...], pace: PhaseMotion, standing: float) -> Kinematics:
     """An angle between its value in standing [rad] and the gait's."""
     away = value_at(series, at) - standing
     rate = rate_at(series, at, pace.frequency)
     # A changing cadence adds its own term to the second derivative, with the shape of the rate.
     turning = acceleration_at(series, at, pace.frequency) + rate_at(series, at, pace.frequency_rate)
-    return Motion(
+    return Kinematics(
         value=standing + pace.stride * away,
         rate=pace.stride_rate * away + pace.stride * rate,
         acceleration=pace.stride_acceleration * away + 2.0 * pace.stride_rate * rate + pace.stride * turning,
     )
 
 
-def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Motion:
+def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Kinematics:
     """Forward lean of the shank for a strike with the toes: largest at the strike, zero at toe-off and standing."""
     standing = STANDS_AT * timing.heel_off
     # Counted from standing, the lean rises from toe-off to the strike and falls to standing without a wrap in between.
@@ -457,7 +457,7 @@ def tilt_of_shank(timing: GaitTiming, phase: float, pace: PhaseMotion) -> Motion
     place = (since - lifted) * slope if rises else 1.0 + (since - strike) * slope
     shape = blend(max(0.0, min(1.0, place)))
     rate = slope * pace.frequency
-    return Motion(
+    return Kinematics(
         value=pace.tilt * shape.value,
         rate=pace.tilt * shape.rate * rate,
         acceleration=pace.tilt * (shape.acceleration * rate * rate + shape.rate * slope * pace.frequency_rate),

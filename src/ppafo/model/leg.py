@@ -163,7 +163,7 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
     """Torque [N m] that shank, knee and weight put on what turns about the ankle, positive in plantarflexion.
 
     T_shank of docs/equations.md: ``torque_of_shank`` at an angle [rad] of the ankle, with the sign of a torque that
-    drives.
+    drives. Equation (11).
     """
     # alpha = phi - theta + a quarter turn: the foot is level at an ankle angle of 90 deg below an upright shank.
     sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)

@@ -15,7 +15,7 @@ from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.observer import NOMINAL_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
+from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
@@ -48,14 +48,14 @@ class EventOnOffParameters(NamedTuple):
     ]
     phases: PhaseRules
     safety: SafetyRules
-    timing: ThresholdRules
+    timing: EmptyRow
 
 
 class EventOnOffState(NamedTuple):
     """Phase, clock, safety, whether the foot is to be lifted (1), and whether a torque too large is let go (1)."""
 
     phase: PhaseState
-    clock: ThresholdClock
+    clock: EmptyRow
     safety: SafetyState
     lifting: float
     resting: float
@@ -105,7 +105,7 @@ EVENT_ON_OFF = ControllerKind(
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
     quantities=(*quantities_of(EventOnOffParameters), *NOMINAL_QUANTITIES),
     parameters=EventOnOffParameters,
-    initial=EventOnOffState(phase=phases.START, clock=ThresholdClock(), safety=safety.START, lifting=0.0, resting=0.0),
+    initial=EventOnOffState(phase=phases.START, clock=EmptyRow(), safety=safety.START, lifting=0.0, resting=0.0),
     update=update,
     only_switches=True,
 )

@@ -15,11 +15,11 @@ from ppafo.control.walking.assistance import ASSISTING_QUANTITIES, Assistance, T
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ThresholdClock, ThresholdRules, TimingParts
+from ppafo.control.walking.timing import AT_THRESHOLDS, TimingParts
 from ppafo.errors import ScenarioError
 from ppafo.model.binding import made_of
 from ppafo.model.controlled import TORQUE
-from ppafo.model.declaration import row_with
+from ppafo.model.declaration import EmptyRow, row_with
 from ppafo.model.sensors import GaitMeasurement, Measurement
 
 
@@ -120,8 +120,8 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         )
     # One class for each law, named after it: exported C has structs of these names.
     title = "".join(part.capitalize() for part in name.split("_"))
-    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=ThresholdRules)
-    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=ThresholdClock)
+    parameters = row_with(f"{title}Parameters", LawParameters, law=law.parameters, timing=EmptyRow)
+    state = row_with(f"{title}State", LawState, law=type(law.initial), clock=EmptyRow)
     # A law without a state has nothing to begin anew, and its empty NamedTuple no literal in C.
     anew = made_of(restart_anew, f"restart_{name}", InitialStateParts(law.initial)) if len(law.initial) else keep_state
     parts = WalkingParts(timing=AT_THRESHOLDS, state=state, update=law.update, restart=law.restart or anew)
@@ -134,7 +134,7 @@ def walking_law(law: ControllerKind, name: str, summary: str) -> ControllerKind:
         parameters=parameters,
         initial=state(
             phase=phases.START,
-            clock=ThresholdClock(),
+            clock=EmptyRow(),
             safety=safety.START,
             request=assistance.START,
             law=law.initial,

@@ -27,8 +27,8 @@ from ppafo.control.walking.assistance import (
 from ppafo.control.walking.fault_checks import SafetyRules
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
-from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts, ThresholdClock, ThresholdRules
-from ppafo.model.declaration import Number, quantities_of
+from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
+from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.helping import PUSH_OFF
 from ppafo.model.sensors import GaitMeasurement
 
@@ -149,14 +149,14 @@ class EventDampedLearningParameters(NamedTuple):
     assistance: Assistance
     phases: PhaseRules
     safety: SafetyRules
-    timing: ThresholdRules
+    timing: EmptyRow
 
 
 class EventDampedLearningState(NamedTuple):
     """Phase, clock, safety, the requested torque, the torque's course, and what was learnt."""
 
     phase: PhaseState
-    clock: ThresholdClock
+    clock: EmptyRow
     safety: SafetyState
     request: TorqueRequest
     law: TorqueSlope
@@ -222,7 +222,7 @@ KIND = ControllerKind(
     parameters=EventDampedLearningParameters,
     initial=EventDampedLearningState(
         phase=phases.START,
-        clock=ThresholdClock(),
+        clock=EmptyRow(),
         safety=safety.START,
         request=assistance.START,
         law=TorqueSlope(0.0, 0.0, 0.0),

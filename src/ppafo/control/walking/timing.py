@@ -18,7 +18,7 @@ from typing import Annotated, Any, NamedTuple
 
 from ppafo.control.kind import FORCE_LAG, VALVE_DELAY
 from ppafo.control.walking.phases import PhaseRules, PhaseState
-from ppafo.model.declaration import Number, Quantity, quantities_of
+from ppafo.model.declaration import EmptyRow, Number, Quantity, quantities_of
 from ppafo.model.helping import LANDING, SWING
 from ppafo.model.sensors import GaitMeasurement
 
@@ -50,28 +50,20 @@ class TimingKind:
     gait_time: Callable[[Any, Any, PhaseState], GaitTime]
 
 
-class ThresholdRules(NamedTuple):
-    """Nothing to set: the rules of the phases say it all."""
-
-
-class ThresholdClock(NamedTuple):
-    """State of a timing by force thresholds beside the phases: empty."""
-
-
 def follow_thresholds(
-    rules: ThresholdRules,
+    rules: EmptyRow,
     phase_rules: PhaseRules,
-    clock: ThresholdClock,
+    clock: EmptyRow,
     before: PhaseState,
     phase: PhaseState,
     measurement: GaitMeasurement,
     period: float,
-) -> ThresholdClock:
+) -> EmptyRow:
     """The clock after a sample, taken every ``period`` [s]: nothing."""
     return clock
 
 
-def threshold_time(rules: ThresholdRules, clock: ThresholdClock, phase: PhaseState) -> GaitTime:
+def threshold_time(rules: EmptyRow, clock: EmptyRow, phase: PhaseState) -> GaitTime:
     """The time since the detected heel strike [s]; the foot lands once that was detected."""
     return GaitTime(phase.since_strike, 1.0 if phase.phase == LANDING else 0.0)
 
@@ -97,8 +89,8 @@ THRESHOLDS = TimingKind(
     summary="The stride begins when the heel force has passed its threshold; nothing is known before it is detected.",
     source="the paper, figure 1A",
     quantities=(),
-    parameters=ThresholdRules,
-    initial=ThresholdClock(),
+    parameters=EmptyRow,
+    initial=EmptyRow(),
     follow=follow_thresholds,
     gait_time=threshold_time,
 )

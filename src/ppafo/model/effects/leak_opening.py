@@ -11,6 +11,13 @@ from ppafo.model.ports import leakage_path
 class LeakOpening(NamedTuple):
     """Pressure between the chambers at which the leak begins [Pa], above 0, and how slowly it then opens [-]."""
 
+    opening_pressure: float
+    opening_rise: float
+
+
+class LeakSettings(NamedTuple):
+    """Settings of a leak past the vane that opens in use: when, and how slowly."""
+
     pressure: Annotated[
         float, Number("Pa_d", "pressure between chambers at which the leak opens, 0 for always", 0.0, 0.0, 1.0e7)
     ]
@@ -25,7 +32,7 @@ def lifted(
     The gas lifts the lip of a seal against its preload, in either direction. The flow begins without a jump, is half of
     the orifice's flow at ``w P_o`` above the opening pressure ``P_o``, and approaches the orifice's far above it.
     """
-    opening, rise = leak_opening.pressure, leak_opening.rise
+    opening, rise = leak_opening.opening_pressure, leak_opening.opening_rise
     # e / (e + w P_o) written as 1 - w P_o / (e + w P_o), whose divisor is never 0, and whose sign shuts the leak below
     # P_o.
     above = max(abs(pressure_1 - pressure_2), opening) + (rise - 1.0) * opening
@@ -36,7 +43,7 @@ def lifted(
 EFFECT = Effect(
     name="leak_opening",
     summary="A leak between the chambers that opens at a pressure.",
-    settings=LeakOpening,
+    settings=LeakSettings,
     parameters=LeakOpening,
     prepare=None,
     switch=("pressure",),
@@ -44,7 +51,7 @@ EFFECT = Effect(
     source="assumed: a lip that the gas lifts against a constant preload, to be fitted to an actuator",
     equation="C = C_l e / (e + w P_o), e = max(0, |P_1 - P_2| - P_o)",
     symbols=(
-        ("P_o", "pressure", "Pa", "pressure between the chambers at which the leak opens"),
-        ("w", "rise", "-", "excess at which half of the leak is open, over the pressure at which it opens"),
+        ("P_o", "opening_pressure", "Pa", "pressure between the chambers at which the leak opens"),
+        ("w", "opening_rise", "-", "excess at which half of the leak is open, over the pressure at which it opens"),
     ),
 )

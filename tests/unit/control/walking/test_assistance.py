@@ -10,8 +10,9 @@ from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import Assistance, TorqueProfile, profile_torque
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.control.walking.phases import DebouncedSensor, PhaseState
-from ppafo.control.walking.timing import ThresholdClock, ThresholdRules, threshold_time
+from ppafo.control.walking.timing import threshold_time
 from ppafo.engine.rows import rebuilt
+from ppafo.model.declaration import EmptyRow
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
 from ppafo.model.sensors import GaitMeasurement
 from ppafo.model.valves.kind import VENT
@@ -32,9 +33,7 @@ FOLLOWING = [
 
 
 def wanted(phase: PhaseState, angle: float, rate: float, rules: Assistance = RULES) -> float:
-    return assistance.requested_torque(
-        rules, phase, threshold_time(ThresholdRules(), ThresholdClock(), phase), angle, rate
-    )
+    return assistance.requested_torque(rules, phase, threshold_time(EmptyRow(), EmptyRow(), phase), angle, rate)
 
 
 def at(phase: float, share: float) -> PhaseState:
