@@ -400,4 +400,4 @@ NOT_PUBLISHED_CLAIM = Claim(
     "in tests/, on synthetic recordings; it says nothing about the paper's device.",
     words=f"{len(NOT_PUBLISHED)} statements",
 )
-"""One claim on all that nothing published can test."""
+"""The claim on everything that nothing published can test."""
