@@ -79,7 +79,7 @@ def decay_of(source: RecordingSource, start: float | None, end: float | None) ->
                 f"{source.name}: {PROCEDURE}: channel '{VELOCITY}' is {gain:.3g} times as fast as 'angle' changes; "
                 f"check unit and sign of both"
             )
-    return FreeDecay(time - time[0], angle, sign, velocity)
+    return FreeDecay(time=time - time[0], angle=angle, sign=sign, velocity=velocity)
 
 
 def _falling_part(source: RecordingSource, part: Recording, starts_here: bool) -> tuple[slice, float]:

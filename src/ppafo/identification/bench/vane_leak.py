@@ -243,7 +243,7 @@ def closed_chambers(source: RecordingSource, start: float | None, end: float | N
             f"{MINIMUM_SAMPLES} are needed; record faster, or give start"
         )
     time = part.time[:last] - part.time[0]
-    return _ClosedChambers(time, first[:last], second[:last], fuller, number)
+    return _ClosedChambers(time=time, first=first[:last], second=second[:last], fuller=fuller, number=number)
 
 
 _POINTS = 400
