@@ -12,7 +12,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS, load_walking_cont
 from ppafo.control.walking.timings import TIMINGS
 from ppafo.documents.models import make_schema, one_of, optional, table
 from ppafo.documents.problems import quote
-from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
+from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
 from ppafo.model.shut_off import SHUT_OFF
@@ -38,6 +38,7 @@ from ppafo.simulation.schema import (
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
+from ppafo.wording import nearest_name
 
 SUMMARY = "the device on a leg that walks along a prescribed gait"
 """Description of the motion of a walk."""

@@ -14,7 +14,7 @@ from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, one_line, refused_as
+from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, at_fault, refused_as
 from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.fault_catalogue import PLANT_FAULTS
@@ -81,6 +81,7 @@ from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.task_sequence import load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
+from ppafo.wording import one_line
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -158,10 +159,11 @@ def load_walk(
                 f"{file}: override '{override}': the {path.partition('.')[0]} is given as '{one_line(other)}' "
                 "already; give it once"
             )
-    content = FILE.parse(FILE.read(scenario), file)
-    folder = Path(scenario).parent
+    with at_fault("scenario"):
+        content = FILE.read(scenario)
+    document, folder = FILE.parse(content, file), Path(scenario).parent
     return scenario_of(
-        ScenarioRequest(file, str(scenario), folder, content, given, set_or_load(parameter_set), instead), WALKING
+        ScenarioRequest(file, str(scenario), folder, document, given, set_or_load(parameter_set), instead), WALKING
     )
 
 

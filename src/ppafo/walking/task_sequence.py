@@ -15,7 +15,7 @@ from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional,
 from ppafo.documents.problems import NAME, quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.engine.rows import leaves
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.elementary import sine_and_cosine
@@ -25,6 +25,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import DocumentReader
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
+from ppafo.wording import nearest_name
 
 FILE = TomlKind("task sequence", "task-sequence", resources.files("ppafo.walking") / "task_sequences", ScenarioError)
 

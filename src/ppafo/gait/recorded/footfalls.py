@@ -12,12 +12,13 @@ from itertools import pairwise
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, count_of
+from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
 from ppafo.gait.plausible_angles import SHANK_RANGE, check_angle_range
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
+from ppafo.wording import count_of
 
 LOADED, UNLOADED = 0.05, 0.03
 """Body weights: above the first the foot is on the ground, below the second it is off it."""

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, PpafoError, count_of, noted_in, raise_noted
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
@@ -35,6 +35,7 @@ from ppafo.gait.recorded.source import GaitSource, of_largest_one, read_source
 from ppafo.gait.recorded.strides import StrideSelection, of_usual_time, without_drop_outs, without_odd_shapes
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
 from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, low_pass
+from ppafo.wording import count_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, PpafoError, nearest_name, noted_in, one_line, raise_noted
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.mean_stride import SignSource
 from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
 from ppafo.gait.recorded.form import Convention, GaitForm
@@ -17,6 +17,7 @@ from ppafo.gait.recorded.walk import LOADS, Signal, walk_signals
 from ppafo.kinds import Kinds
 from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
+from ppafo.wording import nearest_name, one_line
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
 

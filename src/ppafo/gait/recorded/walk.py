@@ -15,15 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import (
-    DataError,
-    PpafoError,
-    UnitError,
-    noted_in,
-    one_line,
-    raise_noted,
-    refused_as,
-)
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
 from ppafo.gait.mean_stride import SignSource, other_sign
 from ppafo.gait.plausible_angles import SHANK_RANGE
@@ -39,6 +31,7 @@ from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
+from ppafo.wording import one_line
 
 _MINIMUM_SAMPLES = 20
 """Samples without which a low pass has no inside."""

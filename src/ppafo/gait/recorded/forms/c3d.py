@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import Events, MotionTable, TrialData, bare_label
@@ -15,6 +15,7 @@ from ppafo.signals.recording import Floats
 from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart
 from ppafo.storage.files import read_bytes
 from ppafo.storage.trial_reading import check_can_be_read
+from ppafo.wording import one_line
 
 _AXES = "xyz"
 _MARK = b"\x50"

@@ -6,13 +6,14 @@ A CSV file need not have the header ``name [unit]``: names alone or with the uni
 import re
 from pathlib import Path
 
-from ppafo.errors import DataError, UnitError, one_line, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.recorded.delimited import Cells, NumberBlock, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.mapping import Side, package_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.storage.comma_separated import kind_of_comments
 from ppafo.units import to_si
+from ppafo.wording import one_line
 
 _DELIMITERS = ",;\t"
 

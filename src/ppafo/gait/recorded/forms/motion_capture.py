@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.gait.recorded.delimited import (
     Cells,
     Clock,
@@ -27,6 +27,7 @@ from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
 from ppafo.gait.recorded.table import AXES, MotionTable, bare_label
 from ppafo.signals.recording import Floats
+from ppafo.wording import one_line
 
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
 """Blocks of a Nexus export: markers, angles and moments of models; force plates and other analog channels."""
