@@ -199,6 +199,7 @@ class Program:
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
     that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
     ``has_vacuum`` True where the supplies are below the atmosphere: a command above 0 then lowers what it raises else.
+    ``has_one_chamber`` True where nothing is measured of chamber 2, which is the dead volume behind a port alone.
     """
 
     valve: ValveModel
@@ -226,6 +227,7 @@ class Program:
     foot: FootPhases | None = None
     controlled: str = TORQUE
     has_vacuum: bool = False
+    has_one_chamber: bool = False
 
     @property
     def groups(self) -> Groups:
