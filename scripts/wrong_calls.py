@@ -161,7 +161,7 @@ ARGUMENTS: Mapping[str, str] = {
     "bottle": "recordings gas_per_stride? stride_time? peak_flow? bottle? walk? rest? longest overrides",
     "compare": (
         "overrides seed? threads? progress? confidence maximum_failed configurations? study? tasks "
-        "baseline? draws check"
+        "baseline? draws? check"
     ),
     "compare_walks": "scenario minutes? progress",
     "design": ("problem:object? threads? mass? stature? torque? pressure? minutes? toes? catalogue? bottle? progress?"),
@@ -170,7 +170,7 @@ ARGUMENTS: Mapping[str, str] = {
         "overrides seed? threads? progress? confidence maximum_failed study metric statistic width? also "
         "configuration first_draws draws"
     ),
-    "evaluate": "recording columns",
+    "evaluate": "recording columns?",
     "find": "scenario vary such_that highest grid overrides threads? progress?",
     "identify": "problem progress",
     "linearise": "scenario at overrides",
@@ -185,7 +185,7 @@ ARGUMENTS: Mapping[str, str] = {
     "load_tuning": "tuning overrides",
     "load_walk": "scenario:name overrides gait? task_sequence? bottle? parameter_set?",
     "parts": "part? catalogue",
-    "read_recording": "path atmosphere columns",
+    "read_recording": "path atmosphere columns?",
     "read_result": "folder",
     "reproduce": "study:name overrides progress?",
     "scenario_from_dict": "content overrides",

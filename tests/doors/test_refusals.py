@@ -10,7 +10,7 @@ import pytest
 
 from ppafo.errors import PpafoError
 from ppafo.exports.c_library import c_library
-from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.fmu.interface import closed_loop
 from ppafo.exports.fmu.platforms import host_platform
 from ppafo.exports.fmu.unit import functional_unit

@@ -7,16 +7,15 @@ argument, says what it takes and quotes the value; so are words that Python itse
 import contextlib
 import functools
 import inspect
-import re
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
-from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, TypeVar
+from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.values import Taken, annotated_parameters, shown, taken
-from ppafo.errors import ArgumentError, PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError
+from ppafo.wording import nearest_name
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -30,38 +29,21 @@ class _Parameter(NamedTuple):
     taken: Taken
 
 
-class _Signature(NamedTuple):
-    """The parameters of a function by name, and the ones that a call may give by position."""
-
-    parameters: Mapping[str, _Parameter]
-    positional: tuple[str, ...]
-
-
-_says_arguments: ContextVar[bool] = ContextVar("_says_arguments", default=True)
-
-
-_has_options: ContextVar[bool] = ContextVar("_has_options", default=False)
+_Reader = Literal["caller", "function", "command line"]
+_reader: ContextVar[_Reader] = ContextVar("_reader", default="caller")
 
 
 @contextlib.contextmanager
-def without_names() -> Iterator[None]:
-    """Leave errors inside as they are, without the name of an argument."""
-    token = _says_arguments.set(False)
+def read_by(reader: _Reader) -> Iterator[None]:
+    """Write errors in a ``with`` block for a reader: the caller in Python, a function of the package, a command line.
+
+    A caller knows arguments and a command line options; a function has arguments that whoever called it never gave.
+    """
+    token = _reader.set(reader)
     try:
         yield
     finally:
-        _says_arguments.reset(token)
-
-
-@contextlib.contextmanager
-def with_options() -> Iterator[None]:
-    """Speak inside to somebody at a command line, who has options where a caller in Python has arguments."""
-    token = _has_options.set(True)
-    try:
-        with without_names():
-            yield
-    finally:
-        _has_options.reset(token)
+        _reader.reset(token)
 
 
 def argument_text(name: str, value: str = "", option: str = "") -> str:
@@ -72,88 +54,60 @@ def argument_text(name: str, value: str = "", option: str = "") -> str:
     >>> argument_text("peak_flow"), argument_text("peak_flow", "4 g/s")
     ('peak_flow', "peak_flow='4 g/s'")
     """
-    if not _has_options.get():
+    if _reader.get() != "command line":
         return f"{name}={value!r}" if value else name
     option = option or f"--{name.replace('_', '-')}"
     return f"{option} {shlex.quote(value)}" if value else option
-
-
-def _usual_numpy() -> contextlib.AbstractContextManager[object]:
-    """NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
-
-    Where nobody has loaded NumPy it is the usual one.
-    """
-    numpy = sys.modules.get("numpy")
-    if numpy is None:
-        return contextlib.nullcontext()
-    usual: contextlib.AbstractContextManager[object] = numpy.errstate(all="warn", under="ignore")
-    return usual
-
-
-def _named(function: Callable[..., R], values: Mapping[str, Any]) -> R:
-    """Call a function; an error that quotes an argument, and does not name it or begin with it, gets its name."""
-    try:
-        return function(**values)
-    except PpafoError as error:
-        message = str(error)
-        # A module that was named is where other errors lie, and says itself where it is not there.
-        asked = {name: value for name, value in values.items() if name != "plugins"}
-        quoted = [(text, name) for name, value in asked.items() for text in _texts(value) if text in message]
-        # A text in quotation marks before one that stands among others; the first, for an example may follow; and of
-        # two within each other the longer one.
-        rank = {name: (f"'{text}'" in message, -message.index(text), len(text)) for text, name in quoted}
-        name = max(rank, key=lambda each: rank[each], default="")
-        # A message that begins with the path that was given, or with a file below that folder, says where it lies.
-        begins = any(re.match(rf"{re.escape(text)}[:/,]", message) for text, _ in quoted if text)
-        if name and not begins and not re.search(rf"\b{name.removesuffix('s').replace('_', '[_ -]')}", message, re.I):
-            error.args = (f"{name}: {message}",)
-        raise
-
-
-def _texts(value: Any) -> Iterator[str]:
-    """Yield the texts and paths of an argument, of a dictionary its keys."""
-    if isinstance(value, str | Path):
-        yield str(value)
-    elif isinstance(value, tuple | Mapping):
-        yield from (str(each) for each in value if isinstance(each, str | Path))
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
     """Return a function with the door before it."""
 
     @functools.cache
-    def signature() -> _Signature:
+    def signature() -> tuple[Mapping[str, _Parameter], tuple[str, ...]]:
+        """Return the parameters by name, and the names of those that a call may give by position."""
         parameters = annotated_parameters(function)
-        return _Signature(
+        return (
             {name: _Parameter(each.default, taken(each.annotation)) for name, each in parameters.items()},
             tuple(name for name, each in parameters.items() if each.kind is each.POSITIONAL_OR_KEYWORD),
         )
 
     @functools.wraps(function)
     def call(*args: P.args, **kwargs: P.kwargs) -> R:
-        values = _values(function.__name__, signature(), args, kwargs)
-        with _usual_numpy():
-            if _says_arguments.get():
-                # Only the function that was called says which argument: those that it calls have others.
-                with without_names():
-                    return _named(function, values)
-            return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
+        values = _values(function.__name__, *signature(), args, kwargs)
+        # NumPy's usual handling of errors, whatever the host program has set: an underflow is 0, and nothing to raise.
+        numpy = sys.modules.get("numpy")
+        usual = contextlib.nullcontext() if numpy is None else numpy.errstate(all="warn", under="ignore")
+        is_outermost = _reader.get() == "caller"
+        with usual, read_by("function") if is_outermost else contextlib.nullcontext():
+            try:
+                return function(**values)  # type: ignore[call-arg]  # names and types are those of the signature
+            except PpafoError as error:
+                if is_outermost and error.argument in values:
+                    error.args = (f"{error.argument}: {error}",)
+                raise
 
     return call
 
 
 def _values(
-    function: str, signature: _Signature, positional: tuple[Any, ...], by_name: Mapping[str, Any]
+    function: str,
+    parameters: Mapping[str, _Parameter],
+    places: Sequence[str],
+    positional: Sequence[Any],
+    by_name: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Return the arguments of a call by name, each as the function takes it."""
-    parameters, places = signature
     if len(positional) > len(places):
         left = [name for name in parameters if name not in places]
-        named = [(_taking(parameters, left, value), value) for value in positional[len(places) :]]
-        known = map(shown, positional[: len(places)])
-        now = ", ".join([*known, *(f"{name}={shown(value)}" for name, value in named)])
+        now = list(map(shown, positional[: len(places)]))
+        for value in positional[len(places) :]:
+            # The first of the names that are left whose parameter takes the value.
+            name = next((name for name in left if _takes(parameters[name], value)), left[0] if left else "...")
+            left = [other for other in left if other != name]
+            now.append(f"{name}={shown(value)}")
         count = {1: "one argument"}.get(len(places), f"{len(places)} arguments")
-        raise ArgumentError(f"{function}() takes {count} by position: write {function}({now})")
+        raise ArgumentError(f"{function}() takes {count} by position: write {function}({', '.join(now)})")
     given = dict(zip(places, positional, strict=False))
     for name, value in by_name.items():
         if name not in parameters:
@@ -166,20 +120,17 @@ def _values(
     if missing:
         takes = "; ".join(f"{name} is {parameters[name].taken.what}" for name in missing)
         raise ArgumentError(f"{function}() needs {' and '.join(missing)}: {takes}")
-    return {name: _value(name, parameters[name], value) for name, value in given.items()}
+    for name, value in given.items():
+        own = parameters[name]
+        if value is not own.default and not (value is None and own.taken.allows_none):
+            given[name] = own.taken.take(name, value)
+    return given
 
 
-def _taking(parameters: Mapping[str, _Parameter], left: list[str], value: Any) -> str:
-    """Take from the names that are left the first whose parameter takes a value."""
-    for name in left:
-        with contextlib.suppress(ArgumentError):
-            parameters[name].taken.take(name, value)
-            left.remove(name)
-            return name
-    return left.pop(0) if left else "..."
-
-
-def _value(name: str, parameter: _Parameter, value: Any) -> Any:
-    if value is parameter.default or (value is None and parameter.taken.allows_none):
-        return value
-    return parameter.taken.take(name, value)
+def _takes(parameter: _Parameter, value: Any) -> bool:
+    """Tell whether a parameter takes a value."""
+    try:
+        parameter.taken.take("", value)
+    except ArgumentError:
+        return False
+    return True

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from ppafo.errors import ArgumentError, UnitError, one_line
+from ppafo.errors import ArgumentError, UnitError
 from ppafo.units import SI, number_text, parse_quantity, split_number
 from ppafo.units.shown import units_beside
+from ppafo.wording import one_line
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _EXAMPLES = {

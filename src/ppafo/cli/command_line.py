@@ -17,12 +17,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, Protocol, final
 
 from ppafo.arguments import Word, number, whole_number
-from ppafo.arguments.door import with_options
+from ppafo.arguments.door import read_by
 from ppafo.arguments.values import annotated_parameters
 from ppafo.cli import output
-from ppafo.errors import ArgumentError, PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
+from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -277,11 +278,11 @@ def run(parsed: argparse.Namespace, name: str, command: Command) -> int:
     if OUT not in parameters:
         folder = parsed.out
         if folder is None and command.default_folder:
-            with with_options():
+            with read_by("command line"):
                 folder = kind_at(command.default_folder)(values)
         # Before the verb runs: a folder that is refused must not cost a long run.
         output.check_output(folder, name)
-    with output.progress_line() as progress, with_options():
+    with output.progress_line() as progress, read_by("command line"):
         answer = verb(**values, **({PROGRESS: progress} if PROGRESS in parameters else {}))
     return output.deliver(answer, parsed.json, folder, name, has_written=OUT in parameters)
 

@@ -1,6 +1,7 @@
 """``ppafo hil SCENARIO --port PORT``: a scenario's plant in real time against a controller at a wire."""
 
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +12,10 @@ from ppafo.units.shown import in_units
 
 if TYPE_CHECKING:
     from ppafo.exports.hil.result import HardwareRun
+
+
+_SAME_PERIOD = 1.0e-9
+"""Difference of two sample periods, as a fraction of one, that rounding makes."""
 
 
 def hil(
@@ -41,29 +46,34 @@ def hil(
     ...
     ppafo.errors.ScenarioError: no controller answered within 0.2 s; received: nothing
     """
-    from ppafo.exports.hil.loop import stop_by_interrupt
-    from ppafo.exports.hil.plant import check_forces
-    from ppafo.exports.hil.run import run_at
+    from ppafo.exports.hil.loop import LockStep, RealTime, stop_by_interrupt
+    from ppafo.exports.hil.plant import check_baud, plant_of
+    from ppafo.exports.hil.run import run_plant
+    from ppafo.exports.hil.wire import open_port
     from ppafo.loading import load_scenario
     from ppafo.storage import check_result_folder
 
     chosen = load_scenario(scenario, overrides)
-    check_forces(chosen)
     # Before the first sample: a folder that is refused must not cost a run with a bench.
     folder = out if out is not None else Path("out") / f"{chosen.name}-hil"
     with output.blame_out_option():
         check_result_folder(folder)
     with stop_by_interrupt() as is_stopped:
-        ran = run_at(
-            port,
-            chosen,
-            rate=rate,
-            baud=baud,
-            in_lock_step=lock_step,
-            patience=patience,
-            is_stopped=is_stopped,
-            say=_say,
-        )
+        with closing(open_port(port, baud)) as line:
+            # A datagram has no line whose rate could be too low.
+            if line.is_stream:
+                check_baud(baud, rate)
+            plant, decided = plant_of(chosen, rate), chosen.controller.period
+            if plant.period > decided * (1.0 + _SAME_PERIOD):
+                remark = (
+                    f"--rate {rate}: a sample every {plant.period * 1.0e3:.4g} ms, for a controller of the scenario "
+                    f"that decides every {decided * 1.0e3:.4g} ms; it has the wrong gains unless it was exported for "
+                    f"this rate: give --set controller.rate={rate}Hz here and to 'ppafo export controller'"
+                )
+                print(f"ppafo: {remark}", file=sys.stderr, flush=True)
+            output.tell(f"calling the controller at {port}")
+            # In lock step the pace waits for each answer, whatever the sample period is.
+            ran = run_plant(plant, line, (lambda _: LockStep()) if lock_step else RealTime, patience, is_stopped)
         from ppafo.report.drawing import load_drawing
 
         load_drawing()
@@ -97,7 +107,3 @@ def _said(ran: "HardwareRun", port: str, folder: Path) -> CommandOutput:
         return CommandOutput(text, document)
     aside = f"{result.scenario.name}: {exchange.vented or result.status.message}"
     return CommandOutput(text, document, exit_code=EXIT_CHECK_FAILED, aside=aside)
-
-
-def _say(text: str) -> None:
-    print(f"ppafo: {text}", file=sys.stderr, flush=True)

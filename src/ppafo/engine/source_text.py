@@ -26,9 +26,10 @@ import numpy as np
 from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
-from ppafo.errors import ProgramError, nearest_name, one_line
+from ppafo.errors import ProgramError
 from ppafo.model.binding import frame_of, is_made_of, made_of, parts_of
 from ppafo.model.declaration import PlainFunction
+from ppafo.wording import nearest_name, one_line
 
 COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}

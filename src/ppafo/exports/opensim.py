@@ -7,11 +7,12 @@ optimisation gives every actuator a control of its own, and gave the device 0 N 
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
+from ppafo.arguments.door import argument_text
 from ppafo.errors import ScenarioError
+from ppafo.gait.recorded.mapping import Side
 from ppafo.signals import Channel, Recording
 from ppafo.storage import read_recording
 from ppafo.storage.opensim import opensim_bytes
@@ -22,7 +23,6 @@ from ppafo.walking.result import WalkResult
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import walk
 
-Side = Literal["right", "left"]
 FEW_STRIDES = 0.2
 """Minutes of a walk without a task sequence, unless given."""
 SHORTEST_STRIDE, LONGEST_STRIDE = 0.4, 5.0
@@ -85,10 +85,10 @@ def device_torque(result: WalkResult, side: Side = "right", strikes: Sequence[fl
 def check_strikes(strikes: Sequence[float]) -> None:
     """Refuse times [s] that are no heel strikes of one foot, one after the other; ScenarioError."""
     if len(strikes) < 2:
-        raise ScenarioError("--strikes: give two heel strikes or more, such as 0.63,1.86")
+        raise ScenarioError(f"{argument_text('strikes')}: give two heel strikes or more, such as 0.63,1.86")
     for first, last in pairwise(strikes):
         if not SHORTEST_STRIDE <= last - first <= LONGEST_STRIDE:
             raise ScenarioError(
-                f"--strikes: from {first:g} to {last:g} s is not a stride: heel strikes of one foot are "
-                f"{SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in order"
+                f"{argument_text('strikes')}: from {first:g} to {last:g} s is not a stride: heel strikes of one foot "
+                f"are {SHORTEST_STRIDE:g} to {LONGEST_STRIDE:g} s apart, in order"
             )

@@ -14,7 +14,7 @@ from typing import NamedTuple, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import IdentificationError, nearest_name
+from ppafo.errors import IdentificationError
 from ppafo.identification.wording import in_shown_unit
 from ppafo.signals import CHANNELS, Recording, RecordingKind
 from ppafo.signals.faults import (
@@ -29,6 +29,7 @@ from ppafo.signals.faults import (
 )
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
+from ppafo.wording import nearest_name
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,7 +38,8 @@ METRICS: Kinds[MetricKind] = Kinds(
 
 def metric_kind(name: str) -> MetricKind | None:
     """Return a metric that a metered run may have, those of verdicts included; None for an unknown name."""
-    return METRICS.get(name) or SETTLED_METRICS.get(name)
+    # A name that is none of the package's has METRICS look for a metric of another package.
+    return SETTLED_METRICS.get(name) or METRICS.get(name)
 
 
 def evaluate(recording: Recording) -> dict[str, Metric]:

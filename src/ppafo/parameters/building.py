@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.actuators.kind import Range
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES
 from ppafo.model.columns import Problem, at, first, larger, smaller
@@ -42,6 +42,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.parameters.plant import shape_and_growth
 from ppafo.units.shown import shown_text
+from ppafo.wording import nearest_name, one_line
 
 _SAME = 1.0e-9
 """Angles [rad] this near are one, written in two ways."""

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, count_of, nearest_name, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.units import from_si
+from ppafo.wording import count_of, nearest_name
 
 TIME = "time"
 TIME_UNIT = "s"

@@ -1,4 +1,4 @@
-"""Times of day that loggers write, with and without a date and a zone, as seconds."""
+"""Clocks of loggers as seconds: times of day, with and without a date and a zone, and counters of 32 bits."""
 
 import re
 from collections.abc import Sequence
@@ -7,8 +7,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
+from ppafo.wording import one_line
 
 DateOrder = Literal["day month", "month day"]
 """Order of day and month in a date such as 03/04/2026."""
@@ -33,6 +34,10 @@ _MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name
 """Number of a month by the first three letters of its name, in English and German."""
 _LONGEST_SHOWN = 40
 """Characters of a cell that a message repeats."""
+_PERIODS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
+"""Seconds after which a counter of 32 bits begins again, of microseconds and of milliseconds."""
+_LARGEST_STEP = 10.0
+"""Usual intervals [-] across a fall; a longer one is a clock that was set back, and no counter."""
 
 
 class _Stamp(NamedTuple):
@@ -168,3 +173,17 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
         return date(year + 2000 if year < 100 else year, month, day).toordinal()
     except ValueError:
         return None
+
+
+def counted_on(time: Floats) -> Floats:
+    """Return a time [s] without the falls of a counter of 32 bits, ``micros()`` or ``millis()``; any other as it is."""
+    steps = np.diff(time)
+    falls = steps < 0.0
+    if not falls.any() or not (steps > 0.0).any():
+        return time
+    usual_step = float(np.median(steps[steps > 0.0]))
+    for period in _PERIODS:
+        across_falls = steps[falls] + period
+        if (across_falls > 0.0).all() and (across_falls <= _LARGEST_STEP * usual_step).all():
+            return np.asarray(time + period * np.concatenate(([0.0], np.cumsum(falls))))
+    return time

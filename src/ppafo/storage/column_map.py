@@ -15,10 +15,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.documents.models import StrictTable, Text, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import DataError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, refused_as
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import TIME, Between, Floats
 from ppafo.storage.clock import ClockForm, DateOrder
+from ppafo.wording import nearest_name, one_line
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 

@@ -21,11 +21,11 @@ import numpy as np
 
 from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, first_twice, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.signals import CHANNELS, Channel, Recording, RecordingKind
 from ppafo.signals.recording import BETWEEN, PLAIN_NUMBER, TIME, TIME_UNIT, Between, Floats
-from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes, text_of, write_file
+from ppafo.wording import first_twice, nearest_name, one_line
 
 _OTHERS = (
     (";", "semicolons", 'delimiter = "semicolon", and decimal = "comma" if numbers have decimal commas'),
@@ -201,6 +201,8 @@ def read_csv(path: str | Path, label: str | None = None, atmosphere: float = STA
 
     Gauge pressure counts from ``atmosphere`` [Pa absolute]. DataError for a file that is not usable.
     """
+    from ppafo.storage.clock import counted_on  # a run reads no clocks of loggers
+
     content = read_bytes(path)
     try:
         text = text_of(content, remedy='; a column map with encoding = "latin-1" reads that')

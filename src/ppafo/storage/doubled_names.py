@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ppafo.errors import one_line
 from ppafo.signals.recording import Floats
+from ppafo.wording import one_line
 
 _LONGEST_SHOWN = 40
 """Characters of a name that a remark repeats."""

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, Floats
-from ppafo.storage.clock import clock_seconds
+from ppafo.storage.clock import clock_seconds, counted_on
 from ppafo.storage.column_map import (
     ColumnMap,
     MappedChannel,
@@ -25,11 +25,11 @@ from ppafo.storage.column_map import (
     shown_names,
 )
 from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si
-from ppafo.storage.counter import counted_on
 from ppafo.storage.files import read_bytes
 from ppafo.storage.frames import remedy_for
 from ppafo.storage.mapped_text import read_mapped_text
 from ppafo.storage.matlab import MATLAB_SUFFIX, MatlabFile, read_matlab
+from ppafo.wording import nearest_name, one_line
 
 # What a column map takes of a MATLAB file, by the names of its variables: ``M(:,3)``, ``log.pressure``.
 

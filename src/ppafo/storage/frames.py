@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, one_line, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT, recording_kind
 from ppafo.storage.comma_separated import HeaderColumn, check_clock, in_si, parse_header
+from ppafo.wording import one_line
 
 PANDAS_READERS = {
     ".xlsx": "read_excel({path!r})",

@@ -14,12 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.errors import DataError
 from ppafo.signals.recording import TIME
 from ppafo.storage.clock import is_clock
 from ppafo.storage.column_map import LONGEST_SHOWN, ColumnMap, MappedTable, in_map, shown_names
 from ppafo.storage.comma_separated import SPLIT_NUMBERS, kind_of_comments
 from ppafo.storage.files import text_of
+from ppafo.wording import nearest_name, one_line
 
 _DELIMITERS = {"comma": ",", "semicolon": ";", "tab": "\t"}
 _MARKS = {"point": ".", "comma": ",", "apostrophe": "'", "blank": " "}

@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes
 from ppafo.storage.trial_reading import check_can_be_read
+from ppafo.wording import one_line
 
 MATLAB_SUFFIX = ".mat"
 _HDF5 = b"\x89HDF\r\n\x1a\n"

@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals import Channel, Recording, recording_kind
 from ppafo.signals.recording import PLAIN_NUMBER, TIME, TIME_UNIT
 from ppafo.storage.files import read_bytes
 from ppafo.storage.netcdf import BETWEEN, PLAIN_NUMBER_IN_NETCDF
+from ppafo.wording import one_line
 
 _DAMAGED = (OSError, KeyError, RuntimeError, TypeError, ValueError, OverflowError, MemoryError)
 """Exceptions of h5py on a truncated or damaged file."""

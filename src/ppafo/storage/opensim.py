@@ -12,12 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals import Recording, RecordingKind
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
 from ppafo.storage.files import write_file
 from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, text_lines
+from ppafo.wording import one_line
 
 _END = "endheader"
 _COUNT = re.compile(r"(nRows|nColumns|datarows|datacolumns)\s*(?:=|\s)\s*(\S+)", re.IGNORECASE)

@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from ppafo.documents.json_text import json_document
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError
 from ppafo.storage.files import LEFT_ASIDE, write_file
+from ppafo.wording import reason
 
 _ADDRESS_MARK = "://"
 _MAXIMUM_BYTES_OF_DOCUMENT = 100_000_000

@@ -19,11 +19,12 @@ from ppafo.arguments.door import argument_text
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.json_text import json_document, json_text
 from ppafo.documents.regular_file import read_regular_file
-from ppafo.errors import DataError, one_line, reason, refused_as
+from ppafo.errors import DataError, refused_as
 from ppafo.signals import Recording, recording_kind
 from ppafo.storage.comma_separated import csv_bytes, read_csv
 from ppafo.storage.files import add_files, check_folder_can_be_replaced, read_bytes, replace_folder
 from ppafo.storage.netcdf import netcdf_bytes
+from ppafo.wording import one_line, reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

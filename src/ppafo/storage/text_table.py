@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 from ppafo.storage.files import read_bytes, text_of
+from ppafo.wording import one_line
 
 LONGEST_SHOWN = 40
 """Characters of a cell that a message repeats."""

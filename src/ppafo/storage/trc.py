@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals.recording import TIME, Floats
 from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
 from ppafo.storage.text_table import LONGEST_SHOWN, check_growing, number_in, text_lines
+from ppafo.wording import one_line
 
 _FIRST_WORD = "PathFileType"
 _HEAD_LINES = 5

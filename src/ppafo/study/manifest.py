@@ -20,7 +20,7 @@ from ppafo.documents.json_text import plain
 from ppafo.documents.models import validate
 from ppafo.documents.problems import quote
 from ppafo.engine.lanes import write_source
-from ppafo.errors import DataError, StudyError, UnitError, one_line
+from ppafo.errors import DataError, StudyError, UnitError
 from ppafo.metrics import METRICS
 from ppafo.parameters.declaration import fits
 from ppafo.signals.recording import CHANNELS
@@ -32,6 +32,7 @@ from ppafo.study.blocks import chunk_count, chunk_size
 from ppafo.units import to_si
 from ppafo.units.shown import GAUGE_ZERO
 from ppafo.version import __version__
+from ppafo.wording import one_line
 
 # A controller in Python as plain data: its class with a hash of the source, and its settings after a reset.
 

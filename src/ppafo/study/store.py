@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, ScenarioError, StudyError, one_line, refused_as
+from ppafo.errors import DataError, ScenarioError, StudyError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.running import most_reversals
 from ppafo.signals.recording import CHANNELS
@@ -35,6 +35,7 @@ from ppafo.study.blocks import Chunk, chunk, chunk_count, drawn_values, samples_
 from ppafo.study.manifest import MANIFEST, STUDY_COPY, check_same_study, manifest, read_manifest
 from ppafo.study.runs import follows, unvaried, with_companions
 from ppafo.study.sent_plugins import SentPlugin, take_plugins
+from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,7 +11,7 @@ import ppafo
 from ppafo.arguments import Count, Fraction, Mass, Overrides, Threads, Word, checked
 from ppafo.arguments.door import argument_text
 from ppafo.cli.main import main
-from ppafo.errors import ArgumentError, StudyError
+from ppafo.errors import ArgumentError, StudyError, at_fault
 
 TASK = "torque-task-proportional"
 
@@ -107,6 +107,9 @@ def test_a_name_is_taken_wherever_an_object_is() -> None:
 def test_an_error_about_the_content_of_an_argument_begins_with_its_name_and_keeps_its_class() -> None:
     with pytest.raises(StudyError, match=r"^vary: 'nonsense' is not of the form"):
         ppafo.find(TASK, vary="nonsense", such_that="rms_error <= 1 N m")
+    # The example in the message is the other argument, word by word.
+    with pytest.raises(StudyError, match=r"^vary: 'rms_error <= 0\.3 N m' is not of the form"):
+        ppafo.find(TASK, vary="rms_error <= 0.3 N m", such_that="supply.pressure=20..90 psi_g")
     # A message that begins with the path that was given says where it lies.
     with pytest.raises(ppafo.ScenarioError, match=r"^nowhere\.toml: cannot be read"):
         ppafo.simulate(Path("nowhere.toml"))
@@ -114,10 +117,20 @@ def test_an_error_about_the_content_of_an_argument_begins_with_its_name_and_keep
         ppafo.audit("nowhere")
 
 
-def test_of_two_arguments_in_a_message_the_one_at_fault_is_named() -> None:
-    # The example in the message is the other argument, word by word.
-    with pytest.raises(StudyError, match=r"^vary: 'rms_error <= 0\.3 N m' is not of the form"):
-        ppafo.find(TASK, vary="rms_error <= 0.3 N m", such_that="supply.pressure=20..90 psi_g")
+def test_the_argument_at_fault_is_one_of_the_function_that_was_called() -> None:
+    @checked
+    def inner(walk: str) -> None:
+        with at_fault("walk"):
+            raise StudyError(f"there is no walk '{walk}'")
+
+    @checked
+    def outer(walks: str, size: str) -> None:
+        with at_fault(size):
+            inner(walks)
+
+    for size, said in {"size": "^size: there is no walk 'a'$", "other": "^there is no walk 'a'$"}.items():
+        with pytest.raises(StudyError, match=said):
+            outer("a", size)
 
 
 def test_overrides_in_another_place_are_answered_with_a_call_that_works() -> None:

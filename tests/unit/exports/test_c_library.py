@@ -17,7 +17,7 @@ import pytest
 from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of, batches_of
 from ppafo.exports.c_library import c_library, scenario_library
-from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.c_library.library import c_identifier
 from ppafo.exports.c_library.plant import plant_library
 from ppafo.metrics import METRICS
 from ppafo.metrics.metric import Readings

@@ -21,7 +21,7 @@ from ppafo.engine.rows import row_numbers
 from ppafo.engine.run import batch_of
 from ppafo.errors import ParameterError, ScenarioError
 from ppafo.exports.c_library import c_library, walk_library
-from ppafo.exports.c_library.files import ExportParameter, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, c_identifier
 from ppafo.exports.c_library.walk_preparation import settings_of_walk
 from ppafo.loading import load_scenario
 from ppafo.simulation.motion_kind import VANE, WALK

@@ -31,7 +31,7 @@ WORDS = st.integers(0, 2**32 - 1)
 HALVES = st.integers(0, 2**16 - 1)
 FLAGS = st.integers(0, 255)
 COUNTS = st.integers(-(2**31), 2**31 - 1)
-NAMES = [channel.name for channel in CHANNELS]
+NAMES = list(CHANNELS)
 SAMPLES = st.builds(WireSample, FLAGS, HALVES, WORDS, WORDS, st.dictionaries(st.sampled_from(NAMES), COUNTS))
 ANSWERS = st.builds(Answer, FLAGS, HALVES, WORDS, WORDS, st.integers(-FULL_COMMAND, FULL_COMMAND))
 PACKETS = st.one_of(SAMPLES, ANSWERS)
@@ -72,8 +72,8 @@ def test_the_tables_of_the_page_are_those_of_the_code() -> None:
         "1": 1.0,
     }
     cells = rows_of_page(r"(\d+) \| `(\w+)`(?:, absolute)? \| ([^|]+?) \|")
-    assert {int(bit): (name, units[unit]) for bit, name, unit in cells} == dict(enumerate(map(tuple, CHANNELS)))
-    assert {channel.name for channel in CHANNELS} <= set(KNOWN)
+    assert {int(bit): (name, units[unit]) for bit, name, unit in cells} == dict(enumerate(CHANNELS.items()))
+    assert CHANNELS.keys() <= KNOWN.keys()
 
 
 def test_a_packet_is_laid_out_as_struct_and_zlib_say() -> None:

@@ -5,12 +5,14 @@ import ctypes
 import json
 import os
 import select
+import shlex
 import signal
 import socket
 import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -158,6 +160,15 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
     words = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-shared", "-fPIC"]
     subprocess.run([str(COMPILER), *words, "link.c", "-o", "link.so"], cwd=folder, check=True, capture_output=True)
     return ctypes.CDLL(str(folder / "link.so"))
+
+
+def test_the_next_command_of_a_controller_names_its_file_with_what_was_set(tmp_path: Path) -> None:
+    file = tmp_path / "my task.toml"
+    file.write_text(files("ppafo.scenarios").joinpath(f"{TASK}.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    page = example_controller(load_scenario(file, WHOLE[:1]))["README.md"].decode()
+    (line,) = [line.strip() for line in page.splitlines() if line.strip().startswith("ppafo hil")]
+    words = shlex.split(line)
+    assert words == ["ppafo", "hil", str(file), "--set", WHOLE[0], "--port", "udp:127.0.0.1:5000", "--out", "out/hil"]
 
 
 class CSample(ctypes.Structure):
@@ -347,7 +358,7 @@ def test_what_is_no_serial_port_is_said_in_words(place: str, tmp_path: Path, mon
     Path("folder").mkdir()
     Path("file").touch()
     os.mkfifo("pipe")
-    with pytest.raises(ScenarioError, match=rf"^--port serial:{place}: cannot be opened: not a serial port$"):
+    with pytest.raises(ScenarioError, match=rf"^port serial:{place}: cannot be opened: not a serial port$"):
         open_port(f"serial:{place}")
 
 

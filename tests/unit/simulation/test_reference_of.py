@@ -9,7 +9,7 @@ import pytest
 
 from ppafo.analyses.linearise.point import equilibrium
 from ppafo.errors import ScenarioError
-from ppafo.exports.hil.run import plant_of
+from ppafo.exports.hil.plant import plant_of
 from ppafo.processor.firmware import firmware
 from ppafo.running import simulate
 from ppafo.simulation.ensemble import COMPLETED, REFUSED, run_ensemble

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from ppafo.analyses.compare.answer import ComparisonResult, ConfigurationResult, OnTask, front_of, remarks_of
 from ppafo.analyses.compare.pairs import COMPARED, Paired, best_probabilities, compare_pairs, compared_metrics
-from ppafo.errors import StudyError, first_twice, nearest_name
+from ppafo.errors import StudyError
 from ppafo.progress import Report
 from ppafo.report.kind import ConfidenceInterval
 from ppafo.simulation.scenario import Scenario
@@ -25,6 +25,7 @@ from ppafo.studies.sampling import NOISE, with_new_noise
 from ppafo.studies.study import Configuration, Study, with_overrides
 from ppafo.studies.varying import value_at, varied_path
 from ppafo.study.runs import Rows, RunCounter, Runs, failures_of, unvaried
+from ppafo.wording import first_twice, nearest_name
 
 AS_WRITTEN = "as written"
 """Name of a configuration's task where no other task is requested."""

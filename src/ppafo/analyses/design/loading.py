@@ -8,7 +8,7 @@ from ppafo.analyses.design.profile.problem import SizingFile, SizingProblem, siz
 from ppafo.arguments import checked
 from ppafo.documents.models import make_schema, validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import StudyError
+from ppafo.errors import StudyError, at_fault
 from ppafo.plugins import Plugins, name_plugins
 
 FILE = TomlKind("design", "design", resources.files("ppafo.analyses.design") / "library", StudyError)
@@ -28,7 +28,9 @@ def load_design(problem: str | Path, *, plugins: Plugins = ()) -> SizingProblem:
     """
     name_plugins(plugins)
     file = label(str(problem))
-    document = validate(SizingFile, FILE.parse(FILE.read(problem), file), file, StudyError)
+    with at_fault("problem"):
+        content = FILE.read(problem)
+    document = validate(SizingFile, FILE.parse(content, file), file, StudyError)
     return sizing_problem(document, file, Path(problem).parent)
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import ScenarioError, StudyError, UnitError, one_line, refused_as
+from ppafo.errors import ScenarioError, StudyError, UnitError, at_fault, refused_as
 from ppafo.progress import Report
 from ppafo.simulation.scenario import Scenario
 from ppafo.studies.distributions import Floats
@@ -16,6 +16,7 @@ from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, varied_path
 from ppafo.study.runs import RunCounter, Runs, oscillating, settled, tracking_violation, with_companions
 from ppafo.units import split_quantity
+from ppafo.wording import one_line
 
 FEWEST, MOST = 3, 100_000
 """Values that may be tried first, from both ends with one between."""
@@ -186,8 +187,10 @@ def outermost(
     ``vary`` is ``PATH=LOW..HIGH`` and ``such_that`` is ``METRIC <= LIMIT`` or ``METRIC >= LIMIT``; ``grid`` values
     are tried first, the highest that meets the condition is sought, or else the lowest.
     """
-    searched = range_of(vary, base)
-    condition = condition_of(such_that, base, searched.path.path)
+    with at_fault("vary"):
+        searched = range_of(vary, base)
+    with at_fault("such_that"):
+        condition = condition_of(such_that, base, searched.path.path)
     if not FEWEST <= grid <= MOST:
         raise StudyError(f"grid = {grid}: must be at least {FEWEST} and at most {MOST:,}")
     # The same streams for all values, so that neighbours differ by the value alone.

@@ -13,7 +13,7 @@ from ppafo.analyses.reproduce.claim import Verdict
 from ppafo.analyses.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_task_sequence
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
-from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
+from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
@@ -23,6 +23,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import healthy_metrics, walk
+from ppafo.wording import nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5

@@ -23,7 +23,7 @@ from ppafo.analyses.reproduce.decision_phases import PhasedRuns, phased_runs
 from ppafo.analyses.reproduce.meaning_of_u import readings_of_u
 from ppafo.analyses.reproduce.step_response import SupplyLevels, step_events, step_observations
 from ppafo.constants import GRAMS_PER_KILOGRAM
-from ppafo.errors import ParameterError, ScenarioError, SimulationError, count_of
+from ppafo.errors import ParameterError, ScenarioError, SimulationError
 from ppafo.parameters import load_parameter_set
 from ppafo.parameters.audit import audit
 from ppafo.parameters.overrides import Override, override_set, read_overrides
@@ -35,6 +35,7 @@ from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.overrides import apply_overrides, chosen_by, is_of_device, unknown_value
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result, simulate
+from ppafo.wording import count_of
 
 # The torque task: what the paper claims of tracking error and gas, and what its text tells of both valves.
 

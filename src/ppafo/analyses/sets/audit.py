@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ppafo.errors import ParameterError, count_of, refused_as
+from ppafo.errors import ParameterError, refused_as
 from ppafo.parameters import ParameterSet, apply_overrides, load_parameter_set
 from ppafo.parameters.audit import AuditFinding, audit, changed_paths
 from ppafo.parameters.audit.changes import changes
 from ppafo.report.finding import Finding, Section, columns_of
+from ppafo.wording import count_of
 
 _WIDTH = 100
 _INDENT = "    "

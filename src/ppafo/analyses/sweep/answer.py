@@ -11,7 +11,7 @@ from ppafo.analyses.sweep.figure import figure_of
 from ppafo.analyses.sweep.results import SUMMARY, StudyResults, metric_kind
 from ppafo.arguments import checked
 from ppafo.documents.models import validate
-from ppafo.errors import DataError
+from ppafo.errors import DataError, at_fault
 from ppafo.report.finding import Finding, Section, columns_of, facts, files_of
 from ppafo.storage.places import place_at, read_document
 from ppafo.study.manifest import MANIFEST, read_manifest
@@ -199,7 +199,8 @@ def load_study_results(folder: str | Path) -> Finding[StudyResults]:
     'torque-task-uncertainty: 8 runs: 8 completed'
     """
     location = place_at(folder)
-    document = read_manifest(location)
+    with at_fault("folder"):
+        document = read_manifest(location)
     try:
         summary: dict[str, Any] = read_document(location, SUMMARY)
     except (OSError, ValueError) as error:

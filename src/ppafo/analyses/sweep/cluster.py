@@ -9,10 +9,11 @@ from itertools import islice
 from typing import Any
 from uuid import uuid4
 
-from ppafo.errors import StudyError, one_line, reason
+from ppafo.errors import StudyError
 from ppafo.storage.places import place_at
 from ppafo.study.blocks import chunk_count
 from ppafo.study.store import ChunkTask, FinishedChunk, note_file, work_on_chunk
+from ppafo.wording import one_line, reason
 
 _TASKS_PER_THREAD = 3
 """Tasks that wait at the scheduler for every thread of the workers: enough to keep them busy, few for 10^9 runs."""

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.errors import DataError, StudyError, nearest_name
+from ppafo.errors import DataError, StudyError
 from ppafo.report.kind import Kind, of_stored_metric
 from ppafo.signals.recording import CHANNELS
 from ppafo.storage.parquet import as_numpy, column_names, matrix_of, read_parquet
 from ppafo.storage.places import Place
 from ppafo.study.runs import joined
 from ppafo.study.store import check_types, chunk_file, stored_rows, trace_column
+from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:
     import pyarrow as pa

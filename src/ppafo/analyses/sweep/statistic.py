@@ -15,6 +15,7 @@ from ppafo.analyses.sweep.statistic_kind import FEWEST_SEEN, Statistic, parse_st
 from ppafo.analyses.sweep.stopping import InterimEstimate, OfMean, StatisticEstimate, StoppingRule, stopping_rule
 from ppafo.arguments import Confidence, Count, MaximumFailed, Name, Overrides, Seed, Threads, checked
 from ppafo.documents.json_text import plain
+from ppafo.errors import at_fault
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.progress import Report
 from ppafo.report.finding import Finding
@@ -90,8 +91,10 @@ def estimate(
     """
     name_plugins(plugins)
     chosen, base, uncertainty = drawn_in(study, overrides, configuration)
+    check_metrics((metric,), base.scenario)
+    with at_fault("also"):
+        check_metrics(also, base.scenario)
     wanted = tuple(dict.fromkeys((metric, *also)))
-    check_metrics(wanted, base.scenario)
     what = parse_statistic(statistic, metric, atmosphere_of(base.scenario, {*uncertainty.paths, *uncertainty.same}))
     # A probability may be 0, of which a fraction says nothing: its width is a difference.
     asked = width or (PROBABILITY_WIDTH if what.threshold is not None else DEFAULT_WIDTH)

@@ -11,7 +11,6 @@ import numpy as np
 
 from ppafo.analyses.tune.problem import Problem
 from ppafo.analyses.tune.result import FRESH_DRAWS, INFEASIBLE, GainResult, SearchStart, Tuned, agreement
-from ppafo.errors import count_of
 from ppafo.metrics.metric import controlled_in
 from ppafo.metrics.tracking import ONE_INSTANT
 from ppafo.model.controlled import CONTROLLED, TORQUE
@@ -27,6 +26,7 @@ from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import fraction_text
 from ppafo.units import percentage, without_exponent
 from ppafo.units.shown import in_units, quantity_of_unit
+from ppafo.wording import count_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

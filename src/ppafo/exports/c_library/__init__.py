@@ -6,20 +6,14 @@ from functools import partial
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.engine.run import batch_of
 from ppafo.errors import ProgramError
+from ppafo.exports.c_library.conditions import RULES_OF_TIMES, choosing
 from ppafo.exports.c_library.entries import follow_entry, prepare_entry
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import exported
-from ppafo.exports.c_library.files import (
-    RULES_OF_TIMES,
-    Library,
-    SwitchedSettings,
-    c_identifier,
-    choosing,
-    library_files,
-    words_of,
-    words_of_walk,
-)
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.library import Library, Switch, c_identifier
 from ppafo.exports.c_library.preparation import VANE_PREPARATION, Preparation
+from ppafo.exports.c_library.readme import words_of, words_of_walk
 from ppafo.exports.c_library.settings import relations_of, settings_of
 from ppafo.model.catalog import ordered_effects
 from ppafo.parameters.device import Device
@@ -137,13 +131,13 @@ def library_of(scenario: Scenario) -> Library:
     return _LIBRARIES[scenario.motion.motion_kind.layout](scenario)
 
 
-def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[SwitchedSettings, ...]:
+def _switches(device: Device, others: Iterable[tuple[Sequence[str], bool]]) -> tuple[Switch, ...]:
     """Settings that choose the program by being 0 or not: of the valve, and others."""
     settings = device.valve.settings
     of_valve = [((f"valve_{name}",), settings[name] > 0.0) for name in choosing(device)]
-    of_effects = [
+    of_effects: list[Switch] = [
         ([c_identifier(f"{effect.section}.{name}") for name in effect.switch], True)
         for effect in effects_of(device)
         if effect.switch
     ]
-    return tuple(SwitchedSettings(tuple(names), is_above) for names, is_above in (*of_valve, *of_effects, *others))
+    return (*of_valve, *of_effects, *others)

@@ -11,7 +11,7 @@ from ppafo.engine.source_text import SourceCollector, place_of
 from ppafo.errors import ProgramError
 from ppafo.exports.c_library.boundary import Boundary
 from ppafo.exports.c_library.exported import COUNTS
-from ppafo.exports.c_library.files import ExportParameter, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, c_identifier
 from ppafo.exports.c_library.preparation import Preparation
 from ppafo.model.declaration import PlainFunction, quantities_of
 from ppafo.parameters.graph import Graph, LinkFunction

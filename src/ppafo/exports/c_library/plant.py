@@ -9,7 +9,8 @@ from ppafo.control.controllers import switching
 from ppafo.exports.c_library import library_of
 from ppafo.exports.c_library.expected import expected_csv
 from ppafo.exports.c_library.exported import ExportedProgram
-from ppafo.exports.c_library.files import ExportParameter, Library, LibraryApi, c_identifier, library_files
+from ppafo.exports.c_library.files import library_files
+from ppafo.exports.c_library.library import ExportParameter, Library, LibraryApi, c_identifier
 from ppafo.exports.c_library.walk_preparation import check_can_leave
 from ppafo.model.controlled import CONTROLLED
 from ppafo.model.valves.kind import VENT
@@ -99,11 +100,6 @@ class PlantAlone:
     def inputs(self) -> tuple[Input, ...]:
         """Inputs at each step, the command first."""
         return (self.drive.command, *self.drive.inputs)
-
-    @property
-    def motion(self) -> str:
-        """Motion of the joint within a step, in words."""
-        return self.drive.motion
 
 
 STEPS, SAMPLES = "run.step", "controller.period"
@@ -249,7 +245,7 @@ def surfaced(alone: PlantAlone) -> PlantAlone:
         "are_numbers": " && ".join([*(f"{name} - {name} == 0.0" for name in names), *_volume_conditions(alone)]),
         "said_inputs": ";\n".join(comments) + ".",
         "listed_inputs": "\n".join(entries),
-        "motion": alone.motion,
+        "motion": alone.drive.motion,
         "highest": repr(alone.drive.command.maximum),
         "lead": "\n".join(
             f"    parameters->{field} = {expression.format(**by_name)};" for field, expression in alone.drive.parameters

@@ -17,7 +17,7 @@ from ppafo.engine.run import NEVER_FAILED, moment_at_start, whole_and_rest
 from ppafo.engine.scheme.motion import StepControl
 from ppafo.engine.scheme.pneumatics import is_slow
 from ppafo.engine.step.lane import Lane, LaneResult, LaneTiming
-from ppafo.exports.c_library.files import c_identifier
+from ppafo.exports.c_library.library import c_identifier
 from ppafo.model.actuators.kind import Range, mean_growth
 from ppafo.model.catalog import VALVES
 from ppafo.model.columns import larger, smaller

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from ppafo.exports.c_library.files import ExportParameter, Relation, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
 from ppafo.model.catalog import device_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.building import consistency

@@ -10,7 +10,7 @@ from typing import Any
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.engine.rows import rebuilt
 from ppafo.errors import ScenarioError
-from ppafo.exports.c_library.files import ExportParameter, Relation, c_identifier
+from ppafo.exports.c_library.library import ExportParameter, Relation, c_identifier
 from ppafo.exports.c_library.preparation import (
     Preparation,
     PreparedLane,

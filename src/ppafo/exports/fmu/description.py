@@ -112,7 +112,7 @@ def build_description_of_fmi3(identifier: str, flags: str) -> bytes:
 def _head(version: str, interface: Interface, **further: str) -> dict[str, str]:
     return {
         "fmiVersion": version,
-        "modelName": interface.name,
+        "modelName": interface.library.title,
         **further,
         "description": interface.library.description,
         "version": __version__,

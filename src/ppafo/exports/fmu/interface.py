@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ppafo.exports.c_library import library_of
-from ppafo.exports.c_library.files import Library
+from ppafo.exports.c_library.library import Library
 from ppafo.exports.c_library.plant import Input, follow_lines, half_open, plant_of, surfaced
 from ppafo.simulation.scenario import Scenario
 
@@ -29,7 +29,7 @@ _PLANT_TUNING = "They are taken at the next communication step."
 
 @dataclass(frozen=True, slots=True)
 class Interface:
-    """The interface of a unit: the settings and outputs of its library that are its variables, and its inputs.
+    """Interface of a unit: its library, whose settings, outputs and metrics are its variables, and its inputs.
 
     ``templates`` are the files of C that move it on, and ``words`` what is filled in there by name. ``hidden`` are the
     paths of settings that are no variables. ``time`` tells people how the unit goes on, ``tuning`` when it takes a
@@ -39,15 +39,12 @@ class Interface:
     under the command ``EXAMPLE``.
     """
 
-    name: str
     library: Library
     templates: tuple[str, ...]
     time: str
     tuning: str
     step: float
     duration: float
-    outputs: tuple[str, ...]
-    shows_metrics: bool
     is_step_fixed: bool
     clock: str | None
     hidden: frozenset[str]
@@ -61,15 +58,12 @@ def closed_loop(scenario: Scenario) -> Interface:
     library = library_of(scenario)
     times = {setting.path: setting.value for setting in library.settings}
     return Interface(
-        name=scenario.name,
         library=library,
         templates=("stepped.c", "closed_loop.c"),
         time=_LOOP_TIME,
         tuning=_LOOP_TUNING,
         step=times["run.output_interval"],
         duration=times["run.duration"],
-        outputs=library.program.outputs,
-        shows_metrics=True,
         is_step_fixed=False,
         clock="ticks when the controller decides, every controller.period",
         hidden=frozenset(),
@@ -89,15 +83,12 @@ def plant_alone(scenario: Scenario) -> Interface:
     inputs = ", ".join(f"inputs[{index}]" for index in range(len(alone.inputs)))
     numbers = {variable.name: f"inputs[{index}]" for index, variable in enumerate(alone.inputs)}
     return Interface(
-        name=library.title,
         library=library,
         templates=("stepped.c", "plant_inputs.c", "plant.c"),
-        time=_PLANT_TIME.format(motion=alone.motion, clock=alone.clock),
+        time=_PLANT_TIME.format(motion=alone.drive.motion, clock=alone.clock),
         tuning=_PLANT_TUNING,
         step=alone.step,
         duration=scenario.run.duration,
-        outputs=library.program.outputs,
-        shows_metrics=False,
         is_step_fixed=True,
         clock=None,
         hidden=alone.hidden,

@@ -94,7 +94,7 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
 
     ProgramError where it cannot be loaded, a call fails, or an output is another number.
     """
-    head, *lines = expected_csv(interface.run, interface.outputs).decode().splitlines()
+    head, *lines = expected_csv(interface.run, interface.library.program.outputs).decode().splitlines()
     rows = [[float(text) for text in line.split(",")] for line in lines]
     numbers = {variable.name: variable.number for variable in variables_of(interface)}
     outputs = head.split(",")[1:]
@@ -103,7 +103,9 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
         try:
             loaded = ctypes.CDLL(str(Path(folder, "unit")))
         except OSError as error:
-            raise ProgramError(f"{interface.name}: the FMU was built but cannot be loaded here: {error}") from error
+            raise ProgramError(
+                f"{interface.library.title}: the FMU was built but cannot be loaded here: {error}"
+            ) from error
         instance: _Fmi2 | _Fmi3 = _Fmi2(loaded, token) if fmi == 2 else _Fmi3(loaded, token)
         with closing(instance):
             given = _array(c_uint, [numbers[name] for name in inputs]), _array(c_double, list(inputs.values()))
@@ -116,7 +118,7 @@ def check_unit(interface: Interface, fmi: int, token: str, library: bytes) -> No
                     if status or value != wanted:
                         problem = f"{name} is {value!r}, Python has {wanted!r}" if not status else "a call fails"
                         raise ProgramError(
-                            f"{interface.name}: the FMU differs from the Python run at {time:g} s: {problem}; "
+                            f"{interface.library.title}: the FMU differs from the Python run at {time:g} s: {problem}; "
                             f"nothing is written"
                         )
 

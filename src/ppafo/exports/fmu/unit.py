@@ -7,15 +7,17 @@ import zipfile
 from collections.abc import Sequence
 from importlib.resources import files
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.arguments.door import argument_text
+from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
 from ppafo.exports.fmu.interface import Interface
-from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, Platform, build, host_platform
+from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
 from ppafo.exports.fmu.trial import check_unit
 from ppafo.exports.fmu.variables import tuning_of, variability_of
 from ppafo.version import __version__
+from ppafo.wording import nearest_name
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 """The earliest date of a zip file: a unit does not depend on the day on which it was made."""
@@ -35,7 +37,13 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     and for a unit of this computer that gives other numbers than Python.
     """
     # Before anything is built: a misspelt platform should not cost a compilation.
-    chosen = {name: _platform(name, fmi) for name in platforms}
+    for name in platforms:
+        if name not in PLATFORMS:
+            hint = nearest_name(name, PLATFORMS)
+            raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
+        if fmi == 2 and PLATFORMS[name].folder_2 is None:
+            raise ScenarioError(f"platform {name} is not defined in FMI 2: give {argument_text('fmi')} 3")
+    chosen = {name: PLATFORMS[name] for name in platforms}
     identifier = interface.library.name
     sources = _sources(interface, fmi)
     token = hashlib.sha256(b"".join(sources.values())).hexdigest()[:32]
@@ -44,7 +52,7 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
     main = f"fmi{fmi}.c"
     tried = "".join(f"<tr><td>{name}</td><td>{platform.tried}</td></tr>" for name, platform in chosen.items())
     words = {
-        "title": html.escape(interface.name),
+        "title": html.escape(interface.library.title),
         "description": html.escape(interface.library.description),
         "version": __version__,
         "time": interface.time,
@@ -76,17 +84,6 @@ def functional_unit(interface: Interface, fmi: int, platforms: Sequence[str]) ->
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
             archive.writestr(entry, content)
     return {f"{identifier}.fmu": target.getvalue()}
-
-
-def _platform(name: str, fmi: int) -> Platform:
-    """Return a platform; ScenarioError for a name that is none, or that a version of FMI has no folder for."""
-    platform = PLATFORMS.get(name)
-    if platform is None:
-        hint = nearest_name(name, PLATFORMS)
-        raise ScenarioError(f"platform '{name}' is not known{hint}; available: {', '.join(PLATFORMS)}")
-    if fmi == 2 and platform.folder_2 is None:
-        raise ScenarioError(f"platform {name} is not defined in FMI 2: give --fmi 3")
-    return platform
 
 
 def _sources(interface: Interface, fmi: int) -> dict[str, bytes]:

@@ -1,10 +1,10 @@
 """Variables of a unit, and what of it may change under way."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from ppafo.exports.c_library.files import OUTPUTS, ExportParameter
+from ppafo.exports.c_library.files import OUTPUTS
+from ppafo.exports.c_library.library import ExportParameter
 from ppafo.exports.fmu.interface import Interface
 from ppafo.model.controlled import CONTROLLED
 
@@ -70,61 +70,26 @@ def variables_of(interface: Interface) -> tuple[FmuVariable, ...]:
 
     The numbers are also those of the C, which counts what is no variable of the unit too.
     """
-    library = interface.library
-    first_output = len(library.settings)
-    first_metric = first_output + len(library.program.outputs)
-    first_input = first_metric + len(library.program.metrics)
-    return (
-        *_parameters(interface),
-        *_outputs(interface, first_output),
-        *(_metrics(interface, first_metric) if interface.shows_metrics else ()),
-        *_inputs(interface, first_input),
-    )
-
-
-def _parameters(interface: Interface) -> Iterator[FmuVariable]:
-    for number, setting in enumerate(interface.library.settings):
+    library, program = interface.library, interface.library.program
+    variables = []
+    for number, setting in enumerate(library.settings):
         tuning, quantity = tuning_of(interface, setting), setting.quantity
         if tuning != "hidden":
-            yield FmuVariable(
-                setting.path,
-                number,
-                quantity.unit,
-                quantity.summary or quantity.name,
-                "parameter",
-                tuning,
-                setting.value,
-                _shown_limit(quantity.minimum),
-                _shown_limit(quantity.maximum),
+            ends = (quantity.minimum, quantity.maximum)
+            limits = (limit if abs(limit) < _LARGEST_LIMIT else None for limit in ends)
+            said = quantity.summary or quantity.name
+            variables.append(
+                FmuVariable(setting.path, number, quantity.unit, said, "parameter", tuning, setting.value, *limits)
             )
-
-
-def _shown_limit(limit: float) -> float | None:
-    return limit if abs(limit) < _LARGEST_LIMIT else None
-
-
-def _outputs(interface: Interface, first: int) -> Iterator[FmuVariable]:
-    for number, name in enumerate(interface.library.program.outputs, start=first):
-        if name in interface.outputs:
-            unit, summary = OUTPUTS[name]
-            yield FmuVariable(name, number, unit, summary, "output", variability_of(name))
-
-
-def _metrics(interface: Interface, first: int) -> Iterator[FmuVariable]:
-    for number, metric in enumerate(interface.library.program.metrics, start=first):
-        yield FmuVariable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
-
-
-def _inputs(interface: Interface, first: int) -> Iterator[FmuVariable]:
-    for number, given in enumerate(interface.inputs, start=first):
-        yield FmuVariable(
-            given.name,
-            number,
-            given.unit,
-            given.summary,
-            "input",
-            "continuous",
-            given.start,
-            given.minimum,
-            given.maximum,
+    first_output = len(library.settings)
+    for number, name in enumerate(program.outputs, start=first_output):
+        variables.append(FmuVariable(name, number, *OUTPUTS[name], "output", variability_of(name)))
+    first_metric = first_output + len(program.outputs)
+    for number, metric in enumerate(program.metrics, start=first_metric):
+        variables.append(
+            FmuVariable(f"metrics.{metric.name}", number, metric.unit, metric.summary, "local", "continuous")
         )
+    for number, given in enumerate(interface.inputs, start=first_metric + len(program.metrics)):
+        taken = given.start, given.minimum, given.maximum
+        variables.append(FmuVariable(given.name, number, given.unit, given.summary, "input", "continuous", *taken))
+    return tuple(variables)

@@ -304,7 +304,6 @@ class Bench:
 
         ScenarioError where nobody answers.
         """
-        # Send the first sample until it is answered; false where it was not.
         self.judge.sent = 0
         self._show(wire.BEGIN)
         # The first sample is repeated until somebody answers: a controller may be started later than the plant.
@@ -329,11 +328,27 @@ class Bench:
                 sent = self.pace.now()
                 self.judge.sent = self.plant.taken
                 self.port.send(wire.sample_bytes(self._shown))
-            self._exchange(sent, late)
+            next_due = (self.plant.taken + 1) * self.period
+            # Nothing is to come where the port broke, or the plant is vented and the last sample had no answer.
+            is_given_up = bool(self.port.failure or (self.judge.vented and self.judge.sent - self.judge.answered > 1))
+            # In lock step nothing is waited for then, or each sample would take a second.
+            if not self.judge.is_answered and (self.pace.is_real or not is_given_up):
+                self.pace.listen(next_due, self.port, self._take)
+            answered = self._answered_at - sent if self.judge.is_answered else None
+            if self.port.failure:
+                self.judge.vent(BROKEN)
+            self._go_on(self.judge.decide(), late, answered)
+            self._show(0)
+            if self._is_going_on:
+                self.pace.rest(next_due, self.port, self._take)
         stopped = self._is_going_on
         # A stopped run goes on vented for half a second, so that its end can be seen in the recording.
         if stopped:
-            self._vent_to_the_end()
+            self.judge.vent(STOPPED)
+            self._say_over()
+            until = min(self.plant.samples, self.plant.taken + math.ceil(AFTER_STOP / self.period))
+            while self.plant.taken < until:
+                self._go_on(VENT, None, None)
         self._say_over()
         vented = next((row.due for row in self.rows if row.is_vented), None)
         return LinkTraffic(
@@ -350,34 +365,21 @@ class Bench:
             failure=self.port.failure,
         )
 
-    def _exchange(self, sent: float, late: float) -> None:
-        """Wait for the answer to the sample that was sent [s], go on under it, and wait until the next one is due."""
+    def _go_on(self, command: float, sent_late: float | None, answered_after: float | None) -> None:
+        """Log the present sample, and take the plant to the next one under a command [-]."""
         sequence = self.plant.taken
-        next_due = (sequence + 1) * self.period
-        # Nothing is to come where the port broke, or the plant is vented and the last sample had no answer.
-        is_given_up = bool(self.port.failure or (self.judge.vented and self.judge.sent - self.judge.answered > 1))
-        # In lock step nothing is waited for then, or each sample would take a second.
-        if not self.judge.is_answered and (self.pace.is_real or not is_given_up):
-            self.pace.listen(next_due, self.port, self._take)
-        answered = self._answered_at - sent if self.judge.is_answered else None
-        if self.port.failure:
-            self.judge.vent(BROKEN)
-        command = self.judge.decide()
         self.rows.append(
             LogRow(
                 sequence=sequence,
                 due=sequence * self.period,
-                sent_late=late,
-                answered_after=answered,
+                sent_late=sent_late,
+                answered_after=answered_after,
                 command=command,
                 controller_time=self.judge.controller_time,
                 is_vented=bool(self.judge.vented),
             )
         )
         self.plant.go_on(command)
-        self._show(0)
-        if self._is_going_on:
-            self.pace.rest(next_due, self.port, self._take)
 
     def _take(self, data: bytes) -> bool:
         """Take what came in; true where the sample that was sent is answered."""
@@ -415,26 +417,6 @@ class Bench:
             time=round(plant.taken * self.period * wire.MICROSECONDS) % wire.WRAP,
             counts={name: wire.count_of(name, value) for name, value in shown.items()},
         )
-
-    def _vent_to_the_end(self) -> None:
-        """Go on for ``AFTER_STOP`` with both chambers vented, not in real time."""
-        self.judge.vent(STOPPED)
-        self._say_over()
-        until = min(self.plant.samples, self.plant.taken + math.ceil(AFTER_STOP / self.period))
-        while self.plant.taken < until:
-            sequence = self.plant.taken
-            self.rows.append(
-                LogRow(
-                    sequence=sequence,
-                    due=sequence * self.period,
-                    sent_late=None,
-                    answered_after=None,
-                    command=VENT,
-                    controller_time=self.judge.controller_time,
-                    is_vented=True,
-                )
-            )
-            self.plant.go_on(VENT)
 
     def _say_over(self) -> None:
         """Tell the controller that the run is over."""

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 
+from ppafo.arguments.door import argument_text
 from ppafo.engine.lanes import RunnableProgram, load_program
 from ppafo.engine.loading import backend_described
 from ppafo.engine.run import Run, batch_of
@@ -29,8 +30,13 @@ class CompiledPlant:
 def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
     """The plant of a scenario with ``rate`` commands a second; a proportional valve gets a vent valve."""
     if not wire.LOWEST_RATE <= rate <= wire.HIGHEST_RATE:
-        raise ScenarioError(f"--rate {rate}: must be {wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second")
-    check_forces(scenario)
+        limits = f"{wire.LOWEST_RATE} to {wire.HIGHEST_RATE} samples per second"
+        raise ScenarioError(f"{argument_text('rate')} {rate}: must be {limits}")
+    if scenario.motion.motion_kind.reads_forces:
+        raise ScenarioError(
+            f"'{scenario.name}' is a walk; the link transmits no ground reaction forces, so give a scenario without "
+            f"a walk"
+        )
     if scenario.controlled != TORQUE:
         raise ScenarioError(
             f"{scenario.name}: reference.of = '{scenario.controlled}': the link transmits torque references only; "
@@ -49,20 +55,11 @@ def plant_of(scenario: Scenario, rate: int = wire.RATE) -> CompiledPlant:
     return CompiledPlant(chosen, run, module, backend_described(), period)
 
 
-def check_forces(scenario: Scenario) -> None:
-    """Refuse a scenario whose controller reads what the wire does not carry."""
-    if scenario.motion.motion_kind.reads_forces:
-        raise ScenarioError(
-            f"'{scenario.name}' is a walk; the link transmits no ground reaction forces, so give a scenario without "
-            f"a walk"
-        )
-
-
 def check_baud(baud: int, rate: int) -> None:
     """Refuse a serial line that cannot carry the samples."""
-    needed = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE * rate
-    if baud < needed:
+    bits = wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE
+    if baud < bits * rate:
         raise ScenarioError(
-            f"--baud {baud}: {rate} samples per second need {needed} baud; use a faster line, or a --rate of at "
-            f"most {baud // (wire.sample_length(CHANNELS_SENT) * wire.BITS_OF_A_BYTE)}"
+            f"{argument_text('baud')} {baud}: {rate} samples per second need {bits * rate} baud; use a faster line, "
+            f"or a {argument_text('rate')} of at most {baud // bits}"
         )

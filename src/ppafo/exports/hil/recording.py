@@ -12,11 +12,12 @@ from typing import Any, final
 
 import numpy as np
 
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError
 from ppafo.exports.hil import wire
 from ppafo.signals import CHANNELS as KNOWN
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.storage.comma_separated import mark_of
+from ppafo.wording import reason
 
 MOST_SAMPLES = 5_000_000
 ASIDE = ".recording"
@@ -82,11 +83,15 @@ class Collector:
     def __init__(self) -> None:
         self.ignored: Counter[str] = Counter()
         self.is_over = False
-        self._newest: wire.WireSample | None = None
         self._stray: wire.WireSample | None = None
         self._number = 0
-        self._elapsed = 0
         self._names: list[str] = []
+        self._begin()
+
+    def _begin(self) -> None:
+        """Begin without a sample."""
+        self._newest: wire.WireSample | None = None
+        self._elapsed = 0
         self._kind: RecordingKind = "measured"
         # In the order in which they came, as plain numbers: an hour of a bench has millions of samples.
         self._numbers, self._stamps, self._counts = array("q"), array("Q"), array("i")
@@ -105,30 +110,24 @@ class Collector:
         if self._newest is None and not packet.counts:
             self.ignored["without a channel"] += 1
             return False
-        why = "" if self._newest is None else _why_not(self._newest, packet)
-        if not why:
+        newest, stray = self._newest, self._stray
+        why = "" if newest is None else _why_not(newest, packet)
+        if newest is None or not why:
             self._drop_stray()
             return self._keep(packet)
         if why == _DOUBLED:
             self.ignored[why] += 1
             return False
-        return self._decide(packet)
-
-    def _decide(self, packet: wire.WireSample) -> bool:
-        """Keep a sample that goes on from the stray alone, with that one; any other is the next stray."""
-        stray, newest = self._stray, self._newest
-        if stray is None or newest is None or _why_not(stray, packet):
+        is_alone = len(self) == 1
+        # A sample that goes on from the stray alone is kept with that one; any other is the next stray.
+        if stray is None or _why_not(stray, packet) or not (is_alone or _why_not(newest, stray) not in _OF_OTHERS):
             self._drop_stray()
             self._stray = packet
             return False
-        if len(self) == 1:
+        if is_alone:
             # Two go on from each other and not from the first: that one was the stray.
             self.ignored["before all others"] += 1
-            self._forget()
-        elif _why_not(newest, stray) in _OF_OTHERS:
-            self._drop_stray()
-            self._stray = packet
-            return False
+            self._begin()
         self._stray = None
         self._keep(stray)
         return self._keep(packet)
@@ -158,14 +157,6 @@ class Collector:
         self._stamps.append(packet.time)
         self._counts.extend(packet.counts[name] for name in self._names)
         return True
-
-    def _forget(self) -> None:
-        """Begin anew, without the only sample so far."""
-        self._newest = None
-        self._elapsed, self._kept, self._last_kept = 0, 0, None
-        self._kind = "measured"
-        self._numbers, self._stamps, self._counts = array("q"), array("Q"), array("i")
-        self._seen = set()
 
     def _drop_stray(self) -> None:
         if self._stray is not None and self._newest is not None:
@@ -277,7 +268,18 @@ def record(
         if clock() - kept >= _BETWEEN_KEEPING:
             keep(collector.fresh_lines())
             kept = clock()
-        ended = _why_ended(collector, port, duration, clock() - heard >= patience, is_stopped())
+        if is_stopped():
+            ended = "stopped"
+        elif duration is not None and collector and collector.duration >= duration:
+            ended = "its duration"
+        elif collector.is_over:
+            ended = "the bench ended the recording"
+        elif port.failure:
+            ended = port.failure
+        elif len(collector) >= MOST_SAMPLES:
+            ended = f"{MOST_SAMPLES} samples"
+        elif clock() - heard >= patience:
+            ended = "silence of the bench"
     if not collector:
         if is_stopped():
             raise KeyboardInterrupt("interrupted before the first sample; nothing is written")
@@ -330,18 +332,3 @@ def kept_aside(target: Path) -> Iterator[Callable[[str], None]]:
         os.close(file)
         if not left:
             aside.unlink(missing_ok=True)
-
-
-def _why_ended(collector: Collector, port: wire.Port, duration: float | None, is_silent: bool, is_stopped: bool) -> str:
-    """The reason why a recording ends now; empty while it goes on."""
-    if is_stopped:
-        return "stopped"
-    if duration is not None and collector and collector.duration >= duration:
-        return "its duration"
-    if collector.is_over:
-        return "the bench ended the recording"
-    if port.failure:
-        return port.failure
-    if len(collector) >= MOST_SAMPLES:
-        return f"{MOST_SAMPLES} samples"
-    return "silence of the bench" if is_silent else ""

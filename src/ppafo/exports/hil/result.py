@@ -6,7 +6,7 @@ import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, final
+from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
@@ -49,24 +49,6 @@ class HostComputer:
     load_after: float | None
 
 
-class Timing(NamedTuple):
-    """Delays of the samples sent, response times [s], and number of samples without a response.
-
-    Samples with which a stopped run was vented are not among them: they were not sent.
-    """
-
-    sent_late: list[float]
-    answered_after: list[float]
-    missed: int
-
-
-def timing_of(rows: Sequence[LogRow]) -> Timing:
-    """Return the timing of the samples of a log."""
-    sent = [row for row in rows if row.sent_late is not None]
-    answered = [row.answered_after for row in sent if row.answered_after is not None]
-    return Timing([row.sent_late for row in sent if row.sent_late is not None], answered, len(sent) - len(answered))
-
-
 @final
 @dataclass(frozen=True, slots=True)
 class HardwareRun:
@@ -75,8 +57,17 @@ class HardwareRun:
     plant: CompiledPlant
     result: Result
     exchange: LinkTraffic
-    timing: Timing
     machine: HostComputer
+
+    @property
+    def sent_late(self) -> list[float]:
+        """Delays of the samples that were sent [s]; a stopped run is vented without sending any."""
+        return [row.sent_late for row in self.exchange.rows if row.sent_late is not None]
+
+    @property
+    def answered_after(self) -> list[float]:
+        """Response times of the samples that were answered [s]."""
+        return [row.answered_after for row in self.exchange.rows if row.answered_after is not None]
 
     @property
     def is_good(self) -> bool:
@@ -85,15 +76,15 @@ class HardwareRun:
 
     def document(self) -> dict[str, Any]:
         """The content of ``link.json``, in SI units."""
-        exchange, timing = self.exchange, self.timing
+        exchange, late, after = self.exchange, self.sent_late, self.answered_after
         return {
             "rate": round(1.0 / self.plant.period),
-            "samples": len(timing.sent_late),
-            "answered": len(timing.answered_after),
-            "missed": timing.missed,
+            "samples": len(late),
+            "answered": len(after),
+            "missed": len(late) - len(after),
             "longest_silence": longest_silence(exchange.rows) * self.plant.period,
-            "sent_late": spread(timing.sent_late),
-            "answered_after": spread(timing.answered_after),
+            "sent_late": spread(late),
+            "answered_after": spread(after),
             "stood_still": list(exchange.stood_still),
             "taken": exchange.taken,
             "refused": dict(exchange.refused),
@@ -120,7 +111,7 @@ class HardwareRun:
 
     def text(self) -> str:
         """The run in words."""
-        exchange, timing, machine = self.exchange, self.timing, self.machine
+        exchange, machine, late, after = self.exchange, self.machine, self.sent_late, self.answered_after
         others = [*exchange.ignored.items(), ("of somebody else", exchange.strangers)]
         silence = longest_silence(exchange.rows) * self.plant.period
         loads = "".join(
@@ -131,12 +122,12 @@ class HardwareRun:
         still = exchange.stood_still
         stood = f"stood still {len(still)} times, {sum(still):.3g} s in all" if still else "never stood still"
         lines = [
-            f"samples    {len(timing.sent_late)} sent, {len(timing.answered_after)} answered, {timing.missed} missed; "
+            f"samples    {len(late)} sent, {len(after)} answered, {len(late) - len(after)} missed; "
             f"longest silence {silence * _PER_THOUSAND:.3g} ms",
             *(
                 (
-                    f"answers    {described_spread(timing.answered_after)}",
-                    f"sent late  {described_spread(timing.sent_late)}",
+                    f"answers    {described_spread(after)}",
+                    f"sent late  {described_spread(late)}",
                     f"time       {stood}",
                 )
                 if exchange.is_real_time
@@ -187,19 +178,18 @@ class HardwareRun:
 
     def plot(self) -> "Figure":
         """Histograms of how late samples were sent, and after how long they were answered."""
-        period, load, timing = self.plant.period * _PER_THOUSAND, self.machine.load_after, self.timing
+        period, load = self.plant.period * _PER_THOUSAND, self.machine.load_after
+        sent_late, answered_after = self.sent_late, self.answered_after
         beside = "" if load is None else f"; load {load:.2f} on {self.machine.cores} cores"
         with house_style():
             figure, ((late, after),) = figure_of_free_panels(
                 (7.2, 3.3), FigureMargins(0.75, 0.2, 0.8, 0.85, 0.5, 0.7), 1, 2
             )
             figure.text(0.017, 0.97, f"{self.plant.scenario.name}: the link", va="top", fontsize=13, fontweight="bold")
-            said = (
-                f"Dashed: one sample, {period:g} ms. {timing.missed} of {len(timing.sent_late)} samples missed{beside}"
-            )
-            figure.text(0.017, 0.03, said, va="bottom", fontsize=9)
-            _histogram(late, timing.sent_late, "Samples, after they were due")
-            _histogram(after, timing.answered_after, "Answers, after their sample")
+            missed = f"{len(sent_late) - len(answered_after)} of {len(sent_late)} samples missed"
+            figure.text(0.017, 0.03, f"Dashed: one sample, {period:g} ms. {missed}{beside}", va="bottom", fontsize=9)
+            _histogram(late, sent_late, "Samples, after they were due")
+            _histogram(after, answered_after, "Answers, after their sample")
             late.set_ylabel("Samples")
             for axes in (late, after):
                 axes.axvline(period, color=VERMILION, linewidth=1.0, linestyle="--")
@@ -226,8 +216,8 @@ def described_spread(values: Sequence[float]) -> str:
     numbers = spread(values)
     if numbers is None:
         return "none"
-    shown = {name: f"{value * _PER_THOUSAND:.3g} ms" for name, value in numbers.items()}
-    return f"median {shown['median']}, 99 % within {shown['percentile_99']}, at most {shown['largest']}"
+    median, most, largest = (f"{value * _PER_THOUSAND:.3g} ms" for value in numbers.values())
+    return f"median {median}, 99 % within {most}, at most {largest}"
 
 
 def longest_silence(rows: Sequence[LogRow]) -> int:

@@ -1,4 +1,4 @@
-"""A scenario at the wire, from its settings to what came of it.
+"""Run of a compiled plant against the controller at a port.
 
 The plant runs in this process: why not in one of its own, docs/decisions/0022-processor-and-hardware-in-the-loop.md.
 """
@@ -10,19 +10,16 @@ from collections.abc import Callable
 
 from ppafo.engine.run import batch_of
 from ppafo.exports.hil import wire
-from ppafo.exports.hil.loop import Bench, LockStep, LoopPacing, RealTime, without_collections
-from ppafo.exports.hil.plant import CompiledPlant, check_baud, plant_of
-from ppafo.exports.hil.result import HardwareRun, HostComputer, timing_of
+from ppafo.exports.hil.loop import Bench, LoopPacing, without_collections
+from ppafo.exports.hil.plant import CompiledPlant
+from ppafo.exports.hil.result import HardwareRun, HostComputer
 from ppafo.simulation.sampled import SampledRun
-from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import result_of
 
 PATIENCE = 10.0
 """Time [s] for which the controller is called before the run is given up."""
 _LARGEST_RUN = 2**16 - 1
 """Largest number of a run: packets carry it in 16 bits."""
-_SAME_PERIOD = 1.0e-9
-"""Difference of two sample periods, as a fraction of one, that rounding makes."""
 
 
 def run_plant(
@@ -53,43 +50,7 @@ def run_plant(
         load_after=load_now(),
     )
     result = result_of(plant.scenario, plant.run, sampled.result())
-    return HardwareRun(plant, result, exchange, timing_of(exchange.rows), machine)
-
-
-def run_at(
-    port_name: str,
-    scenario: Scenario,
-    rate: int,
-    baud: int,
-    in_lock_step: bool,
-    patience: float,
-    is_stopped: Callable[[], bool],
-    say: Callable[[str], None],
-) -> HardwareRun:
-    """Open a port and run a scenario's plant there, ``rate`` samples a second, over a line of ``baud`` bits a second.
-
-    ``in_lock_step`` lets the plant wait for each answer, else it runs in real time. ``say`` hears of a rate that does
-    not fit the scenario, and of the call; ``patience`` and ``is_stopped`` as ``run_plant`` has them. ScenarioError for
-    a port, rate or scenario that does not do, and where nobody answers.
-    """
-    port = wire.open_port(port_name, baud)
-    try:
-        # A datagram has no line whose rate could be too low.
-        if port.is_stream:
-            check_baud(baud, rate)
-        plant, decided = plant_of(scenario, rate), scenario.controller.period
-        if plant.period > decided * (1.0 + _SAME_PERIOD):
-            say(
-                f"--rate {rate}: a sample every {plant.period * 1.0e3:.4g} ms, for a controller of the scenario that "
-                f"decides every {decided * 1.0e3:.4g} ms; it has the wrong gains unless it was exported for this rate: "
-                f"give --set controller.rate={rate}Hz here and to 'ppafo export controller'"
-            )
-        say(f"calling the controller at {port_name} ...")
-        # In lock step the pace waits for each answer, whatever the sample period is.
-        pace: Callable[[float], LoopPacing] = (lambda _: LockStep()) if in_lock_step else RealTime
-        return run_plant(plant, port, pace, patience, is_stopped)
-    finally:
-        port.close()
+    return HardwareRun(plant, result, exchange, machine)
 
 
 def load_now() -> float | None:

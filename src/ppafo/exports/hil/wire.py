@@ -18,7 +18,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, final
 
-from ppafo.errors import ScenarioError, one_line, reason
+from ppafo.arguments.door import argument_text
+from ppafo.errors import ScenarioError
+from ppafo.wording import one_line, reason
+
+try:
+    from termios import error as TerminalError  # noqa: N812 - an exception, by a name in lower case
+except ImportError:  # a system without terminals
+    TerminalError = OSError  # type: ignore[misc, assignment]
 
 RATE = 1000
 """Samples per second unless another rate is asked for [Hz]."""
@@ -45,33 +52,26 @@ _SHORTEST = _HEADER.size + _WORD.size + _CHECKSUM
 _LARGEST_COUNT = 2**31 - 1
 
 
-class ChannelCode(NamedTuple):
-    """A channel on the wire: its name, and the SI value of a count."""
-
-    name: str
-    scale: float
-
-
-CHANNELS = (
-    ChannelCode("reference", 1.0e-6),
-    ChannelCode("angle", 1.0e-6),
-    ChannelCode("pressure_1", 1.0),
-    ChannelCode("pressure_2", 1.0),
-    ChannelCode("torque", 1.0e-6),
-    ChannelCode("command", 1.0e-6),
-    ChannelCode("supply_pressure", 1.0),
-    ChannelCode("dorsiflexion_pressure", 1.0),
-    ChannelCode("pressure_difference", 1.0),
-    ChannelCode("external_torque", 1.0e-6),
-    ChannelCode("angular_velocity", 1.0e-6),
-    ChannelCode("upstream_pressure", 1.0),
-    ChannelCode("downstream_pressure", 1.0),
-    ChannelCode("mass_flow", 1.0e-9),
-    ChannelCode("direction", 1.0),
-    ChannelCode("repetition", 1.0),
-)
-"""Channels by the number of their bit."""
-_NUMBERS = {channel.name: number for number, channel in enumerate(CHANNELS)}
+CHANNELS = {
+    "reference": 1.0e-6,
+    "angle": 1.0e-6,
+    "pressure_1": 1.0,
+    "pressure_2": 1.0,
+    "torque": 1.0e-6,
+    "command": 1.0e-6,
+    "supply_pressure": 1.0,
+    "dorsiflexion_pressure": 1.0,
+    "pressure_difference": 1.0,
+    "external_torque": 1.0e-6,
+    "angular_velocity": 1.0e-6,
+    "upstream_pressure": 1.0,
+    "downstream_pressure": 1.0,
+    "mass_flow": 1.0e-9,
+    "direction": 1.0,
+    "repetition": 1.0,
+}
+"""SI values of a count of each channel, in the order of the bits of a mask."""
+_NAMES = tuple(CHANNELS)
 LONGEST = _SHORTEST + _WORD.size * len(CHANNELS)
 """Bytes of the longest packet."""
 
@@ -101,7 +101,7 @@ Packet = WireSample | Answer
 
 def count_of(name: str, value: float) -> int:
     """Counts of a channel for a value in SI units, rounded; as far as they go where it is beyond them."""
-    counts = value / CHANNELS[_NUMBERS[name]].scale
+    counts = value / CHANNELS[name]
     return int(max(-_LARGEST_COUNT, min(_LARGEST_COUNT, math.floor(counts + 0.5))))
 
 
@@ -112,15 +112,14 @@ def value_of(name: str, counts: int) -> float:
 
 def counts_per_unit(name: str) -> int:
     """Counts of a channel for 1 in its SI unit; a quotient by it is rounded once, a product with the scale twice."""
-    return round(1.0 / CHANNELS[_NUMBERS[name]].scale)
+    return round(1.0 / CHANNELS[name])
 
 
 def sample_bytes(sample: WireSample) -> bytes:
     """Return the packet that carries a sample to the processor."""
     # In order of bits, whatever the order of the mapping: the receiver has only the mask.
-    numbers = sorted(_NUMBERS[name] for name in sample.counts)
-    mask = sum(1 << number for number in numbers)
-    values = [sample.counts[CHANNELS[number].name] for number in numbers]
+    mask = sum(1 << _NAMES.index(name) for name in sample.counts)
+    values = [sample.counts[name] for name in _NAMES if name in sample.counts]
     return _packet(SAMPLE, sample[:4], _MASK.pack(mask) + struct.pack(f"<{len(values)}i", *values))
 
 
@@ -230,7 +229,7 @@ def _read(data: bytes) -> Packet | str:
         answer = Answer(flags=flags, run=run, sequence=sequence, time=time, command=command)
         return answer if is_good else "content"
     (mask,) = _MASK.unpack_from(data, _HEADER.size)
-    names = [channel.name for number, channel in enumerate(CHANNELS) if mask >> number & 1]
+    names = [name for number, name in enumerate(_NAMES) if mask >> number & 1]
     # Bits of channels that this version does not know, or a length that is not theirs.
     if mask >> len(CHANNELS) or len(data) != sample_length(len(names)):
         return "content"
@@ -385,28 +384,21 @@ def open_port(text: str, baud: int = DEFAULT_BAUD, listens: bool = False) -> Por
         try:
             import serial
         except ImportError as error:
-            raise ScenarioError(f"--port {text}: a serial port needs pyserial: pip install 'ppafo[hil]'") from error
+            raise ScenarioError(
+                f"{argument_text('port')} {text}: a serial port needs pyserial: pip install 'ppafo[hil]'"
+            ) from error
         try:
             device = serial.Serial(address, baud, timeout=0.0, write_timeout=_WRITE_TIMEOUT, exclusive=True)
             device.reset_input_buffer()
-        except _errors_of_ports() as error:
+        except (OSError, ValueError, OverflowError, TerminalError) as error:
             # pyserial writes the number and the words of the system twice, and names an ioctl that no user knows.
             number = error.errno if isinstance(error, OSError) else None
             why = one_line(error) if number is None else reason(OSError(number, os.strerror(number)))
             if address and Path(address).exists() and not _is_terminal(address):
                 why = "not a serial port"
-            raise ScenarioError(f"--port {one_line(text)}: cannot be opened: {why}") from error
+            raise ScenarioError(f"{argument_text('port')} {one_line(text)}: cannot be opened: {why}") from error
         return _SerialPort(device)
-    raise ScenarioError(f"--port {one_line(text)}: must be {FORMS}")
-
-
-def _errors_of_ports() -> tuple[type[Exception], ...]:
-    """Exceptions that opening a port raises: a terminal adds its own, on systems that have terminals."""
-    try:
-        import termios
-    except ImportError:
-        return (OSError, ValueError, OverflowError)
-    return (OSError, ValueError, OverflowError, termios.error)
+    raise ScenarioError(f"{argument_text('port')} {one_line(text)}: must be {FORMS}")
 
 
 def _is_terminal(address: str) -> bool:
@@ -425,7 +417,9 @@ def _is_terminal(address: str) -> bool:
 def _open_udp(text: str, place: str, listens: bool) -> _UdpPort:
     host, _, number = place.rpartition(":")
     if not host or not number.isascii() or not number.isdigit() or not 0 < int(number) <= _HIGHEST_PORT:
-        raise ScenarioError(f"--port {one_line(text)}: must be udp:HOST:PORT with a port from 1 to {_HIGHEST_PORT}")
+        raise ScenarioError(
+            f"{argument_text('port')} {one_line(text)}: must be udp:HOST:PORT with a port from 1 to {_HIGHEST_PORT}"
+        )
     own = None
     try:
         addresses = socket.getaddrinfo(host.strip("[]"), int(number), type=socket.SOCK_DGRAM)
@@ -437,4 +431,4 @@ def _open_udp(text: str, place: str, listens: bool) -> _UdpPort:
     except (OSError, UnicodeError) as error:
         if own is not None:
             own.close()
-        raise ScenarioError(f"--port {one_line(text)}: cannot be used: {reason(error)}") from error
+        raise ScenarioError(f"{argument_text('port')} {one_line(text)}: cannot be used: {reason(error)}") from error

@@ -18,7 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import count_of
 from ppafo.identification.bench.decay import (
     ANGLE,
     FEWEST_SMOOTHED,
@@ -40,6 +39,7 @@ from ppafo.report.panels import Mark, Panel
 from ppafo.report.residuals import curve_mark, readings_mark
 from ppafo.report.style import GREY
 from ppafo.signals.recording import Floats
+from ppafo.wording import count_of
 
 # How a vane slows down without pressure: equation (1) as angle and speed over time, from a push to standstill.
 

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ppafo.errors import IdentificationError, count_of
+from ppafo.errors import IdentificationError
 from ppafo.identification.bench.law import PooledReadings, Values, recordings_of, solve, sought, within
 from ppafo.identification.bench.result import BenchResult, ReportedNumber, result_of
 from ppafo.identification.source import (
@@ -36,6 +36,7 @@ from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark
 from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.recording import Floats
+from ppafo.wording import count_of
 
 Labels = NDArray[np.int64]
 

@@ -19,7 +19,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError, count_of
+from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import (
     GAS_LAW,
     NEXT_LAW,
@@ -53,6 +53,7 @@ from ppafo.report.residuals import curve_mark, readings_mark, with_residuals
 from ppafo.signals.faults import plateaus, stands_out
 from ppafo.signals.recording import Floats
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
+from ppafo.wording import count_of
 
 PROCEDURE = "vane-leak"
 LAMINAR = "effects.laminar_leak.coefficient"

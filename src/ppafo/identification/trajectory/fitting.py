@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import IdentificationError, nearest_name
+from ppafo.errors import IdentificationError
 from ppafo.identification.estimate import Estimate, Verdict
 from ppafo.identification.fit import Fit
 from ppafo.identification.fit import fit as fit_residuals
@@ -29,6 +29,7 @@ from ppafo.identification.wording import conflict_in_words, in_shown_unit, widen
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.signals.recording import CHANNELS, Channel, Recording
 from ppafo.simulation.scenario import Scenario
+from ppafo.wording import nearest_name
 
 
 @dataclass(frozen=True, slots=True)

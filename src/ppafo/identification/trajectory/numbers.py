@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from ppafo.errors import IdentificationError, nearest_name
+from ppafo.errors import IdentificationError
 from ppafo.identification.residuals import FitVariable
 from ppafo.identification.trajectory.experiment import FITTED_CHANNELS, FittedExperiment, refuse_first, scenario_of
 from ppafo.model.catalog import find_effects
@@ -16,6 +16,7 @@ from ppafo.simulation.numbers import other_form
 from ppafo.simulation.recorded.channels import DORSIFLEXION_SUPPLY, EXTERNAL_TORQUE, SUPPLY
 from ppafo.simulation.recorded.inputs import supply_paths
 from ppafo.simulation.scenario import Scenario, vane_motion
+from ppafo.wording import nearest_name
 
 TIME_OFFSET = "recording.time_offset"
 """Path of a number that no scenario has: the time by which the samples of a recording are later than the run."""

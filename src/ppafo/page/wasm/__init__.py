@@ -79,16 +79,10 @@ from ppafo.engine.package_key import COMPOSED, Key, package_key
 from ppafo.errors import PpafoError, ProgramError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library import library_of
+from ppafo.exports.c_library.conditions import conditions_of, conditions_of_program
 from ppafo.exports.c_library.exported import COUNTS, IN_PARTS, TOGETHER, WHOLE, ExportedProgram, places_of
-from ppafo.exports.c_library.files import (
-    OUTPUTS,
-    ExportParameter,
-    Library,
-    c_identifier,
-    conditions_of,
-    conditions_of_program,
-    run_words,
-)
+from ppafo.exports.c_library.files import OUTPUTS, run_words
+from ppafo.exports.c_library.library import ExportParameter, Library, c_identifier
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.device import Device
 from ppafo.parameters.graph import ATMOSPHERE_PATH, itself
@@ -174,10 +168,10 @@ def _kept(library: Library) -> dict[str, str]:
     """Settings, by name in C, that must stay zero or above zero: a switch is fixed by its sole positive setting."""
     values = {setting.name: setting.value for setting in library.settings}
     kept: dict[str, str] = {}
-    for switch in library.switches:
-        above = [name for name in switch.names if values[name] > 0.0]
-        if not switch.is_above:
-            kept |= dict.fromkeys(switch.names, "zero")
+    for names, is_above in library.switches:
+        above = [name for name in names if values[name] > 0.0]
+        if not is_above:
+            kept |= dict.fromkeys(names, "zero")
         elif len(above) == 1:
             kept[above[0]] = "above zero"
     return kept

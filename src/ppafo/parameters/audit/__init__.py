@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ppafo.arguments import checked
+from ppafo.errors import at_fault
 from ppafo.parameters.audit.chambers import (
     check_filling,
     check_rotation,
@@ -86,7 +87,9 @@ def audit(
     """
     name_plugins(plugins)
     audited = parameter_set if isinstance(parameter_set, ParameterSet) else load_parameter_set(parameter_set)
-    of_parent = set_or_load(audited.parent or None if parent is None else parent)
+    # An argument, or the key of the set.
+    with at_fault("parent"):
+        of_parent = set_or_load(audited.parent or None if parent is None else parent)
     evidence = Evidence(with_followers(audited), audited.declarations())
     findings = [finding for check in CHECKS.values() for finding in check(evidence)]
     changed, ids = overridden_paths(audited), {finding.id for finding in findings}

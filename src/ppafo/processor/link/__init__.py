@@ -1,5 +1,7 @@
 """A scenario's integer controller in C behind the protocol of ``ppafo hil``: the other side of the wire."""
 
+import shlex
+
 from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.hil.wire import MICROSECONDS
@@ -20,6 +22,8 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         raise ScenarioError(
             f"{scenario.name}: controller.period = {scenario.controller.period:.9g} s: must be a whole number of us"
         )
+    source = scenario.origin.file or scenario.name
+    settings = (word for override in scenario.origin.overrides for word in ("--set", override))
     words = {
         "title": scenario.name,
         "kind": fixed.law.kind.name,
@@ -29,7 +33,7 @@ def example_controller(scenario: Scenario) -> dict[str, bytes]:
         "torque_step": repr(fixed.converter.torque_step),
         "top": repr(fixed.converter.top),
         "middle": repr(fixed.converter.middle),
-        "next": f"ppafo hil {scenario.name} --port udp:127.0.0.1:5000 --out out/hil",
+        "next": shlex.join(["ppafo", "hil", source, *settings, "--port", "udp:127.0.0.1:5000", "--out", "out/hil"]),
     }
     own = {name: filled(template(__name__, name), words).encode() for name in _TEMPLATES}
     return dict(sorted({**own, **{name: written[name] for name in _OF_FIRMWARE}}.items()))

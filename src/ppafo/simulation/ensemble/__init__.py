@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ppafo.engine.channels import TRACED
 from ppafo.engine.lanes import Floats
 from ppafo.engine.run import TOO_MANY_PARTS
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.metrics import MetricKind, metric_kind
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals.recording import OF_SECOND_CHAMBER
@@ -19,6 +19,7 @@ from ppafo.simulation.ensemble.planning import EnsemblePlan, plan_ensemble
 from ppafo.simulation.ensemble.running import MeteredRuns, OutputRequest, intervals, offered
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import REMEDY
+from ppafo.wording import nearest_name
 
 COMPLETED, DIVERGED, REFUSED = 0, 1, 2
 """End of a run of an ensemble; refused: a combination of values that no run can have."""

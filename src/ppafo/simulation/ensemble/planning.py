@@ -34,27 +34,29 @@ Rule = Callable[[Scenario], tuple[Problem, ...]]
 class ValidRuns:
     """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not.
 
-    Without a ``clock`` it is the scenario's.
+    Without a ``clock``, which is set before anything asks for the scenario, it is the scenario's.
     """
 
     columns: ScenarioColumns
     members: Members
     reasons: dict[int, str]
     clock: RunTimes | None = None
+    _scenario: Scenario | None = None
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that represents the runs that are left."""
-        # What the clock came to stands in the place of the times that were given.
-        numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
-        scenario, clock = with_numbers(self.columns.base, numbers), self.clock
-        if clock is None:
-            return scenario
-        return replace(
-            scenario,
-            run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
-            controller=replace(scenario.controller, period=clock.period),
-        )
+        """The scenario that represents the runs that are left, made once for all rules that ask for it."""
+        if self._scenario is None:
+            # What the clock came to stands in the place of the times that were given.
+            numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
+            scenario, clock = with_numbers(self.columns.base, numbers), self.clock
+            if clock is not None:
+                run = replace(
+                    scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval
+                )
+                scenario = replace(scenario, run=run, controller=replace(scenario.controller, period=clock.period))
+            self._scenario = scenario
+        return self._scenario
 
     def at(self, places: Members) -> "ValidRuns":
         """The screen of some of these runs, which writes its reasons to the same place."""
@@ -74,7 +76,7 @@ class ValidRuns:
         for place in np.flatnonzero(bad):
             self.reasons[int(self.members[place])] = line(int(place))
         left = self.at(np.flatnonzero(~bad))
-        self.members, self.columns, self.clock = left.members, left.columns, left.clock
+        self.members, self.columns, self.clock, self._scenario = left.members, left.columns, left.clock, None
 
 
 def screen_columns(columns: ScenarioColumns) -> ValidRuns:

@@ -1,0 +1,84 @@
+"""Conditions on the settings of an exported library, as text in C."""
+
+import itertools
+import sys
+
+from ppafo.exports.c_library.library import Library, Rule
+from ppafo.model.catalog import VALVES
+from ppafo.model.declaration import Quantity
+from ppafo.parameters.device import Device
+
+_SIGNS = {"below": "<", "at most": "<=", "at least": ">=", "above": ">"}
+
+
+def conditions_of_program(library: Library) -> list[tuple[str, str]]:
+    """Conditions in C under which the settings ask for another program, with the setting that is named."""
+    values = {setting.name: setting.value for setting in library.settings}
+    conditions = []
+    for names, is_above in library.switches:
+        if is_above:
+            # The setting that switches the program on is the one to name where all of them are 0.
+            was_above = next(name for name in names if values[name] > 0.0)
+            conditions.append((f"!({' || '.join(f'settings->{name} > 0.0' for name in names)})", was_above))
+        else:
+            conditions += [(f"settings->{name} > 0.0", name) for name in names]
+    return [*conditions, *library.other_program]
+
+
+def conditions_of(library: Library) -> list[tuple[str, str]]:
+    """Conditions on settings as text in C, each with the setting that is named where it fails, also for NaN."""
+    ranges = []
+    for setting in library.settings:
+        value, sign = f"settings->{setting.name}", ">=" if setting.quantity.minimum_allowed else ">"
+        low, high = limits_in_c(setting.quantity)
+        ranges.append((f"{value} {sign} {low!r} && {value} <= {high!r}", setting.name))
+    return [*ranges, *relations_of_library(library)]
+
+
+RULES_OF_TIMES: tuple[Rule, ...] = (
+    ("run_output_interval", "is_whole({} / {})", ("run_duration", "run_output_interval")),
+    ("run_duration", "{} / {} <= 1.0e8", ("run_duration", "run_step")),
+    ("run_duration", "{} / {} <= 5.0e6", ("run_duration", "run_output_interval")),
+    ("sensors_delay", "{} / {} <= 1.0e5", ("sensors_delay", "run_step")),
+)
+"""Rules of the times of a scenario (``simulation/clock.py``)."""
+
+
+def relations_of_library(library: Library) -> list[tuple[str, str]]:
+    """Conditions between settings as text in C, each with the setting that is named."""
+    relations = []
+    for relation in library.relations:
+        other, sign = f"settings->{relation.other}", "-" if relation.relation == "at least" else "+"
+        if relation.tolerance:
+            # With the tolerance of files, or a setting that a file accepts would be refused in C.
+            slack = repr(relation.tolerance)
+            other = f"{other} * (1.0 {sign} {slack})" if relation.is_share else f"{other} {sign} {slack}"
+        relations.append((f"settings->{relation.name} {_SIGNS[relation.relation]} {other}", relation.name))
+    return [
+        *relations,
+        *((rule.format(*(f"settings->{name}" for name in names)), named) for named, rule, names in library.rules),
+    ]
+
+
+def limits_in_c(quantity: Quantity) -> tuple[float, float]:
+    """Lowest and highest value of a setting as literals in C can have them."""
+    # C can write no infinity as a literal; no setting is that large.
+    return max(quantity.minimum, -sys.float_info.max), min(quantity.maximum, sys.float_info.max)
+
+
+def choosing(device: Device) -> list[str]:
+    """Settings of the valve that choose its functions by being 0 or not."""
+    kind = VALVES[device.valve.kind]
+    names = [quantity.name for quantity in kind.quantities]
+    chosen = {}
+    # A valve may look only at which settings are 0, so both cases of each tell what chooses.
+    for pattern in itertools.product((0.0, 0.01), repeat=len(names)):
+        # The model and whether it has a dead time: both decide which program is composed.
+        settings = kind.settings(*pattern)
+        model = kind.choose(settings)
+        chosen[pattern] = model, model.command_delay(settings) > 0.0
+    return [
+        name
+        for index, name in enumerate(names)
+        if any(chosen[pattern] != chosen[*pattern[:index], 0.0, *pattern[index + 1 :]] for pattern in chosen)
+    ]

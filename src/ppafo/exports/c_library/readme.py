@@ -1,0 +1,118 @@
+"""Paragraphs of an exported library's README about one scenario or walk."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from ppafo.exports.c_library.conditions import choosing
+from ppafo.exports.c_library.library import c_identifier
+from ppafo.metrics import METRICS
+from ppafo.parameters.device import Device, SonicOrifice
+from ppafo.parameters.graph import Graph
+from ppafo.parameters.plant import effects_of
+from ppafo.simulation.scenario import Scenario, vane_motion
+
+if TYPE_CHECKING:
+    from ppafo.walking.preparation import FaultSettings
+
+_METRICS_OF_SCENARIO = """\
+They equal the metrics of a study (`ppafo sweep`) to the bit. In `ppafo simulate` the same are computed from the
+recording, whose sums are rounded in another order: they agree to about 15 digits. Not here, since they need all samples
+of a channel: {left_out}."""
+_METRICS_OF_WALK = """\
+They are means over the strides with help, from the third on, and counts; of a task sequence counts alone. In
+`ppafo walk` the same are computed from the recording, whose sums are rounded in another order: they agree to about 15
+digits. Not here, since they need the mean stride or the healthy one: `healthy_positive_work`, `push_off_share`,
+`lowest_toes`, `angle_difference`, `dorsiflexor_moment`; nor safety events and the segments of a task sequence."""
+_FOLLOWS = """\
+- As in ppafo, these follow others as long as they have their default, also where that is given: {followers}."""
+_TRAPS_OF_WALK = """\
+- `sensors_angle_bandwidth` and `sensors_pressure_bandwidth` 0 are sensors that follow at once.
+- `run_duration` is what `ppafo walk` calls `--minutes`, here in seconds and up to 10^6.
+- `..._bad_setting` looks at ranges and at contradictions of two settings. A walk file is also refused where a setting
+  contradicts the gait, or several others at once."""
+
+
+def words_of(scenario: Scenario, links: Graph) -> dict[str, str]:
+    """Texts about this scenario on the page of the library; ``links`` has the parameters that follow others."""
+    fixed = [
+        f"the valve, `{scenario.device.valve.kind}`, and the controller, `{scenario.controller.kind}`",
+        f"the reference, `{scenario.reference.kind}`, and the motion, {vane_motion(scenario).form}",
+        *_fixed_of_device(scenario),
+        _at_zero(scenario.device, scenario.sensors.flaws),
+        "whether `run_output_interval` is a whole number of steps of the engine",
+    ]
+    left_out = [kind.name for kind in METRICS.values() if kind.traced]
+    return {
+        "fixed": _listed(fixed),
+        "precomputed": "nothing",
+        "traps": _followers(links),
+        "metrics_said": _METRICS_OF_SCENARIO.format(left_out=", ".join(f"`{name}`" for name in left_out)),
+    }
+
+
+def words_of_walk(walk: Scenario, links: Graph, failing: "Mapping[str, FaultSettings]") -> dict[str, str]:
+    """Texts about this walk on the library's page, with linked parameters (``links``) and ``failing`` sensors."""
+    from ppafo.walking.motion import walk_of
+    from ppafo.walking.planning import has_ideal_sensors
+
+    faults = [f"{sensor} `{fault.kind}`" for sensor, fault in failing.items()]
+    gait, sequence = walk_of(walk).gait, walk_of(walk).task_sequence
+    way = "stride after equal stride"
+    if sequence is not None:
+        way = f"the task sequence `{sequence.name}`, which stays as it is"
+    fixed = [
+        f"the gait, `{gait.name}`: its series, its events and its stride of {gait.stride_time:.4g} s are numbers in "
+        f"the source",
+        f"how it is walked: {way}",
+        f"the valve, `{walk.device.valve.kind}`, and the controller, `{walk.controller.kind}`",
+        *_fixed_of_device(walk),
+        f"which sensors fail, and how: {', '.join(faults) or 'none'}; and whether one is late",
+        _at_zero(walk.device, () if has_ideal_sensors(walk) else (1.0,)),
+    ]
+    return {
+        "fixed": _listed(fixed),
+        "precomputed": "the gait alone" if sequence is None else "the gait and its task sequence alone",
+        "traps": f"{_followers(links)}\n{_TRAPS_OF_WALK}",
+        "metrics_said": _METRICS_OF_WALK,
+    }
+
+
+def _followers(links: Graph) -> str:
+    """The line on what follows what."""
+    said = []
+    for path, follows in links.items():
+        sources = dict.fromkeys(f"`{c_identifier(source)}`" for link in follows for source in link.sources)
+        said.append(f"`{c_identifier(path)}` ({', '.join(sources)})")
+    return _FOLLOWS.format(followers=", ".join(said) or "none")
+
+
+def _fixed_of_device(scenario: Scenario) -> list[str]:
+    """Lines on what no setting of a device changes."""
+    device = scenario.device
+    forms = {"valve": device.valve.orifice, "leak": device.actuator.leak}
+    lines = "with lines behind the regulators" if scenario.supply_lines is not None else "constant supply pressures"
+    effects = ", ".join(f"`{effect.name}`" for effect in effects_of(device) if effect.switch)
+    gas = "thermal" if scenario.gas_model is not None else "isothermal"
+    let = "let" if device.supply.takes_back else "do not let"
+    return [
+        *(
+            f"the form of the {name}, `sonic_conductance, critical_ratio`"
+            if isinstance(orifice, SonicOrifice)
+            else f"the form of the {name}, `area, discharge_coefficient`"
+            for name, orifice in forms.items()
+        ),
+        f"the gas, `{gas}`; {lines}, which {let} gas back in from a chamber above them",
+        *([f"the effects, {effects}, none of which can be switched off"] if effects else []),
+    ]
+
+
+def _at_zero(device: Device, flaws: Sequence[float]) -> str:
+    """Parameters that select functions and are 0."""
+    zero = [f"`valve_{name}`" for name in choosing(device) if not device.valve.settings[name] > 0.0]
+    flawless = [] if any(flaws) else ["what makes a sensor of `sensors_` less than ideal"]
+    here = ", ".join([*zero, *flawless]) or "none"
+    return f"which of the settings of the valve and of the sensors are 0: here 0 are {here}"
+
+
+def _listed(items: Sequence[str]) -> str:
+    return "\n".join(f"- {line}{'.' if line is items[-1] else ';'}" for line in items)
