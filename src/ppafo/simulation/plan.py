@@ -5,7 +5,7 @@ library has them in C.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from ppafo.engine.scheme.pneumatics import KEPT_OF_PRESSURE, is_slow
 from ppafo.engine.step import isothermal
 from ppafo.engine.step.lane import NoParameters
 from ppafo.errors import ScenarioError
+from ppafo.model.binding import made_of
 from ppafo.model.catalog import ACTUATORS, VALVES
 from ppafo.model.columns import (
     Numeric,
@@ -34,7 +35,7 @@ from ppafo.model.columns import (
     truncated,
     whole,
 )
-from ppafo.model.controlled import TORQUE
+from ppafo.model.controlled import OF_TORQUE, TORQUE, error_functions
 from ppafo.model.effects.kind import Effect
 from ppafo.model.gas import wall_exchange
 from ppafo.model.orifice import ExactOrifice
@@ -217,6 +218,14 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
     return not_ideal
 
 
+def _of_error(law: ControllerKind | None, components: Components) -> ControllerKind | None:
+    """Return a law that is given the functions of the error it acts on; one of a torque alone as it is."""
+    parts = error_functions(components.controlled, components.device.supply.is_vacuum)
+    if law is None or law.controls == (TORQUE,) or parts == OF_TORQUE:
+        return law
+    return replace(law, update=made_of(law.update, law.update.__name__, parts))
+
+
 def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     feed: FeedPhases | None = None
@@ -232,7 +241,7 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
         reference=PROFILES[components.reference.kind],
-        controller=components.controller,
+        controller=_of_error(components.controller, components),
         angle=None if components.path is None else PROFILES[components.path.kind],
         ideal_sensors=components.has_ideal_sensors,
         late_commands=has_delay,
@@ -250,7 +259,6 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
         shank=None if components.leg is None else components.leg.shank,
         foot=foot,
         controlled=components.controlled,
-        has_vacuum=components.device.supply.is_vacuum,
         has_one_chamber=components.device.actuator.has_one_chamber,
     )
 

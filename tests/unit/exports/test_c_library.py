@@ -90,7 +90,15 @@ def metrics_of(result: Result) -> dict[str, float]:
     for number in range(len(recording)):
         given = {name: float(recording[name][number]) for name in Sample._fields if name in recording.names}
         gas = GasSample(*(float(recording[name][number]) for name in GasSample._fields))
-        sample = Sample(number=float(number), **given, temperature_1=0.0, temperature_2=0.0, gas=gas, **NOTHING)
+        sample = Sample(
+            number=float(number),
+            **given,
+            value=given["torque"],
+            temperature_1=0.0,
+            temperature_2=0.0,
+            gas=gas,
+            **NOTHING,
+        )
         course = advance_course(course, sample)
         for name, meter in meters.items():
             states[name] = meter.update(states[name], course, sample) if number else meter.start(course, sample)

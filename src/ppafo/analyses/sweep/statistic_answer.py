@@ -1,7 +1,6 @@
 """An estimated statistic in words, its looks as a table, their trace and the histogram of the values."""
 
 import math
-from functools import partial
 
 import numpy as np
 
@@ -81,7 +80,15 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
         f"{100.0 * rule.confidence_of_look:.4g} % confidence (Bonferroni), so that all of them hold simultaneously; "
         f"{looks[-1].missing:,} draws have no value and are left out"
     )
-    rows = [_row_of(look, kind, rule) for look in looks]
+    rows = []
+    for look in looks:
+        interval = look.interval
+        met = ["narrow enough"] if rule.is_narrow(look) else []
+        if not look.is_carried:
+            met.append("its effective sample size is small")
+        ends = (kind.number(value) for value in (interval.value, interval.low, interval.high))
+        wide = kind.change(interval.width) if math.isfinite(interval.width) else f"{interval.width:.3g}"
+        rows.append((f"{look.draws:,}", f"{look.missing:,}", *ends, wide, ", but ".join(met)))
     further = [
         (of_metric(name).title, f"{mean.draws:,}", *map(of_metric(name).number, (mean.value, mean.low, mean.high)))
         for name, mean in estimated.also.items()
@@ -104,7 +111,7 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
                 "Trace",
                 columns_of(("draws", "without value", *_ENDS, "width", ""), rows),
                 said=[policy],
-                panels=partial(_panels, estimated, kind, rule, statistic, of_values),
+                panels=lambda: [_trace(estimated, kind, rule), _histogram(estimated, statistic, of_values)],
                 name="trace",
                 caption=_CAPTION,
                 across=2,
@@ -114,24 +121,6 @@ def finding_of(estimated: StatisticEstimate, statistic: Statistic, rule: Stoppin
         found=estimated,
         passed=estimated.is_met,
     )
-
-
-def _row_of(look: InterimEstimate, kind: Kind, rule: StoppingRule) -> tuple[str, ...]:
-    """Return a look as texts: draws, those without a value, estimate and interval, its width, and what it lacks."""
-    interval = look.interval
-    met = ["narrow enough"] if rule.is_narrow(look) else []
-    if not look.is_carried:
-        met.append("its effective sample size is small")
-    ends = (kind.number(value) for value in (interval.value, interval.low, interval.high))
-    width = kind.change(interval.width) if math.isfinite(interval.width) else f"{interval.width:.3g}"
-    return (f"{look.draws:,}", f"{look.missing:,}", *ends, width, ", but ".join(met))
-
-
-def _panels(
-    estimated: StatisticEstimate, kind: Kind, rule: StoppingRule, statistic: Statistic, of_values: Kind
-) -> list[Panel]:
-    """Return the looks one after the other, and the values of all draws."""
-    return [_trace(estimated, kind, rule), _histogram(estimated, statistic, of_values)]
 
 
 def _trace(estimated: StatisticEstimate, kind: Kind, rule: StoppingRule) -> Panel:

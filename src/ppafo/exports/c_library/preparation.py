@@ -390,6 +390,8 @@ def start(parts: Preparation, lane: PreparedLane, settings: Any) -> None:
     program = parts.program
     lane.result = LaneResult(0.0, NEVER_FAILED, 0.0)
     lane.pace = StepControl(lane.step)
+    for name, of_plant in program.groups_of_plant.items():
+        lane[name] = of_plant(lane.plant)
     if program.gas.START is not None:
         lane.masses = program.gas.START(lane.plant, lane.state, parts=program.functions)
     lane.valve_state = parts.constant(program.valve.initial())
