@@ -145,16 +145,14 @@ def finding_of(comparison: ComparisonResult) -> Finding[ComparisonResult]:
     pareto, change = (
         Section(
             "Error against gas",
-            panels=lambda: [_pareto(comparison, task) for task in comparison.tasks],
+            panels=partial(_pareto_panels, comparison),
             name="pareto",
             caption=_PARETO,
             is_detail=True,
         ),
         Section(
             "Spread of the change",
-            panels=lambda: [
-                _change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)
-            ],
+            panels=partial(_change_panels, comparison),
             name="change",
             caption="Change against the baseline in each draw; the dashed line is the nominal device.",
             across=2,
@@ -296,6 +294,14 @@ _MAXIMUM_DOTS = 1500
 _BINS = 40
 _SHOWN = (0.5, 99.5)
 """Percentiles between which changes are drawn: a few far ones would make all others one bar."""
+
+
+def _pareto_panels(comparison: ComparisonResult) -> list[Panel]:
+    return [_pareto(comparison, task) for task in comparison.tasks]
+
+
+def _change_panels(comparison: ComparisonResult) -> list[Panel]:
+    return [_change(comparison, task, metric) for task in comparison.tasks for metric in (_ERROR, _GAS)]
 
 
 def _pareto(comparison: ComparisonResult, task: OnTask) -> Panel:

@@ -1,6 +1,7 @@
 """The sensitivity of metrics in words, a table for each metric, and two panels: the indices, and how they settle."""
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -43,7 +44,7 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         said.append(f"in {influences.not_following:,} runs the reference is not followed: the indices are of these too")
     figure = Section(
         "Indices and their convergence",
-        panels=lambda: [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)],
+        panels=partial(_panels, influences),
         name="sensitivity",
         caption=_CAPTION.format(
             filled=_TITLES[method.shown[0]], open="".join(f", {_TITLES[name]} open" for name in method.shown[1:])
@@ -60,6 +61,11 @@ def finding_of(influences: Influences) -> Finding[Influences]:
         parts=(*(_part(influences, metric) for metric in influences.metrics), figure),
         found=influences,
     )
+
+
+def _panels(influences: Influences) -> list[Panel]:
+    """Return two panels for each metric: its indices, and how they settle."""
+    return [draw(influences, metric) for metric in influences.metrics for draw in (_bars, _course)]
 
 
 def _part(influences: Influences, metric: OfMetric) -> Section:
