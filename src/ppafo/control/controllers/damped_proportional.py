@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import DEAD_BAND, ControllerKind
 from ppafo.control.torque_loop import PROPORTIONAL_GAIN, beyond_dead_band
-from ppafo.model.controlled import ANYTHING, seen_value, steered
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_value
 from ppafo.model.declaration import Number, Quantity, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -81,10 +81,12 @@ def damped_update(
     reference: float,
     measurement: Measurement,
     period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, DampedProportionalState]:
     """Command from -1 to 1 by ``damped_command``, on top of the table's learnt command, beyond the dead band."""
     ahead = learnt_command(parameters, state.elapsed)
-    wanted, value = steered(reference), steered(seen_value(measurement))
+    wanted, value = parts.steered(reference), parts.steered(seen_value(measurement, parts=parts))
     opening, course = damped_command(parameters.gains, state.course, wanted, value, ahead, period)
     return beyond_dead_band(opening, parameters.dead_band), DampedProportionalState(state.elapsed + period, course)
 

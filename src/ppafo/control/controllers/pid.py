@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import INTEGRAL_GAIN, INTEGRAL_RATE, PROPORTIONAL_GAIN, beyond_dead_band
-from ppafo.model.controlled import ANYTHING, seen_error
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -72,10 +72,16 @@ def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, pe
 
 
 def pid_update(
-    parameters: PidParameters, state: PidState, reference: float, measurement: Measurement, period: float
+    parameters: PidParameters,
+    state: PidState,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, PidState]:
     """Command from -1 to 1 from the torque error [N m], equation (13), beyond the dead band of the valve."""
-    opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement), 0.0, period)
+    opening, after = pid_command(parameters.gains, state, seen_error(reference, measurement, parts=parts), 0.0, period)
     return beyond_dead_band(opening, parameters.dead_band), after
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import BelievedBand, ControllerKind
 from ppafo.control.torque_loop import BOUNDARY, DEAD_ZONE, INTEGRAL_RATE, OPENING, RELEASE, beyond_dead_band
-from ppafo.model.controlled import ANYTHING, seen_error
+from ppafo.model.controlled import ANYTHING, OF_TORQUE, ErrorFunctions, seen_error
 from ppafo.model.declaration import EmptyRow, Number, quantities_of
 from ppafo.model.sensors import Measurement
 
@@ -80,10 +80,16 @@ ROUNDING = 1.0e-9
 
 
 def on_off_update(
-    parameters: EmptyRow, state: EmptyRow, reference: float, measurement: Measurement, period: float
+    parameters: EmptyRow,
+    state: EmptyRow,
+    reference: float,
+    measurement: Measurement,
+    period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, EmptyRow]:
     """Command: 1 (valve A) where the error [N m] is 0 or more, else -1 (valve B). Equation (14)."""
-    error = seen_error(reference, measurement)
+    error = seen_error(reference, measurement, parts=parts)
     return (1.0 if error >= -ROUNDING else -1.0), state
 
 
@@ -123,13 +129,15 @@ def dead_zone_update(
     reference: float,
     measurement: Measurement,
     period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, OnOffDeadZoneState]:
     """Command: the opening, towards the reference, beyond the dead zone of the error [N m]; 0 inside.
 
     Once open, the valve stays so until the error is below ``release``. 0 closes a proportional valve and vents both
     chambers of a solenoid pair.
     """
-    error = seen_error(reference, measurement)
+    error = seen_error(reference, measurement, parts=parts)
     # A release beyond the dead zone would open and close the valve in turn, sample by sample.
     release = min(parameters.release, parameters.dead_zone)
     limit_up = release if state.direction > 0.0 else parameters.dead_zone
@@ -183,6 +191,8 @@ def sliding_update(
     reference: float,
     measurement: Measurement,
     period: float,
+    *,
+    parts: ErrorFunctions = OF_TORQUE,
 ) -> tuple[float, SlidingModeState]:
     """Command [-] for the torque error e [N m], with the boundary layer phi [N m] and the slope lambda [1/s]:
 
@@ -191,7 +201,7 @@ def sliding_update(
     The opening u is made a command beyond the dead band. The integral stands still outside the layer, where a longer
     error could not open the valve further.
     """
-    error = seen_error(reference, measurement)
+    error = seen_error(reference, measurement, parts=parts)
     integral = state.integral + period * error
     surface = error + parameters.surface_slope * integral
     is_inside = abs(surface) < parameters.boundary_layer
