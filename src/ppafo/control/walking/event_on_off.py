@@ -12,7 +12,7 @@ from ppafo.control.torque_loop import REACH
 from ppafo.control.walking import phases, safety
 from ppafo.control.walking.assistance import timed_phase
 from ppafo.control.walking.fault_checks import SafetyRules
-from ppafo.control.walking.observer import NOMINAL_QUANTITIES
+from ppafo.control.walking.observer import LINE_QUANTITIES
 from ppafo.control.walking.phases import PhaseRules, PhaseState
 from ppafo.control.walking.safety import SafetyState
 from ppafo.control.walking.timing import AT_THRESHOLDS, ClockParts
@@ -103,7 +103,7 @@ EVENT_ON_OFF = ControllerKind(
     name="event_on_off",
     summary="Event-based: dorsiflexion in swing and landing, free in mid-stance, plantarflexion in push-off.",
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
-    quantities=(*quantities_of(EventOnOffParameters), *NOMINAL_QUANTITIES),
+    quantities=(*quantities_of(EventOnOffParameters), *LINE_QUANTITIES),
     parameters=EventOnOffParameters,
     initial=EventOnOffState(phase=phases.START, clock=EmptyRow(), safety=safety.START, lifting=0.0, resting=0.0),
     update=update,

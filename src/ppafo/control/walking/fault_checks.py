@@ -23,7 +23,7 @@ from ppafo.control.walking.fault_flags import (
     STILL_TOE,
     raised,
 )
-from ppafo.control.walking.observer import NOMINAL_QUANTITIES, NominalDevice
+from ppafo.control.walking.observer import LINE_QUANTITIES, NominalDevice
 from ppafo.control.walking.phases import PhaseState, lifts
 from ppafo.model.declaration import Number, quantities_of
 from ppafo.model.helping import LANDING, MID_STANCE, PUSH_OFF, SWING
@@ -94,8 +94,8 @@ class SafetyRules(NamedTuple):
     nominal: NominalDevice
 
 
-SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *NOMINAL_QUANTITIES)
-"""Settings of the checks in a walk file, followed by the nominal device of the observer."""
+SAFETY_QUANTITIES = (*quantities_of(SafetyRules), *LINE_QUANTITIES)
+"""Settings of the checks in a walk file, with the nominal device of the observer."""
 
 
 class LastReadings(NamedTuple):

@@ -14,7 +14,7 @@ Every number is a setting whose default follows the device; ``nominal_flow`` 0 s
 """
 
 import math
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from ppafo.control.kind import PRESSURE_LAG, nominal_term
 from ppafo.control.walking.fault_flags import (
@@ -29,41 +29,6 @@ from ppafo.control.walking.fault_flags import (
 from ppafo.model.declaration import Quantity
 from ppafo.model.regulator import LineState, SupplyLines, step_lines
 from ppafo.model.valves.kind import VENTS_ABOVE
-
-
-class NominalDevice(NamedTuple):
-    """The device that the observer believes in, SI units; absolute pressures.
-
-    ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
-    the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
-    with a vent valve, which both follow their command after ``nominal_delay``, the spool with ``nominal_lag`` beyond
-    ``nominal_dead_band``.
-    ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
-    as its content p V [J]; a volume of 0 stands for a supply that needs none.
-    """
-
-    nominal_flow: float
-    nominal_critical_ratio: float
-    nominal_supply_pressure: float
-    nominal_dorsiflexion_pressure: float
-    nominal_atmospheric_pressure: float
-    nominal_relieving: float
-    nominal_displacement_per_radian: float
-    nominal_dead_volume_1: float
-    nominal_dead_volume_2: float
-    nominal_angle_min: float
-    nominal_angle_max: float
-    nominal_pair: float
-    nominal_opening_delay: float
-    nominal_closing_delay: float
-    nominal_switching_interval: float
-    nominal_delay: float
-    nominal_lag: float
-    nominal_dead_band: float
-    nominal_joining_time: float
-    nominal_sensor_lag: float
-    nominal_lines: SupplyLines
-
 
 _CHAMBERS = {
     "displacement_per_radian": "chamber_growth",
@@ -80,36 +45,57 @@ def _nominal(name: str, unit: str, summary: str, maximum: float, lowest: float =
     )
 
 
-NOMINAL_QUANTITIES = (
-    Quantity(
-        "nominal_flow",
-        "m^3/s",
-        "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off; "
-        "the device's unless given",
-        0.0,
-        0.0,
-        1.0,
-        follows=(nominal_term("flow"),),
-    ),
-    _nominal("critical_ratio", "", "critical pressure ratio of the valve", 0.95),
-    _nominal("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e8),
-    _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8),
-    _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8),
-    _nominal("relieving", "", "1 where the supplies take gas back", 1.0),
-    _nominal("displacement_per_radian", "m^3/rad", "mean growth of chamber 1 with the angle", 1.0),
-    _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0),
-    _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0),
-    _nominal("angle_min", "rad", "lower stop", 10.0, -10.0),
-    _nominal("angle_max", "rad", "upper stop", 10.0, -10.0),
-    _nominal("pair", "", "1 for a pair of on/off valves, 0 for a spool with a vent valve", 1.0),
-    _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0),
-    _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0),
-    _nominal("switching_interval", "s", "shortest time between two switchings of a coil", 1.0),
-    _nominal("delay", "s", "dead time of a spool", 1.0),
-    _nominal("lag", "s", "time after which a spool has followed", 1.0),
-    _nominal("dead_band", "", "smallest command that opens a spool", 0.99),
-    _nominal("joining_time", "s", "time for which the chambers are joined after chamber 1 was fed", 10.0),
-    _nominal("sensor_lag", "s", "lag of the pressure sensors", 1.0e3),
+_FLOW = "R T times the conductance of the valve, which the observer of the chambers believes; 0 switches it off"
+_PAIR = "1 for a pair of on/off valves, 0 for a spool with a vent valve"
+_INTERVAL = "shortest time between two switchings of a coil"
+_JOINING = "time for which the chambers are joined after chamber 1 was fed"
+
+
+class NominalDevice(NamedTuple):
+    """The device that the observer believes in, SI units; absolute pressures.
+
+    ``nominal_flow`` is R T times the valve's conductance [m^3/s]: content that a choked flow moves in a second, over
+    the pressure before it. ``nominal_pair`` is 1 for on/off valves that vent where they do not feed, else 0: a spool
+    with a vent valve, which both follow their command after ``nominal_delay``, the spool with ``nominal_lag`` beyond
+    ``nominal_dead_band``.
+    ``nominal_joining_time`` is how long both chambers are joined after chamber 1 was fed. ``nominal_lines`` count gas
+    as its content p V [J]; a volume of 0 stands for a supply that needs none.
+    """
+
+    nominal_flow: Annotated[float, _nominal("flow", "m^3/s", _FLOW, 1.0)]
+    nominal_critical_ratio: Annotated[
+        float, _nominal("critical_ratio", "", "critical pressure ratio of the valve", 0.95)
+    ]
+    nominal_supply_pressure: Annotated[float, _nominal("supply_pressure", "Pa_a", "pressure to chamber 1", 1.0e8)]
+    nominal_dorsiflexion_pressure: Annotated[
+        float, _nominal("dorsiflexion_pressure", "Pa_a", "pressure to chamber 2", 1.0e8)
+    ]
+    nominal_atmospheric_pressure: Annotated[
+        float, _nominal("atmospheric_pressure", "Pa_a", "pressure of the atmosphere", 1.0e8)
+    ]
+    nominal_relieving: Annotated[float, _nominal("relieving", "", "1 where the supplies take gas back", 1.0)]
+    nominal_displacement_per_radian: Annotated[
+        float, _nominal("displacement_per_radian", "m^3/rad", "mean growth of chamber 1 with the angle", 1.0)
+    ]
+    nominal_dead_volume_1: Annotated[float, _nominal("dead_volume_1", "m^3", "dead volume of chamber 1", 1.0)]
+    nominal_dead_volume_2: Annotated[float, _nominal("dead_volume_2", "m^3", "dead volume of chamber 2", 1.0)]
+    nominal_angle_min: Annotated[float, _nominal("angle_min", "rad", "lower stop", 10.0, -10.0)]
+    nominal_angle_max: Annotated[float, _nominal("angle_max", "rad", "upper stop", 10.0, -10.0)]
+    nominal_pair: Annotated[float, _nominal("pair", "", _PAIR, 1.0)]
+    nominal_opening_delay: Annotated[float, _nominal("opening_delay", "s", "time from energising a coil to flow", 1.0)]
+    nominal_closing_delay: Annotated[
+        float, _nominal("closing_delay", "s", "time from de-energising it to venting", 1.0)
+    ]
+    nominal_switching_interval: Annotated[float, _nominal("switching_interval", "s", _INTERVAL, 1.0)]
+    nominal_delay: Annotated[float, _nominal("delay", "s", "dead time of a spool", 1.0)]
+    nominal_lag: Annotated[float, _nominal("lag", "s", "time after which a spool has followed", 1.0)]
+    nominal_dead_band: Annotated[float, _nominal("dead_band", "", "smallest command that opens a spool", 0.99)]
+    nominal_joining_time: Annotated[float, _nominal("joining_time", "s", _JOINING, 10.0)]
+    nominal_sensor_lag: Annotated[float, _nominal("sensor_lag", "s", "lag of the pressure sensors", 1.0e3)]
+    nominal_lines: SupplyLines
+
+
+LINE_QUANTITIES = (
     *(
         _nominal(f"line_{name}_{line}", unit, f"{what} of line {line}", most)
         for line in (1, 2)
@@ -121,7 +107,7 @@ NOMINAL_QUANTITIES = (
     ),
     _nominal("line_relieving", "", "1 where gas flows back through the regulators", 1.0),
 )
-"""Fields of ``NominalDevice``, in order."""
+"""Fields of ``nominal_lines``, in order."""
 
 
 class ObservedValve(NamedTuple):

@@ -5,6 +5,7 @@ foot moves freely. A coil accepts a change at most once in every switching inter
 the opening or closing delay, and is lost if the coil is commanded otherwise before that.
 """
 
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 from ppafo.model.declaration import EmptyRow, Number
@@ -219,20 +220,14 @@ IDEAL = ValveModel(
     settle=settle_ideal,
 )
 
-TIMED = ValveModel(
+TIMED = replace(
+    IDEAL,
     parameters=TimedSolenoid,
     state=PairState,
     prepare=prepare_timed,
     initial=PairState,
-    shown=PairPositions,
-    port=SinglePort,
     advance=advance_timed,
-    connect=connect_positions,
-    port_flow=single_port_flow,
-    port_flow_slopes=single_port_flow_slopes,
     jumps=True,
-    shift=None,
-    command_delay=no_dead_time,
     instant=instant_timed,
     rates=rates_timed,
     next_event=next_timed_event,
