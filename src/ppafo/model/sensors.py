@@ -223,7 +223,7 @@ def is_active(fault: Fault, time: float) -> bool:
     return (time >= fault.time) & (not away)
 
 
-def faulty(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
+def faulty_reading(fault: Fault, reading: float, other: float, last: float, time: float, draw: float) -> float:
     """A reading at ``time`` [s] as a faulty sensor gives it, in its unit; ``other`` is the other sensor's.
 
     ``draw`` from 0 to 1 decides whether the sample is lost.
@@ -291,11 +291,11 @@ def measure_gait(
     kept_toe = hold_if_lost(was_toe, toe, gait_sensors.lost_share, seed, sample, 6)
     # One draw for all: sensors with a common cause lose the same samples.
     draw = unit_noise(seed, sample, 10)
-    shown_angle = faulty(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
-    shown_1 = faulty(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
-    shown_2 = faulty(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
-    shown_heel = faulty(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
-    shown_toe = faulty(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
+    shown_angle = faulty_reading(gait_sensors.angle_fault, kept_angle, kept_angle, was_angle, time, draw)
+    shown_1 = faulty_reading(gait_sensors.pressure_1_fault, kept_1, kept_2, was_1, time, draw)
+    shown_2 = faulty_reading(gait_sensors.pressure_2_fault, kept_2, kept_1, was_2, time, draw)
+    shown_heel = faulty_reading(gait_sensors.heel_fault, kept_heel, kept_toe, was_heel, time, draw)
+    shown_toe = faulty_reading(gait_sensors.toe_fault, kept_toe, kept_heel, was_toe, time, draw)
     remembered = GaitSeen(
         heel_force=shown_heel,
         toe_force=shown_toe,

@@ -224,7 +224,7 @@ def learnt_fraction(come: float, seen: float, found: float, weight: float) -> fl
     return moved if (seen > 0.5) & (found > 0.0) & (found < 1.0) else come
 
 
-def anchored(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
+def anchored_fraction(fraction: float, seen: float, come: float, late: float, weight: float) -> float:
     """Fraction [turns] after an event that comes at ``come`` may have been detected ``late`` [turns] after it."""
     missed = come + late - fraction
     # Far from where it came in recent strides it is another event, or another gait.
@@ -355,9 +355,9 @@ def next_clock(
     )
     # The fraction a period later, moved by what was detected after the strike.
     passed = clock.fraction + period / stride
-    passed = anchored(passed, seen.toes_on, last.toes_on, late.toes_on / stride, weight)
-    passed = anchored(passed, seen.heel_off, last.heel_off, late.heel_off / stride, weight)
-    passed = anchored(passed, seen.toes_off, last.toes_off, late.toes_off / stride, weight)
+    passed = anchored_fraction(passed, seen.toes_on, last.toes_on, late.toes_on / stride, weight)
+    passed = anchored_fraction(passed, seen.heel_off, last.heel_off, late.heel_off / stride, weight)
+    passed = anchored_fraction(passed, seen.toes_off, last.toes_off, late.toes_off / stride, weight)
     set_anew = struck_fraction(passed, late.strike / stride, strike_weight)
     fraction = set_anew if struck else min(passed, latest_fraction(phase, come, predicts))
     predicted = Events(

@@ -22,7 +22,14 @@ from ppafo.model.gait import (
     GaitTiming,
 )
 from ppafo.model.leg import FootLoad, LegParameters, foot_inertia_about_ankle, passive_torque, torque_of_shank
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, loaded, net_torque, viscous_torque
+from ppafo.model.plant import (
+    ActuatorFunctions,
+    PlantParameters,
+    PlantState,
+    net_torque,
+    torque_less_loads,
+    viscous_torque,
+)
 from ppafo.model.ports import friction_in_motion
 
 
@@ -208,7 +215,7 @@ def external_torque(
     # left.
     needed = foot_inertia_about_ankle(leg) * acceleration + passive_damping - (torque - plate)
     pressure_1, pressure_2 = parts.held_pressures(plant, held, state)
-    driving = loaded(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
+    driving = torque_less_loads(parts.torque(plant, state.angle, pressure_1, pressure_2) + plate, state.angle)
     way = (1.0 if speed > 0.0 else 0.0) - (1.0 if speed < 0.0 else 0.0)
     friction = friction_in_motion(plant.dynamic_torque, speed, pressure_1, pressure_2)
     damping = viscous_torque(share.viscous_damping, speed)

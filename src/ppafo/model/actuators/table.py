@@ -91,7 +91,7 @@ def bases_at(table: Table, angle: float) -> tuple[Curve, Curve]:
     )
 
 
-def along(curve: Curve, basis: Curve) -> float:
+def curve_value(curve: Curve, basis: Curve) -> float:
     """Value of a curve, or of its slope, at an angle where the basis of the spline is known."""
     a, b, c, d = curve.powers, basis.powers, curve.bends, basis.bends
     smooth = (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3])
@@ -101,7 +101,7 @@ def along(curve: Curve, basis: Curve) -> float:
 
 def level_of(curve: Curve, bases: tuple[Curve, Curve]) -> Level:
     """Value and slope of a curve over the angle."""
-    return Level(along(curve, bases[0]), along(curve, bases[1]))
+    return Level(curve_value(curve, bases[0]), curve_value(curve, bases[1]))
 
 
 def levels_of(chamber: TabulatedChamber, bases: tuple[Curve, Curve], dead_volume: float) -> tuple[Level, ...]:
@@ -154,7 +154,7 @@ def compliance_at(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: f
     return low + (compliance_in(rises[2], levels[3], gauge) + compliance_in(rises[3], levels[4], gauge))
 
 
-def turning(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
+def chamber_torque(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) -> float:
     """Torque [N m] at a gauge pressure [Pa]: the integral of the volume's slope over the pressure."""
     rises = chamber.rises
     low = levels[1].slope * filled_from_vented(rises[0], gauge) + levels[2].slope * filled_from_vented(rises[1], gauge)
@@ -162,7 +162,7 @@ def turning(chamber: TabulatedChamber, levels: tuple[Level, ...], gauge: float) 
     return levels[0].slope * gauge + (low + high)
 
 
-def climb(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
+def stretch_pressure(rise: Rise, gain: Level, volume: float, found: float, content: float, atmosphere: float) -> float:
     """Absolute pressure [Pa] in a stretch that the gas content [J] reaches; else the one found below it."""
     begin = rise.lower + atmosphere
     stretch = LinearChamber(
@@ -180,12 +180,12 @@ def pressure_at(chamber: TabulatedChamber, levels: tuple[Level, ...], content: f
     """Absolute pressure [Pa] at which p V is a gas content [J]."""
     rises = chamber.rises
     volume = levels[0].volume
-    pressure = climb(rises[0], levels[1], volume, content / volume, content, atmosphere)
+    pressure = stretch_pressure(rises[0], levels[1], volume, content / volume, content, atmosphere)
     second = volume + levels[1].volume
-    pressure = climb(rises[1], levels[2], second, pressure, content, atmosphere)
+    pressure = stretch_pressure(rises[1], levels[2], second, pressure, content, atmosphere)
     third = second + levels[2].volume
-    pressure = climb(rises[2], levels[3], third, pressure, content, atmosphere)
-    return climb(rises[3], levels[4], third + levels[3].volume, pressure, content, atmosphere)
+    pressure = stretch_pressure(rises[2], levels[3], third, pressure, content, atmosphere)
+    return stretch_pressure(rises[3], levels[4], third + levels[3].volume, pressure, content, atmosphere)
 
 
 def chambers(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: float) -> Chambers:
@@ -220,8 +220,8 @@ def torque(plant: ShapedPlant, angle: float, pressure_1: float, pressure_2: floa
     room = plant.atmospheric_pressure
     first, second, bases = shape.table.chamber_1, shape.table.chamber_2, bases_at(shape.table, angle)
     # A dead volume does not change with the angle, so it gives no torque: 0 stands for it.
-    active_1 = turning(first, levels_of(first, bases, 0.0), pressure_1 - room)
-    active_2 = turning(second, levels_of(second, bases, 0.0), pressure_2 - room)
+    active_1 = chamber_torque(first, levels_of(first, bases, 0.0), pressure_1 - room)
+    active_2 = chamber_torque(second, levels_of(second, bases, 0.0), pressure_2 - room)
     return active_1 + active_2 - shape.stiffness * (angle - shape.rest_angle)
 
 

@@ -33,7 +33,7 @@ def spool_position(position: float, command: float, play_width: float) -> float:
     return max(-1.0, min(1.0, inner / (1.0 - half)))
 
 
-def behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
+def command_behind_play(command: float, spool_play: SpoolPlay, spool_play_state: SpoolPlace) -> float:
     """Command [-] that a spool follows with play behind its command. A command that vents is no position."""
     given = at_valve(command)
     drawn = spool_position(spool_play_state.spool_command, given, spool_play.width)
@@ -64,7 +64,7 @@ EFFECT = Effect(
     parameters=SpoolPlay,
     prepare=None,
     switch=("width",),
-    laws={at_valve: behind_play},
+    laws={at_valve: command_behind_play},
     source="the play operator of hysteresis; the simulated test bench has it too",
     equation="y = max(c - b/2, min(c + b/2, y)), c' = y / (1 - b/2)",
     symbols=(
