@@ -27,7 +27,7 @@ def isentropic_curve(heat_capacity_ratio: float, linear_ratio: float) -> FlowCur
         critical_ratio=critical_pressure_ratio(heat_capacity_ratio),
         linear_ratio=linear_ratio,
         linear_slope=1.0 / (1.0 - linear_ratio),
-        coefficients=over_runs(_isentropic_coefficients, heat_capacity_ratio),
+        coefficients=over_runs(_remembered_coefficients, heat_capacity_ratio),
     )
 
 
@@ -39,7 +39,7 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     # A factor on 1 - r scales the n-th coefficient by its n-th power, and the root in front by its own root.
     scale = 1.0 / (1.0 - critical_ratio)
     factor = root(scale)
-    unscaled = _iso6358_coefficients()
+    unscaled = _remembered_iso6358_coefficients()
     coefficients = unscaled
     for place in range(TERMS):
         coefficients = _with_item(coefficients, place, unscaled[place] * factor)
@@ -52,8 +52,6 @@ def iso6358_curve(critical_ratio: float, linear_ratio: float) -> FlowCurve:
     )
 
 
-# A study asks for the few gases of its runs again and again.
-@lru_cache(maxsize=4096)
 def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     """Coefficients of a gas, through the exact function of equation (7) at nodes in the subsonic region."""
     k = heat_capacity_ratio
@@ -70,13 +68,19 @@ def _isentropic_coefficients(heat_capacity_ratio: float) -> Terms:
     return _polynomial_through(gaps, values)
 
 
-@lru_cache(maxsize=1)
+# A study asks for the few gases of its runs again and again.
+_remembered_coefficients = lru_cache(maxsize=4096)(_isentropic_coefficients)
+
+
 def _iso6358_coefficients() -> Terms:
     """Coefficients for a critical ratio of 0, where the function is the root of (1 - r)(1 + r)."""
     values = NODES
     for place in range(TERMS):
         values = _with_item(values, place, math.sqrt(2.0 - NODES[place]))
     return _polynomial_through(NODES, values)
+
+
+_remembered_iso6358_coefficients = lru_cache(maxsize=1)(_iso6358_coefficients)
 
 
 def _polynomial_through(places: Terms, values: Terms) -> Terms:

@@ -36,16 +36,16 @@ class DampedProportionalParameters(NamedTuple):
 class TorqueSlope(NamedTuple):
     """Torque one sample ago [N m], its filtered rate [N m/s], start mark."""
 
-    torque: float
-    slope: float
-    started: float
+    torque: float = 0.0
+    slope: float = 0.0
+    started: float = 0.0
 
 
 class DampedProportionalState(NamedTuple):
     """Time since the start [s], and the torque's course."""
 
-    elapsed: float
-    course: TorqueSlope
+    elapsed: float = 0.0
+    course: TorqueSlope = TorqueSlope()
 
 
 def learnt_command(parameters: DampedProportionalParameters, elapsed: float) -> float:
@@ -108,7 +108,7 @@ DAMPED_PROPORTIONAL = ControllerKind(
         DEAD_BAND,
     ),
     parameters=DampedProportionalParameters,
-    initial=DampedProportionalState(0.0, TorqueSlope(0.0, 0.0, 0.0)),
+    initial=DampedProportionalState(),
     update=damped_update,
     controls=ANYTHING,
 )

@@ -129,8 +129,8 @@ class PidFeedforwardParameters(NamedTuple):
 class PidFeedforwardState(NamedTuple):
     """The state of the PID, and the reference one sample ago [N m]."""
 
-    feedback: PidState
-    reference: float
+    feedback: PidState = PidState()
+    reference: float = 0.0
 
 
 def feedforward_update(
@@ -171,7 +171,7 @@ PID_FEEDFORWARD = ControllerKind(
         *NOMINAL_QUANTITIES,
     ),
     parameters=PidFeedforwardParameters,
-    initial=PidFeedforwardState(PidState(integral=0.0, error=0.0, slope=0.0, started=0.0), 0.0),
+    initial=PidFeedforwardState(),
     update=feedforward_update,
     restart=feedforward_restart,
 )
@@ -191,10 +191,10 @@ class FeedbackLinearisationParameters(NamedTuple):
 class FeedbackLinearisationState(NamedTuple):
     """Reference [N m] and angle [rad] one sample ago, filtered angular velocity [rad/s], start mark."""
 
-    reference: float
-    angle: float
-    angular_velocity: float
-    started: float
+    reference: float = 0.0
+    angle: float = 0.0
+    angular_velocity: float = 0.0
+    started: float = 0.0
 
 
 def linearising_update(
@@ -233,7 +233,7 @@ FEEDBACK_LINEARISATION = ControllerKind(
     source="Slotine and Li 1991, Applied Nonlinear Control, chapter 6; on pneumatic actuators Richer and Hurmuzlu 2000",
     quantities=quantities_of(FeedbackLinearisationParameters),
     parameters=FeedbackLinearisationParameters,
-    initial=FeedbackLinearisationState(reference=0.0, angle=0.0, angular_velocity=0.0, started=0.0),
+    initial=FeedbackLinearisationState(),
     update=linearising_update,
     restart=linearising_restart,
 )

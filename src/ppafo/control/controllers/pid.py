@@ -44,10 +44,10 @@ class PidParameters(NamedTuple):
 class PidState(NamedTuple):
     """Integral part of the command [-], error one sample ago [N m], filtered slope of the error [N m/s], start mark."""
 
-    integral: float
-    error: float
-    slope: float
-    started: float
+    integral: float = 0.0
+    error: float = 0.0
+    slope: float = 0.0
+    started: float = 0.0
 
 
 def pid_command(gains: PidGains, state: PidState, error: float, ahead: float, period: float) -> tuple[float, PidState]:
@@ -98,7 +98,7 @@ PID = ControllerKind(
     source="the paper, equation (13); gains that are not given: Skogestad 2003, Simple analytic rules",
     quantities=quantities_of(PidParameters),
     parameters=PidParameters,
-    initial=PidState(integral=0.0, error=0.0, slope=0.0, started=0.0),
+    initial=PidState(),
     update=pid_update,
     restart=pid_restart,
     controls=ANYTHING,

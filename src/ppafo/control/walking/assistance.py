@@ -112,9 +112,9 @@ class Assistance(NamedTuple):
 class TorqueRequest(NamedTuple):
     """Angle one sample ago [rad], 0 before the first, its filtered rate [rad/s], and the requested torque [N m]."""
 
-    angle: float
-    rate: float
-    torque: float
+    angle: float = 0.0
+    rate: float = 0.0
+    torque: float = 0.0
 
 
 class Assessment(NamedTuple):
@@ -133,7 +133,7 @@ class Assessment(NamedTuple):
     """1 where the law commands the valve, 0 where both chambers are vented."""
 
 
-START = TorqueRequest(0.0, 0.0, 0.0)
+START = TorqueRequest()
 
 EASING_TIME = 0.1
 """Time [s] after a landing on the toes in which a torque in plantarflexion is taken off by the law; it vents after."""

@@ -62,21 +62,24 @@ class EstimatedRules(NamedTuple):
     estimate_weight: Annotated[float, Number("1", "how far an estimate moves the clock, 1 wholly", 0.5, 0.0, 1.0)]
 
 
+_NO_STRIDE, _NO_WINDOW = (0.0,) * KNOTS, (0.0,) * WINDOW
+
+
 class LearntStride(NamedTuple):
     """Ankle angle [rad], heel and toe force [N] at the knots of a stride, the next one first."""
 
-    angle: Annotated[tuple[float, ...], KNOTS]
-    heel_force: Annotated[tuple[float, ...], KNOTS]
-    toe_force: Annotated[tuple[float, ...], KNOTS]
+    angle: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
+    heel_force: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
+    toe_force: Annotated[tuple[float, ...], KNOTS] = _NO_STRIDE
 
 
 class Window(NamedTuple):
     """Angle and forces at the last knots, the latest one last, and how far estimates had moved the clock [turns]."""
 
-    angle: Annotated[tuple[float, ...], WINDOW]
-    heel_force: Annotated[tuple[float, ...], WINDOW]
-    toe_force: Annotated[tuple[float, ...], WINDOW]
-    moved: Annotated[tuple[float, ...], WINDOW]
+    angle: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
+    heel_force: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
+    toe_force: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
+    moved: Annotated[tuple[float, ...], WINDOW] = _NO_WINDOW
 
 
 class EstimatedClock(NamedTuple):
@@ -85,26 +88,16 @@ class EstimatedClock(NamedTuple):
     Knots in the window, strides learnt from, and by how much estimates have moved the clock since the start [turns].
     """
 
-    clock: GaitClock
-    stride: LearntStride
-    window: Window
-    next_knot: float
-    filled: float
-    learnt: float
-    moved: float
+    clock: GaitClock = CLOCK_START
+    stride: LearntStride = LearntStride()
+    window: Window = Window()
+    next_knot: float = 0.0
+    filled: float = 0.0
+    learnt: float = 0.0
+    moved: float = 0.0
 
 
-_NO_STRIDE = (0.0,) * KNOTS
-_NO_WINDOW = (0.0,) * WINDOW
-START = EstimatedClock(
-    clock=CLOCK_START,
-    stride=LearntStride(_NO_STRIDE, _NO_STRIDE, _NO_STRIDE),
-    window=Window(angle=_NO_WINDOW, heel_force=_NO_WINDOW, toe_force=_NO_WINDOW, moved=_NO_WINDOW),
-    next_knot=0.0,
-    filled=0.0,
-    learnt=0.0,
-    moved=0.0,
-)
+START = EstimatedClock()
 
 
 def misfit(stride: LearntStride, window: Window, rules: EstimatedRules, shift: int) -> float:

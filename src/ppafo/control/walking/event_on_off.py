@@ -54,11 +54,11 @@ class EventOnOffParameters(NamedTuple):
 class EventOnOffState(NamedTuple):
     """Phase, clock, safety, whether the foot is to be lifted (1), and whether a torque too large is let go (1)."""
 
-    phase: PhaseState
-    clock: EmptyRow
-    safety: SafetyState
-    lifting: float
-    resting: float
+    phase: PhaseState = PhaseState()
+    clock: EmptyRow = EmptyRow()
+    safety: SafetyState = SafetyState()
+    lifting: float = 0.0
+    resting: float = 0.0
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventOnOffState)
@@ -105,7 +105,7 @@ EVENT_ON_OFF = ControllerKind(
     source="the paper, figure 1A and section 'PPAFO Hardware': binary, event-based control",
     quantities=(*quantities_of(EventOnOffParameters), *LINE_QUANTITIES),
     parameters=EventOnOffParameters,
-    initial=EventOnOffState(phase=phases.START, clock=EmptyRow(), safety=safety.START, lifting=0.0, resting=0.0),
+    initial=EventOnOffState(),
     update=update,
     only_switches=True,
 )

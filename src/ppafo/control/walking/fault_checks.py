@@ -107,17 +107,17 @@ class LastReadings(NamedTuple):
     angle only since the strike before, for a foot that hangs or sits may show one angle for long.
     """
 
-    heel_force: float
-    toe_force: float
-    angle: float
-    pressure_1: float
-    pressure_2: float
-    heel_unchanged: float
-    toe_unchanged: float
-    angle_unchanged: float
-    slow_heel: float
-    slow_toe: float
-    slow_angle: float
+    heel_force: float = 0.0
+    toe_force: float = 0.0
+    angle: float = 0.0
+    pressure_1: float = 0.0
+    pressure_2: float = 0.0
+    heel_unchanged: float = 0.0
+    toe_unchanged: float = 0.0
+    angle_unchanged: float = 0.0
+    slow_heel: float = 0.0
+    slow_toe: float = 0.0
+    slow_angle: float = 0.0
 
 
 class LandingCheck(NamedTuple):
@@ -127,24 +127,20 @@ class LandingCheck(NamedTuple):
     ``late_toes`` push-offs in a row at whose end the foot had turned down as it does in the air only.
     """
 
-    lowest: float
-    highest: float
-    in_doubt: float
-    late: float
-    late_toes: float
+    lowest: float = 0.0
+    highest: float = 0.0
+    in_doubt: float = 0.0
+    late: float = 0.0
+    late_toes: float = 0.0
 
 
 class Emptying(NamedTuple):
     """Lowest pressure of chamber 2 since it was joined to the atmosphere [Pa], angle then [rad], how long above [s]."""
 
-    lowest: float
-    angle: float
-    rising: float
+    lowest: float = 0.0
+    angle: float = 0.0
+    rising: float = 0.0
 
-
-AIRBORNE = LandingCheck(lowest=0.0, highest=0.0, in_doubt=0.0, late=0.0, late_toes=0.0)
-NOT_EMPTYING = Emptying(lowest=0.0, angle=0.0, rising=0.0)
-NOTHING_READ = LastReadings._make((0.0,) * len(LastReadings._fields))
 
 SLOW_TIME = 0.08
 """Time constant [s] of the slow readings: a step has faded from them when a sensor counts as frozen."""

@@ -16,7 +16,7 @@ from ppafo.control.controllers import damped_proportional
 from ppafo.control.controllers.damped_proportional import DampedGains, TorqueSlope, damped_command
 from ppafo.control.kind import DEAD_BAND, BelievedBand, ControllerKind
 from ppafo.control.torque_loop import LEAD, LEARNING_GAIN, beyond_dead_band
-from ppafo.control.walking import assistance, phases, safety
+from ppafo.control.walking import assistance
 from ppafo.control.walking.assistance import (
     ASSISTING_QUANTITIES,
     Assistance,
@@ -155,12 +155,12 @@ class EventDampedLearningParameters(NamedTuple):
 class EventDampedLearningState(NamedTuple):
     """Phase, clock, safety, the requested torque, the torque's course, and what was learnt."""
 
-    phase: PhaseState
-    clock: EmptyRow
-    safety: SafetyState
-    request: TorqueRequest
-    law: TorqueSlope
-    table: Knots
+    phase: PhaseState = PhaseState()
+    clock: EmptyRow = EmptyRow()
+    safety: SafetyState = SafetyState()
+    request: TorqueRequest = TorqueRequest()
+    law: TorqueSlope = TorqueSlope()
+    table: Knots = EMPTY
 
 
 USUAL_CLOCK = ClockParts(AT_THRESHOLDS, EventDampedLearningState)
@@ -220,13 +220,6 @@ KIND = ControllerKind(
         *ASSISTING_QUANTITIES,
     ),
     parameters=EventDampedLearningParameters,
-    initial=EventDampedLearningState(
-        phase=phases.START,
-        clock=EmptyRow(),
-        safety=safety.START,
-        request=assistance.START,
-        law=TorqueSlope(0.0, 0.0, 0.0),
-        table=EMPTY,
-    ),
+    initial=EventDampedLearningState(),
     update=update,
 )

@@ -110,21 +110,25 @@ LINE_QUANTITIES = (
 """Fields of ``nominal_lines``, in order."""
 
 
+LONG_AGO = 1.0e9
+"""Time [s] since the command of a coil that was switched off before the start."""
+
+
 class ObservedValve(NamedTuple):
     """On/off valve: present flow (0 or 1), commanded flow, time since the command, and switching time [s]."""
 
-    position: float
-    target: float
-    since: float
-    waits: float
+    position: float = 0.0
+    target: float = 0.0
+    since: float = LONG_AGO
+    waits: float = 0.0
 
 
 class CommandInTransit(NamedTuple):
     """A command on its way to a spool or a vent valve [-], a third of the dead time behind it each."""
 
-    first: float
-    second: float
-    third: float
+    first: float = 0.0
+    second: float = 0.0
+    third: float = 0.0
 
 
 class ObservedChamber(NamedTuple):
@@ -134,11 +138,11 @@ class ObservedChamber(NamedTuple):
     longer: the lowest of many noisy readings would show gas that never came.
     """
 
-    content: float
-    pressure: float
-    passed: float
-    contrary: float
-    least: float
+    content: float = 0.0
+    pressure: float = 0.0
+    passed: float = 0.0
+    contrary: float = 0.0
+    least: float = 0.0
 
 
 class Observer(NamedTuple):
@@ -147,34 +151,19 @@ class Observer(NamedTuple):
     ``lines`` are the gas contents [J] of the lines behind regulators.
     """
 
-    chamber_1: ObservedChamber
-    chamber_2: ObservedChamber
-    command: float
-    coil_1: ObservedValve
-    coil_2: ObservedValve
-    on_the_way: CommandInTransit
-    venting: CommandInTransit
-    spool: float
-    joined: float
-    lines: LineState
+    chamber_1: ObservedChamber = ObservedChamber()
+    chamber_2: ObservedChamber = ObservedChamber()
+    command: float = 2.0
+    coil_1: ObservedValve = ObservedValve()
+    coil_2: ObservedValve = ObservedValve()
+    on_the_way: CommandInTransit = CommandInTransit()
+    venting: CommandInTransit = CommandInTransit(1.0, 1.0, 1.0)
+    spool: float = 0.0
+    joined: float = 0.0
+    lines: LineState = LineState(0.0, 0.0, 0.0)
 
 
-LONG_AGO = 1.0e9
-_EMPTY = ObservedChamber(content=0.0, pressure=0.0, passed=0.0, contrary=0.0, least=0.0)
-_OFF = ObservedValve(position=0.0, target=0.0, since=LONG_AGO, waits=0.0)
-_FULL = LineState(mass_1=0.0, mass_2=0.0, regulated_mass=0.0)
-START = Observer(
-    _EMPTY,
-    _EMPTY,
-    command=2.0,
-    coil_1=_OFF,
-    coil_2=_OFF,
-    on_the_way=CommandInTransit(first=0.0, second=0.0, third=0.0),
-    venting=CommandInTransit(first=1.0, second=1.0, third=1.0),
-    spool=0.0,
-    joined=0.0,
-    lines=_FULL,
-)
+START = Observer()
 
 FORGETS = 0.128
 """Time [s] in which contents follow what is measured, and gas that has passed is forgotten."""

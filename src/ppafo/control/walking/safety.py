@@ -27,9 +27,9 @@ from ppafo.model.valves.kind import VENT, VENTS_ABOVE
 class ValveTimes(NamedTuple):
     """Times for which the valve is commanded to fill chambers 1 and 2, weighted by opening, and to vent both [s]."""
 
-    filling_1: float
-    filling_2: float
-    venting: float
+    filling_1: float = 0.0
+    filling_2: float = 0.0
+    venting: float = 0.0
 
 
 class Stance(NamedTuple):
@@ -41,10 +41,10 @@ class Stance(NamedTuple):
     longer does, which tells both sensors from each other, until the foot stands flat again.
     """
 
-    heel_seen: float
-    toe_seen: float
-    together: float
-    apart: float
+    heel_seen: float = 0.0
+    toe_seen: float = 0.0
+    together: float = 0.0
+    apart: float = 0.0
     flat_angle: float = 0.0
     turned: float = 0.0
     largest: float = 0.0
@@ -54,12 +54,12 @@ class Stance(NamedTuple):
 class VentingFault(NamedTuple):
     """The last fault flag that vented the chambers, and the readings then: forces [N], angle [rad], pressures [Pa]."""
 
-    fault_flag: float
-    heel_force: float
-    toe_force: float
-    angle: float
-    pressure_1: float
-    pressure_2: float
+    fault_flag: float = fault_flags.NO_FLAG
+    heel_force: float = 0.0
+    toe_force: float = 0.0
+    angle: float = 0.0
+    pressure_1: float = 0.0
+    pressure_2: float = 0.0
 
 
 class SafetyState(NamedTuple):
@@ -70,42 +70,24 @@ class SafetyState(NamedTuple):
     both has been below the pressure of a chamber at rest.
     """
 
-    level: float
-    good_strides: float
-    ventings: float
-    finding: VentingFault
-    readings: fault_checks.LastReadings
-    landing: fault_checks.LandingCheck
-    stance: Stance
-    toe_strides: float
-    steady: float
-    valve_times: ValveTimes
-    observer: Observer
-    emptying: fault_checks.Emptying
-    slow_pressure_1: float
-    slow_pressure_2: float
-    thin: float
+    level: float = HELPS
+    good_strides: float = 0.0
+    ventings: float = 0.0
+    finding: VentingFault = VentingFault()
+    readings: fault_checks.LastReadings = fault_checks.LastReadings()
+    landing: fault_checks.LandingCheck = fault_checks.LandingCheck()
+    stance: Stance = Stance()
+    toe_strides: float = 0.0
+    steady: float = 0.0
+    valve_times: ValveTimes = ValveTimes()
+    observer: Observer = Observer()
+    emptying: fault_checks.Emptying = fault_checks.Emptying()
+    slow_pressure_1: float = 0.0
+    slow_pressure_2: float = 0.0
+    thin: float = 0.0
 
 
-START = SafetyState(
-    level=HELPS,
-    good_strides=0.0,
-    ventings=0.0,
-    finding=VentingFault(
-        fault_flag=fault_flags.NO_FLAG, heel_force=0.0, toe_force=0.0, angle=0.0, pressure_1=0.0, pressure_2=0.0
-    ),
-    readings=fault_checks.NOTHING_READ,
-    landing=fault_checks.AIRBORNE,
-    stance=Stance(heel_seen=0.0, toe_seen=0.0, together=0.0, apart=0.0),
-    toe_strides=0.0,
-    steady=0.0,
-    valve_times=ValveTimes(0.0, 0.0, 0.0),
-    observer=observer.START,
-    emptying=fault_checks.NOT_EMPTYING,
-    slow_pressure_1=0.0,
-    slow_pressure_2=0.0,
-    thin=0.0,
-)
+START = SafetyState()
 
 LIFT_STRIDES = 1.0
 """Good strides in a row after which a paused device holds the foot up again."""

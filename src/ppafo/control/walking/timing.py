@@ -147,10 +147,10 @@ class Delays(NamedTuple):
 class Events(NamedTuple):
     """Number for each event of a stride: heel strike, toes on the ground, heel off, toes off."""
 
-    strike: float
-    toes_on: float
-    heel_off: float
-    toes_off: float
+    strike: float = 0.0
+    toes_on: float = 0.0
+    heel_off: float = 0.0
+    toes_off: float = 0.0
 
 
 class StrideTiming(NamedTuple):
@@ -159,11 +159,11 @@ class StrideTiming(NamedTuple):
     ``this_time`` is what the stride will take that has begun, by when its heel and its toes have left the ground.
     """
 
-    mean_time: float
-    counted: float
-    last: float
-    even: float
-    this_time: float
+    mean_time: float = 0.0
+    counted: float = 0.0
+    last: float = 0.0
+    even: float = 0.0
+    this_time: float = 0.0
 
 
 class GaitClock(NamedTuple):
@@ -172,19 +172,13 @@ class GaitClock(NamedTuple):
     ``come`` is from recent strides, 0 for an event that was not seen yet.
     """
 
-    fraction: float
-    event: float
-    come: Events
-    strides: StrideTiming
+    fraction: float = 0.0
+    event: float = TOES_OFF
+    come: Events = Events()
+    strides: StrideTiming = StrideTiming()
 
 
-NOT_KNOWN = Events(strike=0.0, toes_on=0.0, heel_off=0.0, toes_off=0.0)
-CLOCK_START = GaitClock(
-    fraction=0.0,
-    event=TOES_OFF,
-    come=NOT_KNOWN,
-    strides=StrideTiming(mean_time=0.0, counted=0.0, last=0.0, even=0.0, this_time=0.0),
-)
+CLOCK_START = GaitClock()
 
 
 def detection_delays(delays: Delays, phase_rules: PhaseRules, period: float) -> Events:
@@ -337,7 +331,6 @@ def next_clock(
     # The strike itself was detected late: time since it is longer by that delay.
     now = phase.since_strike + late.strike
     found = Events(
-        strike=0.0,
         toes_on=(now - late.toes_on) / strides.mean_time,
         heel_off=(now - late.heel_off) / strides.mean_time,
         toes_off=(now - late.toes_off) / strides.mean_time,
@@ -348,7 +341,6 @@ def next_clock(
     learns = predicts | (strides.counted < 1.5) & (strides.counted > 0.5)
     share = max(usual, 1.0 / max(strides.counted, 1.0))
     come = Events(
-        strike=0.0,
         toes_on=learnt_fraction(last.toes_on, seen.toes_on, found.toes_on, share) if learns else last.toes_on,
         heel_off=learnt_fraction(last.heel_off, seen.heel_off, found.heel_off, share) if learns else last.heel_off,
         toes_off=learnt_fraction(last.toes_off, seen.toes_off, found.toes_off, share) if learns else last.toes_off,
@@ -361,7 +353,6 @@ def next_clock(
     set_anew = struck_fraction(passed, late.strike / stride, strike_weight)
     fraction = set_anew if struck else min(passed, latest_fraction(phase, come, predicts))
     predicted = Events(
-        strike=0.0,
         toes_on=come.toes_on if predicts else 0.0,
         heel_off=come.heel_off if predicts else 0.0,
         toes_off=come.toes_off if predicts else 0.0,

@@ -193,7 +193,7 @@ def test_a_large_force_that_is_gone_within_a_sample_stops_and_one_that_falls_qui
     name: str, sensor: str
 ) -> None:
     def after(force: float, period: float = PERIOD) -> float:
-        last = fault_checks.NOTHING_READ._replace(**{name: 500.0})
+        last = fault_checks.LastReadings()._replace(**{name: 500.0})
         seen = GOOD._replace(**{name: force})
         return fault_checks.gone_flag(RULES, last, seen, period)
 
