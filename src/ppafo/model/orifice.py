@@ -87,18 +87,8 @@ def exact_flow(pressure_a: float, pressure_b: float, conductance: float, orifice
 
 def fitted_flow_function(pressure_ratio: float, curve: FlowCurve) -> float:
     """Flow over choked flow [-], 0 to 1, from a fitted curve; ratio is downstream over upstream, at most 1."""
-    gap = 1.0 - pressure_ratio
-    linear_gap = 1.0 - curve.linear_ratio
-    inside = max(min(gap, 1.0 - curve.critical_ratio), linear_gap)
-    # Even and odd powers apart: half as many operations wait for one another.
-    square = inside * inside
-    even = curve.coefficients[6] * square + curve.coefficients[4]
-    even = even * square + curve.coefficients[2]
-    even = even * square + curve.coefficients[0]
-    odd = curve.coefficients[5] * square + curve.coefficients[3]
-    odd = odd * square + curve.coefficients[1]
-    polynomial = even + inside * odd
-    return math.sqrt(inside) * polynomial * min(gap * curve.linear_slope, 1.0)
+    value, _ = fitted_flow_slope(pressure_ratio, curve)
+    return value
 
 
 def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, float]:
@@ -110,6 +100,7 @@ def fitted_flow_slope(pressure_ratio: float, curve: FlowCurve) -> tuple[float, f
     linear_gap = 1.0 - curve.linear_ratio
     choked_gap = 1.0 - curve.critical_ratio
     inside = max(min(gap, choked_gap), linear_gap)
+    # Even and odd powers apart: half as many operations wait for one another.
     square = inside * inside
     even = curve.coefficients[6] * square + curve.coefficients[4]
     even_slope = curve.coefficients[6] * square + even

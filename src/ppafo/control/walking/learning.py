@@ -63,24 +63,10 @@ def near(place: float, knot: float) -> float:
 
 def command_at(table: Knots, place: float) -> float:
     """Command [-] at a place counted in knots: straight between knots, 0 outside of the table."""
-    return (
-        table[0] * near(place, 0.0)
-        + table[1] * near(place, 1.0)
-        + table[2] * near(place, 2.0)
-        + table[3] * near(place, 3.0)
-        + table[4] * near(place, 4.0)
-        + table[5] * near(place, 5.0)
-        + table[6] * near(place, 6.0)
-        + table[7] * near(place, 7.0)
-        + table[8] * near(place, 8.0)
-        + table[9] * near(place, 9.0)
-        + table[10] * near(place, 10.0)
-        + table[11] * near(place, 11.0)
-        + table[12] * near(place, 12.0)
-        + table[13] * near(place, 13.0)
-        + table[14] * near(place, 14.0)
-        + table[15] * near(place, 15.0)
-    )
+    command = table[0] * near(place, 0.0)
+    for knot in range(1, KNOTS):
+        command = command + table[knot] * near(place, float(knot))
+    return command
 
 
 def next_knot(knot: float, weight: float, step: float, forgetting: float) -> float:
