@@ -64,21 +64,6 @@ class FootLoad(NamedTuple):
     gravity: float
 
 
-class MassMatrix(NamedTuple):
-    """The symmetric matrix M of equation (11) [kg m^2]: shank, coupling, foot."""
-
-    shank: float
-    coupling: float
-    foot: float
-
-
-class LegTorques(NamedTuple):
-    """Torques on shank angle and ankle angle [N m]."""
-
-    knee: float
-    ankle: float
-
-
 def foot_inertia_about_ankle(leg: LegParameters) -> float:
     """Inertia of the foot about the ankle [kg m^2]; the lower right entry of M in equation (11)."""
     return leg.foot_inertia + leg.foot_mass * leg.foot_mass_centre * leg.foot_mass_centre
@@ -89,23 +74,26 @@ def link_product(leg: LegParameters) -> float:
     return leg.foot_mass * leg.shank_length * leg.foot_mass_centre
 
 
-def mass_matrix(leg: LegParameters, cosine_theta: float) -> MassMatrix:
-    """The inertia matrix M [kg m^2] at an ankle angle, of which the cosine is given. Equations (11), (12)."""
+def mass_matrix(leg: LegParameters, cosine_theta: float) -> tuple[float, float, float]:
+    """Entries of the symmetric inertia matrix M [kg m^2], shank, coupling and foot. Equations (11), (12).
+
+    ``cosine_theta`` is that of the ankle angle.
+    """
     foot = foot_inertia_about_ankle(leg)
     product = link_product(leg) * cosine_theta
     shank = leg.shank_inertia + leg.shank_mass * leg.shank_mass_centre * leg.shank_mass_centre
     # The foot's mass turns with the shank at the end of its length (parallel axes).
     shank += leg.foot_mass * leg.shank_length * leg.shank_length
-    return MassMatrix(shank + foot - 2.0 * product, product - foot, foot)
+    return shank + foot - 2.0 * product, product - foot, foot
 
 
 def centrifugal_torques(
     leg: LegParameters, sine_theta: float, shank_rate: float, angular_velocity: float
-) -> LegTorques:
-    """The centrifugal and Coriolis torques C q' [N m]; rates of shank and ankle [rad/s]. Equations (11), (12)."""
+) -> tuple[float, float]:
+    """Centrifugal and Coriolis torques C q' on knee and ankle [N m]; rates [rad/s]. Equations (11), (12)."""
     product = link_product(leg) * sine_theta
     knee = product * angular_velocity * (2.0 * shank_rate - angular_velocity)
-    return LegTorques(knee, -product * shank_rate * shank_rate)
+    return knee, -product * shank_rate * shank_rate
 
 
 def gravity_torques(
@@ -116,16 +104,16 @@ def gravity_torques(
     cosine_alpha: float,
     knee_forward: float,
     knee_up: float,
-) -> LegTorques:
-    """The vector G [N m], with the acceleration of the knee forward and up [m/s^2] in it. Equations (11), (12).
+) -> tuple[float, float]:
+    """The vector G on knee and ankle [N m], with the knee's acceleration [m/s^2] in it. Equations (11), (12).
 
-    phi is the shank angle, alpha the foot's angle over the horizontal.
+    phi is the shank angle, alpha the foot's angle over the horizontal; the knee accelerates forward and up.
     """
     # A knee that accelerates upwards acts as more gravity.
     up = leg.gravity + knee_up
     shank = leg.shank_mass * leg.shank_mass_centre + leg.foot_mass * leg.shank_length
     foot = leg.foot_mass * leg.foot_mass_centre * (cosine_alpha * up - sine_alpha * knee_forward)
-    return LegTorques(shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot)
+    return shank * (sine_phi * up + cosine_phi * knee_forward) + foot, -foot
 
 
 def foot_load(leg: LegParameters) -> FootLoad:

@@ -21,13 +21,6 @@ SHARPENED = int(1.0 / SHARPNESS)
 """Openings that pass a dead band in full are this part of full opening or more."""
 
 
-class FixedPointGain(NamedTuple):
-    """A factor from 0 up as a fraction of 15 bits and the places by which the product is shifted right."""
-
-    fraction: float
-    places: float
-
-
 def fraction_of(value: int, fraction: int) -> int:
     """``value`` (2^30 at most in size) times ``fraction`` / 2^15, rounded down at every bit of the fraction."""
     # The MSP430 has no multiplier, and a product in C would ask for a run-time library that the image does not have.
@@ -64,10 +57,13 @@ def limited(value: int, limit: int) -> int:
     return max(min(value, limit), -limit)
 
 
-def gain_of(factor: float) -> FixedPointGain:
-    """A factor from 0 to 32767 times 2^15 as a gain: as many bits as there are, the largest one where it is larger."""
+def gain_of(factor: float) -> tuple[float, float]:
+    """A factor from 0 to 32767 times 2^15 as a fraction of 15 bits and the places by which a product is shifted right.
+
+    It has as many bits as there are, and is the largest one where the factor is larger.
+    """
     if not factor > 0.0:
-        return FixedPointGain(0.0, 0.0)
+        return 0.0, 0.0
     _, exponent = math.frexp(factor)
     places = min(MOST_PLACES, max(0, FRACTION_BITS - exponent))
     fraction = math.floor(math.ldexp(factor, places) + 0.5)
@@ -75,7 +71,7 @@ def gain_of(factor: float) -> FixedPointGain:
     if fraction > LARGEST_FRACTION and places > 0:
         places -= 1
         fraction = math.floor(math.ldexp(factor, places) + 0.5)
-    return FixedPointGain(float(min(fraction, LARGEST_FRACTION)), float(places))
+    return float(min(fraction, LARGEST_FRACTION)), float(places)
 
 
 FEWEST_BITS, MOST_BITS = 8, 14
