@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from ppafo.arguments import Address, Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
+from ppafo.arguments import Count, Fraction, Name, Overrides, Seed, Threads, Word, checked
 from ppafo.progress import Report
 
 if TYPE_CHECKING:
@@ -32,7 +32,6 @@ def sweep_into_folder(
     draws: Count | None = None,
     seed: Seed | None = None,
     threads: Threads | None = None,
-    scheduler: Address | None = None,
     agreed: Agreed = False,
     statistic: StatisticWords | None = None,
     metric: MetricName | None = None,
@@ -47,9 +46,8 @@ def sweep_into_folder(
     """Run a study: many runs, one row each, resumable; or a statistic to a wanted precision.
 
     study: name of a study, or a .toml file
-    out: folder or address for the results; default out/NAME with the name of the study
+    out: folder for the results; default out/NAME with the name of the study
     draws: number of draws, instead of the number in the file; of a statistic the maximum, default 1,048,576
-    scheduler: address of a Dask scheduler whose workers compute the chunks
     agreed: start even if the results will fill much of the disk
     statistic: draw until the interval of a statistic is narrow enough, and keep no rows: mean, 'quantile 0.95',
         'probability above 1.2 N m', 'probability below 0.5 g'
@@ -87,11 +85,9 @@ def sweep_into_folder(
             raise StudyError(f"{unused[0]}: needs a statistic, for example --statistic mean --metric rms_error")
         chosen = study_of(study, overrides, draws, seed)
         folder = out or Path("out") / chosen.name
-        return _rows_into_folder(chosen, folder, threads=threads, scheduler=scheduler, agreed=agreed, progress=progress)
+        return _rows_into_folder(chosen, folder, threads=threads, agreed=agreed, progress=progress)
     if metric is None:
         raise StudyError(f"statistic '{statistic}': needs a metric, for example --metric rms_error")
-    if scheduler is not None:
-        raise StudyError(f"--scheduler {scheduler}: a statistic is computed on this machine; omit --scheduler")
     chosen = study_of(study, overrides)
     if draws is not None:
         of_statistic["draws"] = draws
@@ -112,7 +108,6 @@ def _rows_into_folder(
     folder: str | Path,
     *,
     threads: int | None,
-    scheduler: str | None,
     agreed: bool,
     progress: Report | None,
 ) -> Finding[StudyResults]:
@@ -121,7 +116,7 @@ def _rows_into_folder(
     from ppafo.analyses.sweep.solve import INTERRUPTED, INTERRUPTED_AT_ONCE, is_begun, sweep
 
     try:
-        swept = sweep(study, threads=threads, out=folder, scheduler=scheduler, agreed=agreed, progress=progress)
+        swept = sweep(study, threads=threads, out=folder, agreed=agreed, progress=progress)
         write_report(swept.found)
     except KeyboardInterrupt:
         raise KeyboardInterrupt(INTERRUPTED if is_begun(study, folder) else INTERRUPTED_AT_ONCE) from None
