@@ -1,5 +1,6 @@
 """The results of a study, read from its folder on demand."""
 
+import re
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,12 +23,9 @@ if TYPE_CHECKING:
 SUMMARY = "summary.json"
 BANDS = "bands.parquet"
 _OF_BANDS = ("configuration", "channel", "time", "runs")
+_QUANTILE = re.compile(r"q[0-9]*\.?[0-9]+(e-[0-9]+)?")
+"""Name of the column of a quantile of bands, such as q0.05."""
 Columns = dict[str, np.ndarray[Any, Any]]
-
-
-def _is_of_bands(name: str) -> bool:
-    """Tell whether bands have a column of this name: a quantile is ``q0.05``."""
-    return name in _OF_BANDS or (name.startswith("q") and name[1:].replace(".", "", 1).replace("e-", "", 1).isdecimal())
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -105,7 +103,8 @@ class StudyResults:
         try:
             table = read_parquet(self.folder.open(BANDS), BANDS)
             check_types(table, BANDS)
-            if not set(_OF_BANDS) < set(table.column_names) or not all(map(_is_of_bands, table.column_names)):
+            others = set(table.column_names) - set(_OF_BANDS)
+            if not set(_OF_BANDS) < set(table.column_names) or not all(map(_QUANTILE.fullmatch, others)):
                 raise DataError(f"{BANDS}: has other columns than bands have")
         except (DataError, OSError) as error:
             raise DataError(

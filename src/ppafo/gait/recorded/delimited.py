@@ -91,19 +91,13 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
 
 
 class PerFrame(NamedTuple):
-    """Clock of a table whose column ``name`` counts frames from 1, at a rate [Hz]."""
+    """Clock of a table with a frame in each row, at a rate [Hz]; ``name`` is the column that counts from 1, if any."""
 
     name: str
     rate: float
 
 
-class PerRow(NamedTuple):
-    """Clock of a table with a row for each frame, at a rate [Hz]."""
-
-    rate: float
-
-
-Clock = str | PerFrame | PerRow
+Clock = str | PerFrame
 """Clock of a table: its column of time, or frames at a rate."""
 
 
@@ -125,15 +119,13 @@ def table_of(
     apart = told_apart(written)
     own = iter(apart)
     named = Cells([next(own) if name else "" for name in cells.names], cells.units)
-    timed = "" if isinstance(clock, PerRow) else clock.name if isinstance(clock, PerFrame) else clock
+    timed = clock.name if isinstance(clock, PerFrame) else clock
     at = written.index(timed) if timed else None
     try:
         values, numbers = rows_of(block, named, () if at is None else (at,))
         time: Floats = np.arange(len(values), dtype=np.float64) if at is None else values[:, at]
-        if isinstance(clock, str):
-            time = time * seconds
-        else:
-            time = (time - (1.0 if isinstance(clock, PerFrame) else 0.0)) / clock.rate
+        first = 0.0 if at is None else 1.0
+        time = time * seconds if isinstance(clock, str) else (time - first) / clock.rate
         check_growing(time, numbers)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
