@@ -193,6 +193,7 @@ class Program:
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
     that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
+    ``has_one_chamber`` True where nothing is measured of chamber 2, which is the dead volume behind a port alone.
     """
 
     valve: ValveModel
@@ -219,6 +220,7 @@ class Program:
     shank: ProfileKind | None = None
     foot: FootPhases | None = None
     controlled: str = TORQUE
+    has_one_chamber: bool = False
 
     @property
     def groups(self) -> Groups:

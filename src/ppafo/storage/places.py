@@ -10,7 +10,7 @@ import stat
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from ppafo.documents.json_text import json_document
 from ppafo.errors import DataError
@@ -26,43 +26,7 @@ _LONGEST_WRITING = 86400.0
 """Nobody writes a file for longer [s]."""
 
 
-class Place(Protocol):
-    """A folder; names are relative to it, with ``/`` between folders."""
-
-    @property
-    def address(self) -> str:
-        """Name in messages, by which another process can open it."""
-        ...
-
-    def names(self) -> frozenset[str]:
-        """Return the names of all files in it and in its folders, none where it does not exist.
-
-        DataError where the place is a file.
-        """
-        ...
-
-    def open(self, name: str) -> io.BufferedIOBase:
-        """Return a file for reading; OSError where there is none, or no regular one."""
-        ...
-
-    def write(self, name: str, content: bytes) -> None:
-        """Write a file, replacing an earlier one; DataError where that is not possible."""
-        ...
-
-    def remove(self, name: str) -> None:
-        """Remove a file if it is there."""
-        ...
-
-    def free_bytes(self) -> int | None:
-        """Return how much can still be written, None where nobody knows."""
-        ...
-
-    def tidy(self) -> None:
-        """Remove what a killed process has left half written beside its place, once no other can be writing it."""
-        ...
-
-
-def read_document(place: Place, name: str) -> Any:
+def read_document(place: "Place", name: str) -> Any:
     """Return what a JSON file of ours holds, as plain data; OSError or ValueError where that is not possible."""
     with place.open(name) as file:
         content = bytearray()
@@ -74,7 +38,7 @@ def read_document(place: Place, name: str) -> Any:
     return json_document(bytes(content))
 
 
-def place_at(address: str | Path) -> Place:
+def place_at(address: str | Path) -> "Place":
     """Return the folder at a path or an address such as ``s3://bucket/study``; DataError where it cannot be opened."""
     text = str(address)
     if _ADDRESS_MARK not in text:
@@ -87,22 +51,22 @@ def place_at(address: str | Path) -> Place:
         system, root = url_to_fs(text)
     except (ValueError, ImportError, OSError) as error:
         raise DataError(f"{text}: cannot be opened: {' '.join(str(error).split())}") from error
-    return _RemoteFolder(text.rstrip("/"), system, str(root).rstrip("/"))
+    return RemoteFolder(text.rstrip("/"), system, str(root).rstrip("/"))
 
 
 @dataclass(frozen=True, slots=True)
 class DiskFolder:
-    """A folder on a disk of this machine, or on one that several machines share."""
+    """A folder on a disk of this machine, or on one that several machines share; ``/`` is between its folders."""
 
     folder: Path
 
     @property
     def address(self) -> str:
-        """The absolute path."""
+        """The absolute path: its name in messages, by which another process can open it."""
         return str(self.folder)
 
     def names(self) -> frozenset[str]:
-        """Return the names of all files, those left aside by a killed process not among them.
+        """Return the names of all files, none where it does not exist; those left aside are not among them.
 
         DataError where it is a file.
         """
@@ -127,12 +91,12 @@ class DiskFolder:
         (self.folder / name).unlink(missing_ok=True)
 
     def free_bytes(self) -> int | None:
-        """Return the free space of the disk."""
+        """Return how much can still be written, None where nobody knows: the free space of the disk."""
         there = next(ancestor for ancestor in (self.folder, *self.folder.parents) if ancestor.exists())
         return shutil.disk_usage(there).free
 
     def tidy(self) -> None:
-        """Remove files that were being written when a process was killed: a younger one may belong to another."""
+        """Remove what a killed process has left half written; a younger file may belong to another."""
         # By age and not by process: the folder may be shared by machines that cannot see each other's processes.
         latest = time.time() - _LONGEST_WRITING
         for path in self.folder.rglob(f"*{LEFT_ASIDE}*"):
@@ -142,7 +106,7 @@ class DiskFolder:
 
 
 @dataclass(frozen=True, slots=True)
-class _RemoteFolder:
+class RemoteFolder:
     """A folder at an address that fsspec knows, such as an object store."""
 
     address: str
@@ -178,3 +142,7 @@ class _RemoteFolder:
 
     def tidy(self) -> None:
         """Do nothing: nothing is left aside."""
+
+
+Place = DiskFolder | RemoteFolder
+"""A folder of files, wherever it is."""
