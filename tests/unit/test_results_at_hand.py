@@ -108,6 +108,18 @@ def test_a_result_can_be_pickled_and_copied_and_still_prints_and_draws_itself(na
             assert other.to_dict() == result.to_dict()
 
 
+def test_an_audit_is_a_finding_and_a_loop_over_it_goes_through_its_items(tmp_path: Path) -> None:
+    audited = ppafo.audit("ppafo2011-printed")
+    assert isinstance(audited, Finding)
+    assert not audited.passed
+    assert next(finding.severity for finding in audited) == "error"
+    assert tuple(audited) == audited.found.findings
+    audited.save(tmp_path / "audit")
+    assert "no changed value" not in (tmp_path / "audit" / "audit-ppafo2011-printed.txt").read_text()
+    with pytest.raises(TypeError, match="not iterable"):
+        iter(ppafo.bottle(gas_per_stride="0.3 g"))
+
+
 def _files() -> dict[str, Any]:
     """Every shipped scenario and walk, as files have them."""
     return {
