@@ -6,13 +6,14 @@ library has them in C.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind, ProfileKind
-from ppafo.engine.program import FeedPhases, FootPhases, GasPhases, Program
+from ppafo.engine.program import GasPhases, Program
 from ppafo.engine.rows import rebuilt
 from ppafo.engine.run import Lines, Run, Walk
 from ppafo.engine.scheme.actuators import volumes_of
@@ -219,7 +220,7 @@ def _gas(components: Components, effects: Sequence[Effect]) -> GasPhases:
     return not_ideal
 
 
-def _feed(components: Components) -> FeedPhases | None:
+def _feed(components: Components) -> ModuleType | None:
     """Return what feeds the valve."""
     if components.supply_lines is None:
         return None
@@ -228,7 +229,7 @@ def _feed(components: Components) -> FeedPhases | None:
     return lines
 
 
-def _foot(components: Components) -> FootPhases | None:
+def _foot(components: Components) -> ModuleType | None:
     """Return how a foot on a prescribed shank goes through a step."""
     if components.leg is None:
         return None
@@ -248,7 +249,12 @@ def _of_error(law: ControllerKind | None, components: Components) -> ControllerK
 def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_delay: bool) -> Program:
     """Return what the lanes are composed of."""
     is_late, effects = first(components.signal_delay) > 0.0, effects_of(components.device, components.sections)
-    worn = None if walk is None else walk.groups()
+    leg: ModuleType | None = None
+    faults: ModuleType | None = None
+    if walk is not None:
+        from ppafo.engine.step import walk as leg  # most devices walk on no leg
+    if walk is not None and walk.failing is not None:
+        from ppafo.engine.step import failing as faults  # most walks have no fault
     return Program(
         actuator=ACTUATORS[components.device.actuator.kind].model,
         valve=components.valve,
@@ -260,9 +266,9 @@ def _program(components: Components, steps: TimeGrid, walk: Walk | None, has_del
         late_signals=walk is None and is_late,
         late_readings=walk is not None and is_late,
         gas=_gas(components, effects),
-        leg=None if worn is None else worn.leg,
-        takes_task_sequence=worn is not None and worn.takes_task_sequence,
-        faults=None if worn is None else worn.faults,
+        leg=leg,
+        takes_task_sequence=walk is not None and walk.task_sequence is not None,
+        faults=faults,
         feed=_feed(components),
         is_adaptive=bool(first(steps.needs_parts)),
         # A broken number of steps to a sample puts samples inside steps.
