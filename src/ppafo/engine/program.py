@@ -103,6 +103,7 @@ class Program:
     state, that are kept at some of them. ``starts_apart`` True lets the run of each lane begin at a step of its own,
     while others of the block are under way. ``actuator`` is what stands between the chambers and the joint.
     ``effects`` act in this order at the ports of their laws. ``controlled`` names what the reference is of.
+    ``has_one_chamber`` True where nothing is measured of chamber 2, which is the dead volume behind a port alone.
     """
 
     valve: ValveModel
@@ -129,6 +130,7 @@ class Program:
     shank: ProfileKind | None = None
     foot: ModuleType | None = None
     controlled: str = TORQUE
+    has_one_chamber: bool = False
 
     @property
     def groups(self) -> Groups:

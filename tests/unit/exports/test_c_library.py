@@ -36,7 +36,7 @@ from ppafo.signals.meter import (
 from ppafo.simulation.clock import TIMES
 from ppafo.simulation.loading import load_scenario
 from ppafo.simulation.numbers import with_numbers
-from ppafo.simulation.plan import plan_run, plan_runs
+from ppafo.simulation.plan import plan_run
 from ppafo.simulation.scenario import Scenario
 from ppafo.simulation.simulate import Result
 from ppafo.translation.c99 import program_source
@@ -487,7 +487,7 @@ def test_c_makes_the_numbers_of_a_run_that_python_makes(name: str, overrides: tu
     scenario = load_scenario(name, overrides)
     library = built(scenario, tmp_path)
     columns, varied = drawn(scenario)
-    run, _ = plan_runs(varied)
+    run, _ = varied.motion.motion_kind.plan(varied)
     compared = 0
     for members, batch in batches_of(run, RUNS):
         clock = batch.clock
