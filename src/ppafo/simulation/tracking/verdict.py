@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.control.kind import ControllerKind
-from ppafo.metrics.metric import has_reference
+from ppafo.metrics.metric import controlled_in
 from ppafo.model.controlled import CONTROLLED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
@@ -142,7 +142,7 @@ def tracking_of(
     if (
         len(recording) < _FEWEST_SAMPLES
         or scenario.controller.is_open_loop
-        or (is_task and not has_reference(recording))
+        or (is_task and controlled_in(recording) is None)
     ):
         return None
     limit = 0.0 if is_task else torque_limit(scenario.controller.settings)
