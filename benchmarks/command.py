@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from ppafo.cli.command_line import CommandParser, check_options
 from ppafo.cli.main import EXIT_BAD_INPUT
 from ppafo.cli.output import EXIT_INTERRUPTED
-from ppafo.errors import PpafoError, one_line
+from ppafo.errors import PpafoError
+from ppafo.wording import one_line
 
 
 def run_command(

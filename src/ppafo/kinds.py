@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from ppafo.errors import KindError, one_line
+from ppafo.errors import KindError
 from ppafo.plugins import OBJECT, is_working_folder, object_of, without_working_folder
+from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

@@ -10,7 +10,7 @@ from typing import Any
 
 from ppafo.arguments import Overrides, checked
 from ppafo.documents.toml_text import beside, label
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.parameters import ParameterSet
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
@@ -22,6 +22,7 @@ from ppafo.simulation.loading import ScenarioRequest
 from ppafo.simulation.motion_kind import is_walk
 from ppafo.simulation.overrides import over_layer
 from ppafo.simulation.scenario import Scenario
+from ppafo.wording import nearest_name
 
 
 def list_all_scenarios() -> tuple[str, ...]:

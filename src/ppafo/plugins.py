@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ppafo.errors import KindError, one_line
+from ppafo.errors import KindError
+from ppafo.wording import one_line
 
 Plugins = Iterable[str | Path]
 """Files (``laws.py``) or modules (``my_laws.hysteresis``) of the person."""

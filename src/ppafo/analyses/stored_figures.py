@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.analyses.endurance.walk_gas import WALK_FILE
 from ppafo.analyses.sweep.answer import load_study_results
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError
 from ppafo.report.recording_figure import recording_figure
 from ppafo.report.stored_figure import draw_stored_walk, read_result, stated_units
 from ppafo.rig.experiments import RIG_FILE
@@ -13,6 +13,7 @@ from ppafo.storage import read_recording
 from ppafo.storage.result_folder import MARK, NETCDF_FILE, RUN_FILE, marking_command, read_json
 from ppafo.study.manifest import MANIFEST
 from ppafo.units.shown import shown_in
+from ppafo.wording import reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

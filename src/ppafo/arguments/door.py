@@ -14,7 +14,8 @@ from contextvars import ContextVar
 from typing import Any, Literal, NamedTuple, ParamSpec, TypeVar
 
 from ppafo.arguments.values import Taken, annotated_parameters, shown, taken
-from ppafo.errors import ArgumentError, PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError
+from ppafo.wording import nearest_name
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -13,7 +13,8 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
 
 from ppafo.arguments.words import Word, taken_document, taken_flag, taken_number, taken_text, taken_whole
-from ppafo.errors import ArgumentError, one_line
+from ppafo.errors import ArgumentError
+from ppafo.wording import one_line
 
 _LONGEST = 60
 _SEVERAL = ", or several"

@@ -13,9 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from ppafo.errors import ArgumentError, UnitError, one_line
+from ppafo.errors import ArgumentError, UnitError
 from ppafo.units import SI, number_text, parse_quantity, split_number
 from ppafo.units.shown import units_beside
+from ppafo.wording import one_line
 
 _NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|nan|inf)", re.ASCII)
 _EXAMPLES = {
@@ -217,14 +218,6 @@ def point(text: str) -> float | str:
         return quantity("s")(text)
     except ArgumentError as error:
         raise ArgumentError(f"{text!r}: must be a time such as '1.5 s', or 'equilibrium'") from error
-
-
-def taken_address(value: Any) -> str:
-    """Return the address of a scheduler, which has a port or a protocol; ValueError for anything else."""
-    text = taken_text(value)
-    if ":" not in text:
-        raise ValueError
-    return text
 
 
 def taken_text(value: Any) -> str:
@@ -458,7 +451,6 @@ Confidence = Annotated[float, fraction_word("confidence of all intervals; defaul
 MaximumFailed = Annotated[
     float, fraction_word("fraction of the runs that may fail before the study is refused; default {default}")
 ]
-Address = Annotated[str, Word("ADDRESS", take=taken_address, what="an address such as 'tcp://10.0.0.1:8786'")]
 Fraction = Annotated[float, fraction_word()]
 Side = Annotated[str, Word("right|left", help="which foot; default right")]
 Metrics = Annotated[Sequence[str], Word("NAME", option="--metric")]

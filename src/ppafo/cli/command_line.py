@@ -20,9 +20,10 @@ from ppafo.arguments import Word, number, whole_number
 from ppafo.arguments.door import read_by
 from ppafo.arguments.values import annotated_parameters
 from ppafo.cli import output
-from ppafo.errors import ArgumentError, PpafoError, nearest_name
+from ppafo.errors import ArgumentError, PpafoError
 from ppafo.kinds import kind_at
 from ppafo.plugins import name_modules_in, name_plugins
+from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite

@@ -6,9 +6,9 @@ Commands of other packages are plain functions, found by entry points of the gro
 from types import FunctionType
 
 from ppafo.cli.command_line import Command, CommandGroup, UsageError
-from ppafo.errors import nearest_name
 from ppafo.kinds import Kinds, is_installed, package_of
 from ppafo.plugins import name_modules_in
+from ppafo.wording import nearest_name
 
 _ANALYSES, _BENCH, _DEVICE = "ppafo.analyses", "ppafo.cli.verbs.bench", "ppafo.cli.verbs.device"
 _EXPORTS, _WALKING = "ppafo.cli.verbs.exports", "ppafo.cli.verbs.walking"

@@ -8,7 +8,8 @@ from typing import Any
 from ppafo.arguments import Name
 from ppafo.cli.output import EXIT_CHECK_FAILED, EXIT_GOOD, CommandOutput
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, SimulationError, nearest_name
+from ppafo.errors import DataError, SimulationError
+from ppafo.wording import nearest_name
 
 FORMATS: dict[str, str] = {
     "parameters": "ppafo.parameters.loading",

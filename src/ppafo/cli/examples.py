@@ -8,7 +8,8 @@ from importlib.resources.abc import Traversable
 from pathlib import Path, PurePosixPath
 
 from ppafo.cli.output import CommandOutput, listing
-from ppafo.errors import DataError, nearest_name
+from ppafo.errors import DataError
+from ppafo.wording import nearest_name
 
 _FOLDER = resources.files("ppafo") / "examples"
 

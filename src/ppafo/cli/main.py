@@ -10,9 +10,10 @@ from ppafo import interrupts
 from ppafo.cli.command_line import Command, CommandGroup, CommandParser, UsageError, add_parameters, check_options, run
 from ppafo.cli.commands import COMMANDS, OTHERS, check_words, list_commands
 from ppafo.cli.output import EXIT_INTERRUPTED
-from ppafo.errors import PpafoError, one_line
+from ppafo.errors import PpafoError
 from ppafo.kinds import kind_at
 from ppafo.version import __version__
+from ppafo.wording import one_line
 
 # Completion of the command line for bash and zsh: one script, made from the same signatures as the parser.
 

@@ -10,8 +10,9 @@ from typing import Annotated
 
 from ppafo.arguments import File, Name, Word
 from ppafo.cli.output import CommandOutput
-from ppafo.errors import DataError, nearest_name, one_line
+from ppafo.errors import DataError
 from ppafo.kinds import kind_at
+from ppafo.wording import nearest_name, one_line
 
 _SUFFIX = ".toml"
 _SCHEMAS = {"set": "parameters"}

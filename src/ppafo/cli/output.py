@@ -13,8 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ppafo.documents.json_text import json_text
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError
 from ppafo.progress import ProgressLine
+from ppafo.wording import reason
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

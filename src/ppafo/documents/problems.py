@@ -8,7 +8,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from ppafo.errors import nearest_name, one_line, said_missing
+from ppafo.wording import nearest_name, one_line, said_missing
 
 NAME = r"^[a-z0-9][a-z0-9_-]*$"
 """Pattern of the name of a set or scenario."""

@@ -13,7 +13,8 @@ from typing import Any
 
 from ppafo.documents.json_text import MAXIMUM_LEVELS, is_nested_too_deeply
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
-from ppafo.errors import PpafoError, nearest_name, one_line, reason
+from ppafo.errors import PpafoError
+from ppafo.wording import nearest_name, one_line, reason
 
 _SUFFIX = ".toml"
 _MAXIMUM_NAMED = 3

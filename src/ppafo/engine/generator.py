@@ -18,8 +18,9 @@ from ppafo.engine.source_text import (
     emitted_name,
     is_step_function,
 )
-from ppafo.errors import ProgramError, nearest_name
+from ppafo.errors import ProgramError
 from ppafo.model.declaration import PlainFunction
+from ppafo.wording import nearest_name
 
 
 @dataclass(slots=True)

@@ -20,7 +20,8 @@ from ppafo.engine.cache.folder import LEFT_OUT_FOR, cache_folder, refusal
 from ppafo.engine.cache.kept import is_kept
 from ppafo.engine.cache.programs import load_generated, note_name
 from ppafo.engine.compilers import OFFERED, Compiler, CompilerError, Effort, UntranslatableError
-from ppafo.errors import ProgramError, SimulationError, nearest_name, one_line
+from ppafo.errors import ProgramError, SimulationError
+from ppafo.wording import nearest_name, one_line
 
 logger = logging.getLogger("ppafo")
 

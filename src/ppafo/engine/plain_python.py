@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ppafo.engine.entries import ORIGIN, PARSING
-from ppafo.errors import ProgramError, one_line
+from ppafo.errors import ProgramError
+from ppafo.wording import one_line
 
 _PLAIN = {
     *(ast.Return, ast.Assign, ast.AugAssign, ast.AnnAssign, ast.For, ast.While, ast.If, ast.Break, ast.Continue),

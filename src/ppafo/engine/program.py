@@ -9,6 +9,7 @@ from ppafo.control.kind import OPEN_LOOP, ControllerKind, ProfileKind
 from ppafo.control.profiles import CONSTANT
 from ppafo.engine.channels import REQUEST, paths_of_traces
 from ppafo.engine.groups import Groups, Role, given, handed, kept, merged, rows_of
+from ppafo.engine.plain_python import place
 from ppafo.engine.rows import leaf_paths
 from ppafo.engine.scheme.actuators import functions_of_actuator
 from ppafo.engine.scheme.motion import FreePart, PartEnd, PartSlide, PrescribedStep, StepControl
@@ -17,9 +18,10 @@ from ppafo.engine.step.lane import LaneResult, LaneStart, LaneTiming, NoParamete
 from ppafo.kinds import kind_at
 from ppafo.model.actuators.kind import ActuatorModel
 from ppafo.model.actuators.vane import MODEL as VANE
-from ppafo.model.controlled import TORQUE
+from ppafo.model.controlled import CONTROLLED, TORQUE
+from ppafo.model.declaration import PlainFunction
 from ppafo.model.effects.kind import Effect, State
-from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState, SinglePort
+from ppafo.model.plant import ActuatorFunctions, PlantParameters, PlantState
 from ppafo.model.ports import exhaust_path, gas_density, ideal_density, leakage_path, supply_path
 from ppafo.model.sensors import SensorParameters
 from ppafo.model.valves.kind import ValveModel
@@ -107,13 +109,6 @@ class LegPhases(Protocol):
     def groups(self, parts: "Program") -> Groups:
         """Groups of numbers that it has in a lane."""
 
-    @property
-    def ASKED(self) -> tuple[str, ...]:  # noqa: N802
-        """Groups of rows that what stands in ``links`` takes before its own arguments."""
-
-    def links(self, parts: "Program") -> Mapping[Any, Any]:
-        """Replacements of functions of the controller."""
-
     def carry(self, parts: "Program", lane: "Lane") -> None:
         """Initial load of the foot, which is carried from step to step."""
 
@@ -198,7 +193,7 @@ class Program:
     under way. ``actuator`` is what stands between the chambers and the joint. ``effects`` act in this order at the
     ports of their laws. ``shank`` None leaves an unconstrained vane to itself; otherwise it carries a foot on a shank
     that moves so, and ``foot`` says how that goes through a step. ``controlled`` names what the reference is of.
-    ``has_vacuum`` True where the supplies are below the atmosphere: a command above 0 then lowers what it raises else.
+    ``has_one_chamber`` True where nothing is measured of chamber 2, which is the dead volume behind a port alone.
     """
 
     valve: ValveModel
@@ -225,7 +220,7 @@ class Program:
     shank: ProfileKind | None = None
     foot: FootPhases | None = None
     controlled: str = TORQUE
-    has_vacuum: bool = False
+    has_one_chamber: bool = False
 
     @property
     def groups(self) -> Groups:
@@ -239,6 +234,11 @@ class Program:
     def state_rows(self) -> dict[str, type]:
         """Groups of state rows of this program, in order."""
         return rows_of(self.groups, Role.STATE)
+
+    @property
+    def groups_of_plant(self) -> dict[str, PlainFunction]:
+        """Functions of the plant that give groups of parameters, by their names."""
+        return {name: group.of_plant for name, group in self.groups.items() if group.of_plant is not None}
 
     def step_rows(self) -> dict[str, type]:
         """Groups of numbers that a phase of a step hands to the later ones, in order."""
@@ -351,6 +351,11 @@ class Program:
         return self.controlled if self.has_reference and not self.walks else ""
 
     @property
+    def controlled_value(self) -> PlainFunction:
+        """Function of the controlled quantity, of angle, both pressures and torque."""
+        return CONTROLLED[self.controlled].value
+
+    @property
     def wanted(self) -> str:
         """Quantity with a set-point: of the reference, or of a walking law that requests a torque."""
         return TORQUE if self.walks and self.requests_torque else self.followed
@@ -395,11 +400,6 @@ class Program:
     def requests_torque(self) -> bool:
         """True where a controller of walking keeps the torque that it wants."""
         return REQUEST in leaf_paths(self.state_rows()["controller_state"], "controller_state")
-
-    @property
-    def has_single_ports(self) -> bool:
-        """True where one path of each chamber is open, false where a valve blends them."""
-        return self.valve.port is SinglePort
 
     @property
     def has_reference(self) -> bool:
@@ -485,3 +485,12 @@ def groups_of(program: Program) -> Groups:
         **{group: kept(kind.state) for group, kind in program.meter_groups.items()},
         **({"start": kept(LaneStart)} if program.starts_apart else {}),
     }
+
+
+def place_of_group(program: Program, name: str) -> str:
+    """File and line of the function that declares a group of a component; the name of one of the program's own."""
+    for part in (program.gas, program.leg, program.faults, program.feed):
+        if part is not None and name in part.groups(program):
+            code = part.groups.__code__
+            return place(code.co_filename, code.co_firstlineno)
+    return name

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from ppafo.engine.groups import Role, filled, rows_of
 from ppafo.engine.in_python import functions_of
 from ppafo.engine.lanes import Batch, BatchResult, Clock, effort_for, load_programs, run_blocks
-from ppafo.engine.program import FaultPhases, LegPhases, Program
+from ppafo.engine.program import FaultPhases, LegPhases, Program, place_of_group
 from ppafo.engine.rows import of_each, row_numbers
 from ppafo.engine.scheme.actuators import pressures_of
 from ppafo.engine.scheme.motion import StepControl
@@ -178,8 +179,10 @@ def batches_of(run: Run, runs: int) -> list[tuple[Members, Batch]]:
         step=run.step, period=run.period, command_lag=command_lag, signal_lag=signal_lag, tolerance=run.tolerance
     )
     own_groups = program.groups
-    parameters = filled(rows_of(own_groups, Role.PARAMETER), _parameters_of(run, timing), runs, Role.PARAMETER)
-    states = filled(rows_of(own_groups, Role.STATE), _states_of(run), runs, Role.STATE)
+    declared_at = partial(place_of_group, program)
+    given = _parameters_of(run, timing)
+    parameters = filled(rows_of(own_groups, Role.PARAMETER), given, runs, Role.PARAMETER, declared_at)
+    states = filled(rows_of(own_groups, Role.STATE), _states_of(run), runs, Role.STATE, declared_at)
     counts = np.empty((runs, 6))
     numbers = (run.needs_parts, run.step_count, run.steps_per_sample, run.record_every, signal_steps, command_steps)
     for column, count in enumerate(numbers):
@@ -217,6 +220,7 @@ def _parameters_of(run: Run, timing: LaneTiming) -> dict[str, Any]:
         **({} if run.lines is None else {"lines": run.lines.parameters}),
         **({} if run.leg is None else {"load": run.leg.load, "shank": run.leg.shank}),
         **{effect.name: row for effect, row in zip(run.program.effects, run.effects, strict=True)},
+        **{name: of_each(of_plant, run.plant) for name, of_plant in run.program.groups_of_plant.items()},
     }
 
 

@@ -26,9 +26,10 @@ import numpy as np
 from ppafo.engine.entries import ORIGIN, without_origins
 from ppafo.engine.plain_python import check_flow, check_grammar, parse_module, place, refusal
 from ppafo.engine.rows import is_row
-from ppafo.errors import ProgramError, nearest_name, one_line
+from ppafo.errors import ProgramError
 from ppafo.model.binding import frame_of, is_made_of, made_of, parts_of
 from ppafo.model.declaration import PlainFunction
+from ppafo.wording import nearest_name, one_line
 
 COMPILED_BUILTINS = frozenset(
     {"abs", "bool", "divmod", "enumerate", "float", "int", "len", "max", "min", "pow", "range", "round", "sum", "zip"}
@@ -188,8 +189,9 @@ class Composer(ast.NodeTransformer):
             raise self.refuse(node, f"'parts={ast.unparse(given.value)}' must be parts of this function")
         others = [keyword for keyword in node.keywords if keyword is not given]
         # What a function hands on as it was given by a phase is the same for all of a program.
-        frame = frame_of(self.function) if parts is parts_of(self.function) else None
-        is_same = frame is not None and frame.function.__name__ == self.function.__name__
+        frame = frame_of(self.function)
+        is_own = frame is None or frame.function.__name__ == self.function.__name__
+        is_same = is_own and parts is parts_of(self.function)
         name = called.__name__ if is_same else f"{called.__name__}_of_{self.function.__name__}"
         return made_of(called, name, parts), ast.copy_location(ast.Call(node.func, node.args, others), node)
 

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from importlib.resources import files
 
-from ppafo.errors import one_line
+from ppafo.wording import one_line
 
 _MARK = re.compile(r"@(\w+)@")
 _OF_MARKDOWN = re.compile(r"([\\`*_{}\[\]()#+\-!|~<>&:])")

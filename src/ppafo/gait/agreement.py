@@ -14,7 +14,9 @@ import numpy as np
 from ppafo.constants import STANDARD_GRAVITY
 from ppafo.errors import DataError
 from ppafo.gait.gait import HARMONICS, Gait, fit_curve
-from ppafo.gait.plausible import MIDSTANCE, STANCE_FRACTION, MeanStride, force_remarks
+from ppafo.gait.mean_stride import MeanStride
+from ppafo.gait.plausible import STANCE_FRACTION, force_remarks
+from ppafo.gait.plausible_angles import MIDSTANCE
 from ppafo.signals.recording import Floats
 
 LARGEST_DELAY = 0.03

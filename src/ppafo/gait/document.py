@@ -45,6 +45,8 @@ _LIMITS = {
 def gait_file() -> type[BaseModel]:
     """Return the model of a gait file."""
     text = Annotated[str, Field(pattern=QUANTITY)]
+    number = Annotated[float, Field(allow_inf_nan=False)]
+    series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
     subject = {
         "body_mass": (text, Field(description="mass of the wearer, such as '62 kg'")),
         "stature": optional(text, "height of the wearer, such as '1.75 m', where it is known"),
@@ -72,23 +74,9 @@ def gait_file() -> type[BaseModel]:
         "stride": (table("Stride", stride), Field(description="times of the stride")),
     }
     for name, unit in CURVES.items():
-        required = name in REQUIRED
-        fields[name] = (
-            (_curve_table(name, unit), Field(description=_SUMMARIES[name]))
-            if required
-            else optional(_curve_table(name, unit), _SUMMARIES[name])
-        )
-    return table("GaitFile", fields)
-
-
-def _curve_table(name: str, unit: str) -> type[BaseModel]:
-    # Only angles have two units; every other curve has the one of its SI quantity.
-    units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
-    number = Annotated[float, Field(allow_inf_nan=False)]
-    series = Annotated[list[number], Field(min_length=1, max_length=_MAXIMUM_HARMONICS)]
-    return table(
-        "".join(part.capitalize() for part in name.split("_")),
-        {
+        # Only angles have two units; every other curve has the one of its SI quantity.
+        units: Any = Literal["deg", "rad"] if unit == "rad" else Literal[unit]
+        columns = {
             "unit": (units, Field(description="unit of every number of this curve")),
             "mean": (number, Field(description="mean over the stride")),
             "cosine": (series, Field(description="amplitudes of the cosines, first harmonic first")),
@@ -97,8 +85,11 @@ def _curve_table(name: str, unit: str) -> type[BaseModel]:
                 Annotated[number, Field(ge=0.0)],
                 Field(0.0, description="standard deviation between strides, root mean square over the stride"),
             ),
-        },
-    )
+        }
+        curve = table("".join(part.capitalize() for part in name.split("_")), columns)
+        required = (curve, Field(description=_SUMMARIES[name]))
+        fields[name] = required if name in REQUIRED else optional(curve, _SUMMARIES[name])
+    return table("GaitFile", fields)
 
 
 def gait_of(document: dict[str, Any], file: str) -> Gait:

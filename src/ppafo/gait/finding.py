@@ -12,7 +12,6 @@ import numpy as np
 from ppafo.gait.document import gait_toml
 from ppafo.gait.gait import CURVES, Gait, clinical_angle, plain_unit
 from ppafo.gait.recorded.curves import PHASES
-from ppafo.gait.recorded.footfalls import Stride
 from ppafo.gait.recorded.importing import ImportedGait
 from ppafo.report.display_units import display_unit, display_value, display_values
 from ppafo.report.finding import Finding, Section, columns_of, facts
@@ -41,6 +40,7 @@ _PLAIN = (
     "strides",
 )
 """Fields of a gait that are plain data as they stand."""
+_STRIDE_KEYS = ("start", "toe_off", "end", "stance_share")
 
 _NOISE = 1e-9
 """Number [SI] below which a deviation or a misfit is rounding."""
@@ -74,8 +74,10 @@ class GaitFound:
             document["imported"] = {
                 "files": list(imported.files),
                 "events": imported.events,
-                "strides": [_stride(stride) for stride in imported.strides],
-                "left_out": [_stride(stride) for stride in imported.left_out],
+                **{
+                    name: [{key: getattr(stride, key) for key in _STRIDE_KEYS} for stride in strides]
+                    for name, strides in (("strides", imported.strides), ("left_out", imported.left_out))
+                },
                 "remarks": list(imported.remarks),
                 "curves": {
                     name: {
@@ -131,12 +133,8 @@ def gait_finding(gait: Gait, imported: ImportedGait | None = None) -> Finding[Ga
         ),
         found=GaitFound(gait, imported),
         kind=gait.origin,
-        files={f"{gait.name}.toml": partial(_toml_bytes, gait)},
+        files={f"{gait.name}.toml": lambda: gait_toml(gait).encode()},
     )
-
-
-def _toml_bytes(gait: Gait) -> bytes:
-    return gait_toml(gait).encode()
 
 
 def _plus_minus(deviation: float) -> str:
@@ -158,10 +156,6 @@ def _row(gait: Gait, name: str, imported: ImportedGait | None) -> tuple[str | No
         f"{display_value(curve.deviation, quantity):.2g}" if curve.deviation else None,
         f"{left:.2g}" if left > _NOISE else None,
     )
-
-
-def _stride(stride: Stride) -> dict[str, float]:
-    return {"start": stride.start, "toe_off": stride.toe_off, "end": stride.end, "stance_share": stride.stance_share}
 
 
 _STANCE = "#dddddd"

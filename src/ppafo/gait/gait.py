@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ppafo.errors import DataError, nearest_name
+from ppafo.errors import DataError
 from ppafo.model.elementary import sine_and_cosine
 from ppafo.model.gait import HARMONICS as ENGINE_HARMONICS
 from ppafo.model.gait import Harmonic, Series
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
+from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

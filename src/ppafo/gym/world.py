@@ -13,7 +13,7 @@ from ppafo.engine.lanes import Clock, Floats
 from ppafo.engine.program import Program
 from ppafo.engine.rows import numbers
 from ppafo.engine.run import batch_of
-from ppafo.errors import ScenarioError, SimulationError, nearest_name
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.gym.lanes import BatchStep, Environments, EpisodeStarts, FromOutside, Places, RewardWeights, episode_program
 from ppafo.gym.scenario_episodes import Ranges, ScenarioEpisodes, scenario_episodes
 from ppafo.gym.tasks import BAR, LONGEST_SINCE, TASKS, Goal, Task
@@ -29,6 +29,7 @@ from ppafo.walking.person import draw_gaits
 from ppafo.walking.planning import batch_of_many, plan_walk
 from ppafo.walking.walk import lasting
 from ppafo.walking.wearer import draw_builds
+from ppafo.wording import nearest_name
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ from pydantic import Field
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import IdentificationError, nearest_name
+from ppafo.errors import IdentificationError
 from ppafo.identification.bench.flow import GasAt, Law
 from ppafo.identification.bench.free_decay import free_decay
 from ppafo.identification.bench.open_valve_flow import open_valve_flow
@@ -34,6 +34,7 @@ from ppafo.parameters.device import VANE
 from ppafo.parameters.parameter_set import Citation, ParameterSet, chosen_valve, number_in_si, with_followers
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.storage.column_map import ColumnMap
+from ppafo.wording import nearest_name
 
 _Recordings = Annotated[tuple[Text, ...], Field(strict=False, min_length=1, description="files, relative to this one")]
 _Start = Annotated[Text | None, Field(description="first time to use, such as '2 s'")]

@@ -37,13 +37,13 @@ def energy_imbalance(supplied: Numeric, vented: Numeric, heat: Numeric, work: Nu
 
 
 def largest_pressure(recording: Recording) -> float:
-    """Largest pressure in either chamber [Pa absolute]."""
-    return float(max(np.max(recording["pressure_1"]), np.max(recording["pressure_2"])))
+    """Largest chamber pressure [Pa absolute]."""
+    return float(max(np.max(recording[name]) for name in ("pressure_1", "pressure_2") if name in recording))
 
 
 def lowest_temperature(recording: Recording) -> float:
-    """Lowest temperature of the gas in either chamber [K]."""
-    return float(min(np.min(recording["temperature_1"]), np.min(recording["temperature_2"])))
+    """Lowest temperature of the gas in a chamber [K]."""
+    return float(min(np.min(recording[name]) for name in ("temperature_1", "temperature_2") if name in recording))
 
 
 def mechanical_work(recording: Recording) -> float:
@@ -228,8 +228,8 @@ METRICS = (
     MetricKind(
         "largest_pressure",
         "Pa",
-        "largest pressure in a chamber",
-        ("pressure_1", "pressure_2"),
+        "largest chamber pressure",
+        ("pressure_1",),
         largest_pressure,
         ReadAt(("meters.peaks.pressure",)),
         (PEAKS,),
@@ -237,8 +237,8 @@ METRICS = (
     MetricKind(
         "lowest_temperature",
         "K",
-        "lowest temperature of the gas in either chamber, of a gas with an energy balance",
-        ("temperature_1", "temperature_2"),
+        "lowest temperature of the gas in a chamber, of a gas with an energy balance",
+        ("temperature_1",),
         lowest_temperature,
         ReadAt(("meters.peaks.temperature",)),
         (PEAKS,),

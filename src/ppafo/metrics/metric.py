@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, nearest_name
+from ppafo.errors import DataError
 from ppafo.model.columns import choose, larger, root
 from ppafo.model.controlled import CONTROLLED, TORQUE, ControlledQuantity
 from ppafo.model.declaration import PlainFunction
 from ppafo.signals import Recording
 from ppafo.signals.meter import SAME_LEVEL, MeterKind
 from ppafo.units import from_si
+from ppafo.wording import nearest_name
 
 Floats = NDArray[np.float64]
 

@@ -13,7 +13,6 @@ from ppafo.metrics.command import Reversals, start_reversals, update_reversals
 from ppafo.metrics.metric import Floats, MetricKind, ReadAt, Readings, less, mean_of, root_mean
 from ppafo.metrics.switching import OSCILLATION_THRESHOLD, UNDECIDED, Swing, count_of, next_swing
 from ppafo.model.columns import larger
-from ppafo.model.controlled import value_in
 from ppafo.signals.meter import MeterKind, ReferenceSummary, Sample
 
 SHORTEST_HOLD = 0.1
@@ -48,7 +47,7 @@ class SettledSums(NamedTuple):
 
 def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
     """Sums of the first sample."""
-    value = value_in(sample)
+    value = sample.value
     error = value - sample.reference
     return SettledSums(
         squares=error * error,
@@ -72,7 +71,7 @@ def start_settled(course: ReferenceSummary, sample: Sample) -> SettledSums:
 
 def update_settled(state: SettledSums, course: ReferenceSummary, sample: Sample) -> SettledSums:
     """Sums with one more sample; they begin anew where half of the run, or of the hold, is over."""
-    value = value_in(sample)
+    value = sample.value
     error = value - sample.reference
     # The first sample of a half is that from which on twice its number is at least this.
     of_run, of_hold = course.samples - 1.0, course.hold_start + course.samples - 1.0

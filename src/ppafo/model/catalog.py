@@ -5,12 +5,13 @@ Kinds of other packages are found by their entry points.
 
 from collections.abc import Iterable
 
-from ppafo.errors import KindError, one_line
+from ppafo.errors import KindError
 from ppafo.kinds import Kinds
 from ppafo.model.actuators.kind import ActuatorKind
 from ppafo.model.effects import bandwidth, restitution
 from ppafo.model.effects.kind import SECTION, Effect, effect_problem
 from ppafo.model.valves.kind import ValveKind
+from ppafo.wording import one_line
 
 VALVES: Kinds[ValveKind] = Kinds(
     "ppafo.valves",

@@ -16,7 +16,7 @@ from ppafo.arguments import Name, Overrides, checked
 from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional, table, validate
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, beside, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
+from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.catalog import ACTUATORS, EFFECTS, VALVES, device_effects, find_effects
 from ppafo.model.declaration import Quantity
@@ -39,6 +39,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.plugins import Plugins, name_plugins
 from ppafo.units import check_unit
+from ppafo.wording import nearest_name
 
 # A dotted path names a valve: a dot or a blank in its name would make it another path.
 _VALVE_NAME = Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]

@@ -20,10 +20,11 @@ import numpy as np
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.regular_file import MAXIMUM_BYTES_TYPED, decoded, read_regular_file
 from ppafo.documents.toml_text import label
-from ppafo.errors import ParameterError, UnitError, nearest_name, one_line, reason, refused_as, said_missing
+from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.actuators.table import MOST_ANGLES, MOST_PRESSURES
 from ppafo.signals.recording import Floats
 from ppafo.units import number_text, to_si
+from ppafo.wording import nearest_name, one_line, reason, said_missing
 
 
 class VolumeColumn(NamedTuple):

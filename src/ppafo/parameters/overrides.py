@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from ppafo.arguments import Name, Overrides, checked
-from ppafo.errors import ParameterError, PpafoError, UnitError, nearest_name, one_line
+from ppafo.errors import ParameterError, PpafoError, UnitError
 from ppafo.model.catalog import EFFECTS, find_effects
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.declaration import AREA_FORM, RELIEVING_PATH, SONIC_FORM, SPECIES_PATH
@@ -31,6 +31,7 @@ from ppafo.parameters.parameter_set import (
 )
 from ppafo.units import SI, split_number
 from ppafo.units.shown import shown_text
+from ppafo.wording import nearest_name, one_line
 
 CHOSEN_VALVE, NAMED_VALVE = "valve.", "valves."
 Forms = Mapping[str, tuple[tuple[str, ...], ...]]

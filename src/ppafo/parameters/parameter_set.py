@@ -10,7 +10,7 @@ from pydantic import Field
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import StrictTable, Text, Texts
-from ppafo.errors import ParameterError, UnitError, nearest_name
+from ppafo.errors import ParameterError, UnitError
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import SPECIES_PATH, alternatives, fits, quantities
 from ppafo.parameters.graph import (
@@ -27,6 +27,7 @@ from ppafo.parameters.graph import (
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.units import SI, base_value, format_quantity, split_quantity, to_si
 from ppafo.units.shown import units_beside, usual_unit
+from ppafo.wording import nearest_name
 
 if TYPE_CHECKING:  # few devices have a measured actuator
     from ppafo.model.actuators.table import Table

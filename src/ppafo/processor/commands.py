@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from ppafo.arguments import Count, Folder, Name, Overrides, Scenario
 from ppafo.cli import output
 from ppafo.cli.output import CommandOutput
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
+from ppafo.wording import nearest_name
 
 MOST_SAMPLES = 10_000_000
 """Drawn samples that are compared at most."""

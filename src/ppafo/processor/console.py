@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import final
 from weakref import finalize
 
-from ppafo.errors import SimulationError, one_line, reason
+from ppafo.errors import SimulationError
+from ppafo.wording import one_line, reason
 
 UNTOUCHED = 0xA5
 """Fill byte of the stack's RAM, which reveals the bytes that the stack has overwritten."""

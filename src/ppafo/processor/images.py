@@ -8,9 +8,10 @@ from pathlib import Path
 from shutil import which
 from typing import NamedTuple, Protocol
 
-from ppafo.errors import SimulationError, one_line
+from ppafo.errors import SimulationError
 from ppafo.storage.files import temporary_folder
 from ppafo.translation.compiling import asked
+from ppafo.wording import one_line
 
 
 class MemoryRegion(NamedTuple):

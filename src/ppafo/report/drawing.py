@@ -9,7 +9,8 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
+from ppafo.wording import one_line
 
 _AXES_IN_SPACE = "mpl_toolkits.mplot3d"
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ppafo.arguments import checked
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, one_line
+from ppafo.errors import DataError, UnitError
 from ppafo.parameters.joint import ANKLE, JointNames
 from ppafo.report.notebook import shown
 from ppafo.report.recording_figure import recording_figure
@@ -19,6 +19,7 @@ from ppafo.storage import StoredResult, read_stored
 from ppafo.storage.result_folder import RUN_FILE
 from ppafo.units import conversion
 from ppafo.units.shown import GAUGE_ZERO, counted_from, shown_in
+from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,7 +20,7 @@ import numpy as np
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.documents.json_text import json_text, plain
 from ppafo.engine.run import Run
-from ppafo.errors import DataError, ParameterError, ScenarioError, nearest_name, one_line, reason
+from ppafo.errors import DataError, ParameterError, ScenarioError
 from ppafo.model.catalog import VALVES
 from ppafo.model.controlled import TORQUE
 from ppafo.model.effects.second_virial import real_density
@@ -59,6 +59,7 @@ from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.files import LEFT_ASIDE, add_files, check_files_can_be_added
 from ppafo.storage.result_folder import read_json
 from ppafo.version import __version__
+from ppafo.wording import nearest_name, one_line, reason
 
 
 def read_off(

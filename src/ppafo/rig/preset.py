@@ -21,7 +21,7 @@ from pydantic import BaseModel, Field
 
 from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, read_model, table
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
+from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.effects import stribeck
@@ -39,6 +39,7 @@ from ppafo.parameters.plant import switches_of
 from ppafo.rig.dynamics import RigPhysics
 from ppafo.signals.recording import Recording
 from ppafo.units import parse_quantity, to_si
+from ppafo.wording import nearest_name
 
 
 def _from_zero(name: str, unit: str, summary: str, maximum: float = math.inf) -> Quantity:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import DataError, UnitError, count_of, nearest_name, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.units import from_si
+from ppafo.wording import count_of, nearest_name
 
 TIME = "time"
 TIME_UNIT = "s"
@@ -119,6 +120,8 @@ CHANNELS: dict[str, ChannelKind] = {
     "repetition": ChannelKind(PLAIN_NUMBER, "number of the repetition", is_held=True),
 }
 """Known channels. To add one: one line here. A recording may also have channels that are not listed."""
+OF_SECOND_CHAMBER = frozenset({"pressure_2", "mass_2", "temperature_2", "leaked_mass", "pressure_difference"})
+"""Channels that runs of an actuator with one chamber lack."""
 
 
 Floats = NDArray[np.float64]

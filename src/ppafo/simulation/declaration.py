@@ -17,7 +17,7 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
 from ppafo.documents.problems import quote
-from ppafo.errors import KindError, ScenarioError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import KindError, ScenarioError, UnitError, refused_as
 from ppafo.kinds import Kinds
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.model.declaration import Quantity, quantities_of, range_rule
@@ -37,6 +37,7 @@ from ppafo.simulation.scenario import (
 )
 from ppafo.units import format_quantity, parse_quantity, split_quantity, to_si
 from ppafo.units.shown import shown_unit
+from ppafo.wording import nearest_name, one_line
 
 PLAIN = ("", "1")
 """Units of a plain number."""

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.documents.problems import all_problems, is_gap, is_unknown_kind
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, ScenarioError, nearest_name, one_line
+from ppafo.errors import ParameterError, ScenarioError
 from ppafo.model.controlled import CONTROLLED, TORQUE
 from ppafo.parameters import ParameterSet, build_device, list_sets, load_parameter_set
 from ppafo.parameters.declaration import RELIEVING_PATH
@@ -92,6 +92,7 @@ from ppafo.simulation.schema import scenario_file, whole_scenario_file
 from ppafo.simulation.torque_loop import loop_terms
 from ppafo.units import format_quantity, split_quantity
 from ppafo.units.shown import shown_in, shown_text, written_text
+from ppafo.wording import nearest_name, one_line
 
 _SECTION = "assumed"
 _SPEAKING = ("initial", "motion", "controller", "reference")

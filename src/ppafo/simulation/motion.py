@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from ppafo.control.catalog import CONTROLLERS, PROFILES
 from ppafo.control.kind import ControllerKind
-from ppafo.errors import DataError, ScenarioError, one_line
+from ppafo.errors import DataError, ScenarioError
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.device import Device
 from ppafo.simulation.declaration import (
@@ -36,6 +36,7 @@ from ppafo.simulation.motion_kind import VANE, LawSignals, Measured, MotionSecti
 from ppafo.simulation.profiles import TOLERANCE, profile_problem, range_text, read_profile, stops_of
 from ppafo.simulation.scenario import FreeMotion, Leg, PrescribedMotion, ProfileChoice, Scenario, vane_motion
 from ppafo.simulation.schema import profile_table, shank_table
+from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     from ppafo.engine.lanes import Floats

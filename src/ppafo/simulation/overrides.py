@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.model.catalog import EFFECTS, VALVES
 from ppafo.model.effects.kind import SECTION as EFFECTS_SECTION
 from ppafo.parameters.declaration import ORIFICE, RELIEVING_PATH, SECTIONS, SPECIES_PATH
@@ -18,6 +18,7 @@ from ppafo.parameters.declaration import quantities as device_quantities
 from ppafo.parameters.overrides import Override, check_valve, layered, of_another_valve, other_forms, override_set
 from ppafo.simulation.declaration import OF_A_VANE, DeclaredContent, value_at
 from ppafo.units import SI, number_text
+from ppafo.wording import nearest_name
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _SEED, _VALVE = "sensors.seed", "device.valve"

@@ -13,10 +13,11 @@ from ppafo.control.kind import PythonController
 from ppafo.engine.in_python import in_program
 from ppafo.engine.lanes import Batch, BatchResult, LaneBlock, RunnableProgram, effort_for, load_program, samples_in
 from ppafo.engine.rows import group_of, row_numbers
-from ppafo.errors import ScenarioError, SimulationError, nearest_name
+from ppafo.errors import ScenarioError, SimulationError
 from ppafo.model.ports import shown_signals
 from ppafo.model.sensors import NOTHING_SEEN, GaitMeasurement, Measurement, measure, measure_gait
 from ppafo.model.valves.kind import VENT, VENTS_ABOVE
+from ppafo.wording import nearest_name
 
 logger = logging.getLogger("ppafo")
 

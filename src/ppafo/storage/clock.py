@@ -1,4 +1,4 @@
-"""Times of day that loggers write, with and without a date and a zone, as seconds."""
+"""Clocks of loggers as seconds: times of day, with and without a date and a zone, and counters of 32 bits."""
 
 import re
 from collections.abc import Sequence
@@ -7,8 +7,10 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
+from ppafo.storage.comma_separated import LONGEST_SHOWN
+from ppafo.wording import one_line
 
 DateOrder = Literal["day month", "month day"]
 """Order of day and month in a date such as 03/04/2026."""
@@ -31,8 +33,10 @@ _SLASHED = re.compile(r"(\d{1,2})[/-](\d{1,2})[/-](\d{2,4})")
 _MONTHS = ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt", "nov", "dec dez")
 _MONTH = {name: number for number, names in enumerate(_MONTHS, start=1) for name in names.split()}
 """Number of a month by the first three letters of its name, in English and German."""
-_LONGEST_SHOWN = 40
-"""Characters of a cell that a message repeats."""
+_PERIODS = (2.0**32 * 1.0e-6, 2.0**32 * 1.0e-3)
+"""Seconds after which a counter of 32 bits begins again, of microseconds and of milliseconds."""
+_LARGEST_STEP = 10.0
+"""Usual intervals [-] across a fall; a longer one is a clock that was set back, and no counter."""
 
 
 class _Stamp(NamedTuple):
@@ -81,7 +85,7 @@ def _stamp(cell: str, form: ClockForm | None, row: str) -> _Stamp:
     compact = _COMPACT.fullmatch(text)
     if compact is not None:
         text = f"{compact['date']} {compact['hour']}:{compact['minute']}:{compact['second']}{compact['rest']}"
-    shown = repr(text[:_LONGEST_SHOWN])
+    shown = repr(text[:LONGEST_SHOWN])
     match = _TIME.search(text)
     if match is None:
         raise DataError(f"{row}: {shown} is not a time of day such as '08:00:10,5'")
@@ -130,7 +134,7 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
         else:
             readings.append(np.array(days, dtype=np.float64))
     if not readings:
-        shown = words[unread_row][:_LONGEST_SHOWN]
+        shown = words[unread_row][:LONGEST_SHOWN]
         raise DataError(
             f"{rows[unread_row]}: {shown!r} is not a date such as '2026-03-21', '21.03.2026' or '03/21/2026'"
         )
@@ -139,7 +143,7 @@ def _days(words: Sequence[str], rows: Sequence[str], seconds: Floats, order: Dat
     since_first = [days - days[0] for days in growing]
     if len(since_first) > 1 and not np.array_equal(since_first[0], since_first[1]):
         raise DataError(
-            f"{rows[0]}: the date {words[0][:_LONGEST_SHOWN]!r} may begin with the day or with the month; give "
+            f"{rows[0]}: the date {words[0][:LONGEST_SHOWN]!r} may begin with the day or with the month; give "
             'date_order = "day month" or date_order = "month day"'
         )
     return growing[0]
@@ -168,3 +172,17 @@ def _ordinal(word: str, order: DateOrder) -> int | None:
         return date(year + 2000 if year < 100 else year, month, day).toordinal()
     except ValueError:
         return None
+
+
+def counted_on(time: Floats) -> Floats:
+    """Return a time [s] without the falls of a counter of 32 bits, ``micros()`` or ``millis()``; any other as it is."""
+    steps = np.diff(time)
+    falls = steps < 0.0
+    if not falls.any() or not (steps > 0.0).any():
+        return time
+    usual_step = float(np.median(steps[steps > 0.0]))
+    for period in _PERIODS:
+        across_falls = steps[falls] + period
+        if (across_falls > 0.0).all() and (across_falls <= _LARGEST_STEP * usual_step).all():
+            return np.asarray(time + period * np.concatenate(([0.0], np.cumsum(falls))))
+    return time

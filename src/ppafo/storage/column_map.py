@@ -15,10 +15,12 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ppafo.documents.models import StrictTable, Text, make_schema, read_model
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import DataError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, refused_as
 from ppafo.signals import RecordingKind
 from ppafo.signals.recording import TIME, Between, Floats
 from ppafo.storage.clock import ClockForm, DateOrder
+from ppafo.storage.comma_separated import LONGEST_SHOWN
+from ppafo.wording import nearest_name, one_line
 
 Thousands = Literal["point", "comma", "apostrophe", "blank"]
 
@@ -185,8 +187,6 @@ class MappedTable(NamedTuple):
     kind: RecordingKind
 
 
-LONGEST_SHOWN = 40
-"""Characters of a name or a cell that a message repeats."""
 _MOST_SHOWN = 20
 """Names that a message lists."""
 

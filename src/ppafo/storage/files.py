@@ -11,7 +11,8 @@ from pathlib import Path
 
 from ppafo import interrupts
 from ppafo.documents.regular_file import decoded, read_regular_file
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError
+from ppafo.wording import reason
 
 LEFT_ASIDE = ".writing-"
 """Part of the name of a file that is being written; one that is still there was left by a process that was killed."""

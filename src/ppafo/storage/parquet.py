@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
+from ppafo.wording import one_line
 
 if TYPE_CHECKING:
     import pyarrow as pa

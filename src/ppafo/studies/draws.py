@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.constants import STANDARD_ATMOSPHERE
-from ppafo.errors import StudyError, UnitError, first_twice, nearest_name, refused_as
+from ppafo.errors import StudyError, UnitError, refused_as
 from ppafo.metrics import METRICS
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.simulation.ensemble.running import lacking, offered
@@ -18,6 +18,7 @@ from ppafo.studies.loading import load_study
 from ppafo.studies.sampling import NOISE, correlate, uniform_numbers, with_noise
 from ppafo.studies.study import Configuration, RandomValue, SamplingPlan, Study, with_followers
 from ppafo.units import parse_quantity
+from ppafo.wording import first_twice, nearest_name
 
 FEWEST_DRAWS, MAXIMUM_DRAWS = 32, 2**26
 """Two in each replicate, whose spread needs them, and what Sobol replicates are even for."""

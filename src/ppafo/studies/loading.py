@@ -12,16 +12,7 @@ import numpy as np
 from ppafo.arguments import Count, Overrides, Seed, checked
 from ppafo.documents.models import validate
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import (
-    DataError,
-    ParameterError,
-    ScenarioError,
-    StudyError,
-    UnitError,
-    first_twice,
-    nearest_name,
-    refused_as,
-)
+from ppafo.errors import DataError, ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.parameters.overrides import other_forms, override_set, read_overrides
@@ -41,6 +32,7 @@ from ppafo.studies.varying import (
     varied_path,
 )
 from ppafo.units.shown import usual_unit
+from ppafo.wording import first_twice, nearest_name
 
 STUDY_FILES = TomlKind("study", "study", resources.files("ppafo") / "studies" / "library", StudyError)
 

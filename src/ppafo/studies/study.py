@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ppafo.engine.channels import TRACED
-from ppafo.errors import StudyError, UnitError, at_fault, first_twice, nearest_name, refused_as
+from ppafo.errors import StudyError, UnitError, at_fault, refused_as
 from ppafo.loading import reloaded, scenario_or_load
 from ppafo.metrics import METRICS
 from ppafo.model.controlled import CONTROLLED
@@ -18,6 +18,7 @@ from ppafo.simulation.scenario import Scenario
 from ppafo.studies import declaration as declared
 from ppafo.studies.distributions import Distribution
 from ppafo.units import parse_quantity
+from ppafo.wording import first_twice, nearest_name
 
 
 @dataclass(frozen=True, slots=True)

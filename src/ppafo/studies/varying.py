@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import ScenarioError, UnitError, nearest_name, refused_as
+from ppafo.errors import ScenarioError, UnitError, refused_as
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import alternatives, fits, is_within, limits_text
@@ -35,6 +35,7 @@ from ppafo.studies.sampling import NOISE
 from ppafo.studies.study import Axis, RandomValue
 from ppafo.units import parse_quantity, split_pressure_kind, split_quantity
 from ppafo.units.shown import shown_unit, shown_value
+from ppafo.wording import nearest_name
 
 WHOLE = (NOISE, "wearer.person")
 """Paths of numbers that name one of many: a random seed, and a person of the population."""

@@ -14,7 +14,8 @@ from pathlib import Path
 
 from ppafo import interrupts
 from ppafo.engine.compilers import OFFERED, CompilerError
-from ppafo.errors import SimulationError, one_line, reason
+from ppafo.errors import SimulationError
+from ppafo.wording import one_line, reason
 
 LONGEST_COMPILING = 300.0
 """Seconds after which a compiler is ended that has not ended by itself; the longest program takes a tenth of it."""

@@ -16,8 +16,9 @@ from types import ModuleType
 
 from ppafo.engine.compilers import FLAGS, LIBRARY, CompilerError, Effort
 from ppafo.engine.loading import HOW_TO_INSTALL, WITHOUT_C
-from ppafo.errors import SimulationError, reason
+from ppafo.errors import SimulationError
 from ppafo.translation.native_entries import fill_module, parameters_of
+from ppafo.wording import reason
 
 FOR_GCC = (
     *("-fno-thread-jumps", "-fno-ssa-phiopt", "-fno-tree-pre"),

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from ppafo.engine.compilers import CompilerError
 from ppafo.engine.entries import FLOAT, INT, entry_types
-from ppafo.errors import one_line
+from ppafo.wording import one_line
 
 PACKED = "_packed"
 """Stands behind the name of an entry that takes its arrays in one block (``ppafo_array``, ``prelude.h``)."""

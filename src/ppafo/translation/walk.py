@@ -15,7 +15,7 @@ from typing import Any
 
 from ppafo.engine.compilers import LIBRARY, UntranslatableError
 from ppafo.engine.plain_python import parse_module, place_in, refusal
-from ppafo.errors import ProgramError, nearest_name
+from ppafo.errors import ProgramError
 from ppafo.translation import typed
 from ppafo.translation.scopes import ScopeNames, changed, needed
 from ppafo.translation.typed import FUNCTIONS, Function, Module, Parameter, Statement, Term, converted
@@ -36,6 +36,7 @@ from ppafo.translation.value_types import (
     mixes,
     types_in,
 )
+from ppafo.wording import nearest_name
 
 SIGN_OF: dict[type[ast.AST], str] = {
     **{ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.FloorDiv: "//", ast.Mod: "%"},

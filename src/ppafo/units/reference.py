@@ -17,9 +17,10 @@ from ppafo.constants import (
     STANDARD_REFERENCE_DENSITY_AIR,
     STANDARD_REFERENCE_TEMPERATURE,
 )
-from ppafo.errors import UnitError, nearest_name
+from ppafo.errors import UnitError
 from ppafo.units.definitions import DECIMALS, PRESSURE, ParsedUnit, parse_unit
 from ppafo.units.spelling import says_kind
+from ppafo.wording import nearest_name
 
 MASS_FLOW = {"[mass]": 1, "[time]": -1}
 VOLUME_FLOW = {"[length]": 3, "[time]": -1}

@@ -3,10 +3,11 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
-from ppafo.errors import DataError, UnitError, nearest_name, one_line
+from ppafo.errors import DataError, UnitError
 from ppafo.parameters.device import Device
 from ppafo.simulation.recorded.usual_errors import ANGLE_ERRORS, PRESSURE_ERRORS
 from ppafo.units import parse_quantity, split_quantity
+from ppafo.wording import nearest_name, one_line
 
 ANGLE, PRESSURE_1, PRESSURE_2 = "angle", "pressure_1", "pressure_2"
 PRESSURE_DIFFERENCE, TORQUE = "pressure_difference", "torque"

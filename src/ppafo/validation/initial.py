@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 
 from ppafo.arguments.door import argument_text
-from ppafo.errors import DataError, UnitError, nearest_name, one_line, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.units import parse_quantity
 from ppafo.validation.compared import ANGLE, PRESSURE_1, PRESSURE_2
+from ppafo.wording import nearest_name, one_line
 
 _UNITS = {ANGLE: "rad", PRESSURE_1: "Pa_a", PRESSURE_2: "Pa_a"}
 _EXAMPLES = {ANGLE: "angle=75 deg", PRESSURE_1: "pressure_1=0 psi_g", PRESSURE_2: "pressure_2=50 psi_g"}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ppafo.arguments.door import argument_text
 from ppafo.constants import PASCALS_PER_PSI
-from ppafo.errors import DataError, nearest_name
+from ppafo.errors import DataError
 from ppafo.parameters.device import Device
 from ppafo.signals import CHANNELS, Recording
 from ppafo.signals.faults import lasting_change
@@ -30,6 +30,7 @@ from ppafo.storage.foreign import read_foreign
 from ppafo.storage.result_folder import NETCDF_FILE
 from ppafo.units.shown import in_units, shown_text
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
+from ppafo.wording import nearest_name
 
 MINIMUM_SAMPLES = 10
 """Fewer are a few readings and no course in time."""

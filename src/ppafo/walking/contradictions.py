@@ -6,12 +6,11 @@ Any number may be an array (runs,), one for each run of an ensemble.
 import math
 import operator
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from ppafo.arguments.door import argument_text
 from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
@@ -31,8 +30,7 @@ _IN_FILES = {"m": "m"}
 """Units in which files of walks have segments of a leg, which everything else has in millimetres."""
 
 
-@dataclass(frozen=True, slots=True)
-class Pair:
+class _Pair(NamedTuple):
     """Two numbers of a walk: the one at ``path`` must be below, above, at most or at least the ``other``.
 
     ``unit`` is the SI unit of both, ``words`` what is wrong where the bare relation would not say it.
@@ -46,15 +44,17 @@ class Pair:
 
 
 PAIRS = (
-    Pair("wearer.shank_mass_centre", "at most", "wearer.shank_length", "m", "lies beyond the ankle"),
-    Pair("wearer.foot_mass_centre", "at most", "wearer.toe_lever", "m", "lies beyond the toes"),
-    Pair("controller.unload_threshold", "below", "controller.load_threshold", "N"),
-    Pair("controller.largest_force", "above", "controller.load_threshold", "N"),
-    Pair("controller.flat_from", "below", "controller.flat_to", ""),
-    Pair("controller.lowest_angle", "below", "controller.highest_angle", "rad"),
-    Pair("controller.push_off_end", "above", "controller.push_off_start", ""),
-    Pair("controller.rise_time", "at most", "controller.peak_time", "", "the torque would rise before the heel strike"),
-    Pair(
+    _Pair("wearer.shank_mass_centre", "at most", "wearer.shank_length", "m", "lies beyond the ankle"),
+    _Pair("wearer.foot_mass_centre", "at most", "wearer.toe_lever", "m", "lies beyond the toes"),
+    _Pair("controller.unload_threshold", "below", "controller.load_threshold", "N"),
+    _Pair("controller.largest_force", "above", "controller.load_threshold", "N"),
+    _Pair("controller.flat_from", "below", "controller.flat_to", ""),
+    _Pair("controller.lowest_angle", "below", "controller.highest_angle", "rad"),
+    _Pair("controller.push_off_end", "above", "controller.push_off_start", ""),
+    _Pair(
+        "controller.rise_time", "at most", "controller.peak_time", "", "the torque would rise before the heel strike"
+    ),
+    _Pair(
         "controller.peak_time",
         "at least",
         "controller.push_off_start",
@@ -73,15 +73,11 @@ _BEYOND_STOP = math.radians(5.0)
 
 
 class _Contradiction(NamedTuple):
-    """A path, whether its number contradicts another one, in all runs or in each (runs,), and why in one of them."""
+    """Path of a number, whether it contradicts another one, in all runs or in each (runs,), and the reason in a run."""
 
     path: str
     is_bad: Any
     reason: Callable[[int], str]
-
-    def line(self, run: int) -> str:
-        """The path, and what is wrong with it in a run."""
-        return f"{self.path}: {self.reason(run)}"
 
 
 def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
@@ -104,7 +100,7 @@ def check_walk(scenario: Scenario, reading: DocumentReader) -> None:
             )
             raise ScenarioError(
                 f"{reading.file}: {path}, which is not given and takes its default, {default}: {reason(0)}; "
-                f"give it in the file or with --set {path}=..."
+                f"give it in the file or with {argument_text('overrides', f'{path}=...', '--set')}"
             )
 
 
@@ -112,7 +108,8 @@ def rules(scenario: Scenario) -> tuple[Problem, ...]:
     """Contradictions in the runs of an ensemble. ScenarioError for a walk on a bottle, which cannot vary."""
     check_no_bottle(scenario)
     return tuple(
-        (np.atleast_1d(contradiction.is_bad), contradiction.line) for contradiction in _contradictions(scenario)
+        (np.atleast_1d(is_bad), lambda run, path=path, reason=reason: f"{path}: {reason(run)}")
+        for path, is_bad, reason in _contradictions(scenario)
     )
 
 
@@ -134,7 +131,14 @@ def _contradictions(scenario: Scenario) -> Iterator[_Contradiction]:
     for pair in PAIRS:
         if pair.path in numbers and pair.other in numbers:
             number, other = numbers[pair.path], numbers[pair.other]
-            yield _Contradiction(pair.path, _IS_BAD[pair.relation](number, other), partial(_reason, pair, other))
+
+            def reason(run: int, pair: _Pair = pair, other: Any = other) -> str:
+                value = _text(other, run, pair.unit)
+                if pair.words:
+                    return f"{pair.words}: {pair.other} is {value}"
+                return f"must be {pair.relation} {pair.other}, which is {value}"
+
+            yield _Contradiction(pair.path, _IS_BAD[pair.relation](number, other), reason)
     # An object in charge has no settings that could contradict.
     if scenario.controller.is_outside:
         return
@@ -179,13 +183,6 @@ def _of_stops(scenario: Scenario) -> Iterator[_Contradiction]:
         actuator.angle_min > low + _BEYOND_STOP,
         lambda run: f"{needed}, this joint begins at {_text(actuator.angle_min, run, 'rad')}",
     )
-
-
-def _reason(pair: Pair, other: Any, run: int) -> str:
-    value = _text(other, run, pair.unit)
-    if pair.words:
-        return f"{pair.words}: {pair.other} is {value}"
-    return f"must be {pair.relation} {pair.other}, which is {value}"
 
 
 def _of_times(scenario: Scenario) -> Iterator[_Contradiction]:

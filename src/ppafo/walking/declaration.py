@@ -12,7 +12,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS, load_walking_cont
 from ppafo.control.walking.timings import TIMINGS
 from ppafo.documents.models import make_schema, one_of, optional, table
 from ppafo.documents.problems import quote
-from ppafo.errors import KindError, ScenarioError, nearest_name, refused_as
+from ppafo.errors import KindError, ScenarioError, refused_as
 from ppafo.model.declaration import Quantity
 from ppafo.model.fault_catalogue import PLANT_FAULTS, PlantFault
 from ppafo.model.shut_off import SHUT_OFF
@@ -38,6 +38,7 @@ from ppafo.simulation.schema import (
 from ppafo.walking.bottle.supply import BOTTLE, BOTTLE_NAME, BOTTLE_NUMBERS, BOTTLE_OVERRIDES
 from ppafo.walking.preparation import DISTORTED, FROZEN
 from ppafo.walking.wearer import WEARER
+from ppafo.wording import nearest_name
 
 SUMMARY = "the device on a leg that walks along a prescribed gait"
 """Description of the motion of a walk."""
@@ -85,14 +86,14 @@ FAULTY = tuple(_FAULTY)
 
 
 @dataclass(frozen=True, slots=True)
-class SensorFault:
+class _SensorFault:
     """Description of a sensor fault, and its numbers; a fault of the plant has both too."""
 
     summary: str
     quantities: tuple[Quantity, ...]
 
 
-def _sensor_faults(sensor: str) -> dict[str, SensorFault]:
+def _sensor_faults(sensor: str) -> dict[str, _SensorFault]:
     unit, offset, drift, largest = _FAULTY[sensor]
     period = "the fault is there in the first half of each such period; always with 0"
     times = (
@@ -112,13 +113,13 @@ def _sensor_faults(sensor: str) -> dict[str, SensorFault]:
     )
     reading = Quantity("reading", unit, "its reading from then on", 0.0, -largest, largest)
     return {
-        FROZEN: SensorFault("keeps its last reading", times),
-        "stuck": SensorFault("gives one fixed reading", (*times, reading)),
-        DISTORTED: SensorFault("gives a wrong reading that follows what is there", (*times, *distortions)),
+        FROZEN: _SensorFault("keeps its last reading", times),
+        "stuck": _SensorFault("gives one fixed reading", (*times, reading)),
+        DISTORTED: _SensorFault("gives a wrong reading that follows what is there", (*times, *distortions)),
     }
 
 
-FAULTS: dict[str, Mapping[str, SensorFault | PlantFault]] = {sensor: _sensor_faults(sensor) for sensor in FAULTY}
+FAULTS: dict[str, Mapping[str, _SensorFault | PlantFault]] = {sensor: _sensor_faults(sensor) for sensor in FAULTY}
 FAULTS |= PLANT_FAULTS
 """Every fault of ``[faults]``, by the sensor or part of the plant that fails and by kind."""
 
@@ -206,19 +207,6 @@ OF_A_WALK = DeclaredContent(
 """Possible content of the file of a walk. Gait and task sequence are at top level or, as its motion, in [motion]."""
 
 
-def _fault(part: str) -> Any:
-    """Return the table of a sensor or a part of the plant that fails."""
-    return one_of(
-        [
-            table(
-                f"{model_name(part)}{model_name(kind)}",
-                kind_field(kind, fault.summary) | quantity_fields(fault.quantities),
-            )
-            for kind, fault in FAULTS[part].items()
-        ]
-    )
-
-
 def walk_file(document: Mapping[str, Any]) -> type[BaseModel]:
     """Return the model of the file of a walk, for the controllers that are loaded."""
     return _walk_file(tuple(walking_controllers().items()), (kind_at(document, "motion") or WALK,))
@@ -238,6 +226,15 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             str, "name of a task sequence, or the path of its file; stride after equal stride unless one is given"
         ),
     }
+    timings = [
+        table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | _optional_numbers(timing.quantities))
+        for name, timing in TIMINGS.items()
+    ]
+    bottle = {
+        "name": optional(str, "name of a bottle, or the path of its file"),
+        **_optional_numbers(BOTTLE_NUMBERS),
+        "overrides": (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'")),
+    }
     motion = one_of([table(f"{model_name(name)}Motion", kind_field(name, SUMMARY) | led_by) for name in motions])
     sections: dict[str, Any] = {
         "run": optional(table("WalkRun", run), "how long it is, and how it is computed"),
@@ -247,7 +244,7 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             controller_table(walking_controllers(), "Walking"),
             Field(description="what commands the valve"),
         ),
-        "timing": optional(_timing_table(), "how the controller estimates the gait phase; thresholds unless given"),
+        "timing": optional(one_of(timings), "how the controller estimates the gait phase; thresholds unless given"),
         "wearer": optional(
             table("Wearer", quantity_fields((*WEARER, PERSON))),
             "who walks; the subject of the gait that is named, else the paper's, unless given",
@@ -258,35 +255,32 @@ def _walk_file(_controllers: Any, motions: tuple[str, ...]) -> type[BaseModel]:
             table("ShutOffValve", quantity_fields(SHUT_OFF)),
             "normally closed 3/2 valve in the supply line, part of the safe state; none unless given",
         ),
-        BOTTLE: optional(_bottle_table(), "bottle that supplies the device; a supply without end unless given"),
+        BOTTLE: optional(
+            table("WalkBottle", bottle), "bottle that supplies the device; a supply without end unless given"
+        ),
     }
     return file_model("WalkFile", sections)
 
 
-def _timing_table() -> Any:
-    """Return the table of each way to estimate the gait phase, of which a file has one."""
-    tables = []
-    for name, timing in TIMINGS.items():
-        numbers = {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in timing.quantities}
-        tables.append(table(f"{model_name(name)}Timing", kind_field(name, timing.summary) | numbers))
-    return one_of(tables)
+def _optional_numbers(quantities: Iterable[Quantity]) -> dict[str, Any]:
+    """Return fields of numbers that may be left out."""
+    return {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in quantities}
 
 
 def _faults_table() -> type[BaseModel]:
     """Return the table of what fails: sensors, and parts of the plant."""
-    faults = {
-        part: optional(_fault(part), f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}")
-        for part in FAULTS
-    }
+    faults = {}
+    for part, kinds in FAULTS.items():
+        tables = [
+            table(
+                f"{model_name(part)}{model_name(kind)}",
+                kind_field(kind, fault.summary) | quantity_fields(fault.quantities),
+            )
+            for kind, fault in kinds.items()
+        ]
+        summary = f"fault of the {part} sensor" if part in FAULTY else f"fault of the plant: {part}"
+        faults[part] = optional(one_of(tables), summary)
     return table("Faults", faults)
-
-
-def _bottle_table() -> type[BaseModel]:
-    """Return the table of the bottle that a device hangs on, with its numbers in a walk and overrides of its file."""
-    fields: dict[str, Any] = {"name": optional(str, "name of a bottle, or the path of its file")}
-    fields |= {quantity.name: optional(number_type(quantity), quantity.summary) for quantity in BOTTLE_NUMBERS}
-    fields["overrides"] = (list[str], Field(default_factory=list, description="such as 'room.temperature=5 degC'"))
-    return table("WalkBottle", fields)
 
 
 def json_schema() -> dict[str, Any]:

@@ -7,7 +7,6 @@ path carries the foot with and without the device; toes that come out below the 
 
 import math
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -175,12 +174,14 @@ class AnklePath:
 def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
     """The path of the ankle [m] over one stride of a gait, for the segments of a wearer."""
     height = ANKLE_HEIGHT_FRACTION * wearer.shank_length
-    shank, ankle = truncate(gait.shank_angle), truncate(gait.ankle_angle)
-    foot = shank.values_at(_GRID) - ankle.values_at(_GRID) + 0.5 * np.pi - timing.ground_angle
+    foot = foot_angles(gait, _GRID) - timing.ground_angle
     toes_down = height * np.cos(foot) - wearer.toe_lever * np.sin(foot)
     heel_down = height * np.cos(foot) + wearer.heel_lever * np.sin(foot)
     swing = np.clip((_GRID - timing.toe_off) / (1.0 - timing.toe_off), 0.0, 1.0)
-    up = _above(toes_down, heel_down, swing) + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
+    # The higher of toes and heel is on the ground; late in the swing one goes over to the other.
+    width = HAND_OVER * swing**4 * (1.0 - swing) / (0.8**4 * 0.2)
+    above = 0.5 * (toes_down + heel_down + np.hypot(toes_down - heel_down, width))
+    up = above + MID_SWING_CLEARANCE * np.sin(np.pi * swing) ** 2
     length = (gait.walking_speed or DEFAULT_SPEED) * gait.stride_time
     # Rolling over heel and toes in stance; in the swing a smooth way to the next foothold with equal speeds.
     on_heel = wearer.heel_lever * (np.cos(foot) - 1.0) - height * np.sin(foot)
@@ -194,24 +195,7 @@ def ankle_path(gait: Gait, timing: GaitTiming, wearer: Wearer) -> AnklePath:
     cubic = start * fraction + (3.0 * way - 2.0 * start) * fraction**2 + (start - 2.0 * way) * fraction**3
     forward = np.asarray(np.where(np.arange(_GRID.size) <= last, rolled, rolled[last] + cubic))
     levers = wearer.heel_lever, wearer.toe_lever
-    return AnklePath(forward, up, length, timing.ground_angle, wearer.shank_length, *levers, height)
-
-
-def _above(toes_down: Floats, heel_down: Floats, swing: Floats) -> Floats:
-    """Height of the ankle [m] that keeps toes and heel off the ground; late in the swing one goes over to the other.
-
-    In stance, at toe-off and at heel strike it is the higher of both.
-    """
-    width = HAND_OVER * swing**4 * (1.0 - swing) / (0.8**4 * 0.2)
-    return np.asarray(0.5 * (toes_down + heel_down + np.hypot(toes_down - heel_down, width)))
-
-
-class RockerFit(NamedTuple):
-    """Heel rocker fitted to a gait: lever [m] nearly flat, its gain far up, and the tilt [rad] at half the gain."""
-
-    flat: float
-    rise: float
-    half: float
+    return AnklePath(forward, np.asarray(up), length, timing.ground_angle, wearer.shank_length, *levers, height)
 
 
 def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
@@ -219,14 +203,15 @@ def heel_rocker(gait: Gait, wearer: Wearer) -> HeelRocker:
     return over_runs(rocker_on_heel, *fit_rocker(gait), wearer.heel_lever)
 
 
-def fit_rocker(gait: Gait) -> RockerFit:
+def fit_rocker(gait: Gait) -> tuple[float, float, float]:
     """The lever over the tilt of the measured foot while it comes down on its heel alone, by least squares.
 
-    From the measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel
-    that is still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
+    These are the lever [m] nearly flat, its gain [m] far up, and the tilt [rad] at half the gain. They come from the
+    measured moment, which horizontal forces are part of, or without one from the centre of pressure. A heel that is
+    still up when the toes of the measured foot take over keeps the last lever. The lever of the heel itself
     bounds it, and stands in where nothing was measured.
     """
-    not_measured = RockerFit(LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0])
+    not_measured = LONGER_THAN_A_FOOT, 0.0, ROLL_ANGLES[0]
     if gait.vertical_force is None:
         return not_measured
     phases = np.linspace(0.0, landing_phase(gait), 151)
@@ -240,14 +225,12 @@ def fit_rocker(gait: Gait) -> RockerFit:
     tilt = np.maximum(foot_angles(gait, phases) - gait_timing(gait).ground_angle, 0.0)
     force = np.maximum(force, 0.0)
     flat = max(float(levers[-1]), 0.0)
-    _, rise, half = min(_rise(half, tilt, levers - flat, force) for half in ROLL_ANGLES)
-    return RockerFit(flat, rise, half)
-
-
-def _rise(half: float, tilt: Floats, levers: Floats, force: Floats) -> tuple[float, float, float]:
-    """Squares left over, the rise [m] of the lever far up, and the angle [rad] of half of it; weighted by the force."""
-    shape = force * tilt / (tilt + half)
-    # Exact sums: the fit must have the same bits on every computer, and NumPy adds in an order of its own.
-    rise = math.fsum(shape * force * levers) / max(math.fsum(shape * shape), 1.0e-12)
-    left = force * levers - rise * shape
-    return math.fsum(left * left), rise, half
+    fits = []
+    for half in ROLL_ANGLES:
+        shape = force * tilt / (tilt + half)
+        # Exact sums: the fit must have the same bits on every computer, and NumPy adds in an order of its own.
+        rise = math.fsum(shape * force * (levers - flat)) / max(math.fsum(shape * shape), 1.0e-12)
+        left = force * (levers - flat) - rise * shape
+        fits.append((math.fsum(left * left), rise, half))
+    _, rise, half = min(fits)
+    return flat, rise, half

@@ -1,5 +1,6 @@
 """The walk along a prescribed gait as a kind of motion: shank and loaded foot are led, whatever the device does."""
 
+import shlex
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -50,8 +51,8 @@ class WalkKind:
         return f"ppafo.walk({name!r}, overrides=[{overrides}])"
 
     def further_command(self, file: str) -> str:
-        """Return which command sets the walk of a file beside others, in one line."""
-        return f"'ppafo walk {file}' compares it with no device and with a healthy ankle"
+        """Return the command that compares the walk of a file with others, in one line."""
+        return f"'ppafo walk {shlex.quote(file)}' compares it with no device and with a healthy ankle"
 
 
 WALK_KIND = WalkKind(WALK)

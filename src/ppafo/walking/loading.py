@@ -6,21 +6,22 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from ppafo.arguments import Overrides, checked
+from ppafo.arguments.door import argument_text
 from ppafo.control.kind import FORCE_LAG, PRESSURE_LAG, VALVE_DELAY, VALVE_LAG
 from ppafo.control.walking.catalog import walking_controllers
 from ppafo.control.walking.timings import TIMINGS, with_timing
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, at_fault, one_line, refused_as
-from ppafo.gait import NORMATIVE, Gait, load_gait
+from ppafo.errors import DataError, ParameterError, PpafoError, ScenarioError, at_fault, refused_as
+from ppafo.gait import NORMATIVE, load_gait
 from ppafo.model.catalog import VALVES
 from ppafo.model.fault_catalogue import PLANT_FAULTS
 from ppafo.model.regulator import SupplyLines
 from ppafo.model.shut_off import SHUT_OFF
 from ppafo.parameters import ParameterSet
-from ppafo.parameters.device import Device, Valve
+from ppafo.parameters.device import Device
 from ppafo.parameters.graph import Graph, LinkFunction
 from ppafo.parameters.loading import set_or_load
 from ppafo.parameters.overrides import read_overrides
@@ -78,8 +79,9 @@ from ppafo.walking.motion import (
 )
 from ppafo.walking.planning import NO_REFERENCE, planned_task_sequence
 from ppafo.walking.preparation import FaultSettings
-from ppafo.walking.task_sequence import TaskSequence, load_task_sequence
+from ppafo.walking.task_sequence import load_task_sequence
 from ppafo.walking.wearer import links_of_stature, read_wearer, wearer_origin
+from ppafo.wording import one_line
 
 FILE = TomlKind("walk", "walk", resources.files("ppafo.walking") / "configurations", ScenarioError)
 DEFAULT_PERIOD = 1.0e-3
@@ -104,7 +106,8 @@ def check_duration_once(overrides: Iterable[str], minutes: float | None) -> None
     if minutes is not None and any(
         override.typed == "run.duration" for override in read_overrides(overrides, ScenarioError)
     ):
-        raise ScenarioError("--set run.duration: the same as --minutes; leave one out")
+        given = argument_text("overrides", option="--set")
+        raise ScenarioError(f"{given} run.duration: the same as {argument_text('minutes')}; leave one out")
 
 
 @checked
@@ -174,7 +177,7 @@ def on_bottle(scenario: Scenario, bottle: str | Path | None, overrides: Iterable
     if _without_bottle(scenario_of(as_given, WALKING)) != _without_bottle(scenario):
         raise ScenarioError(
             f"{scenario.name}: this walk differs from its file (changed after it was loaded, or file or package "
-            f"changed since): give the bottle where the walk is loaded, with --bottle"
+            f"changed since): give the bottle where the walk is loaded, with {argument_text('bottle')}"
         )
     content, before = as_given.content, as_given.overrides
     if bottle is not None:
@@ -208,7 +211,6 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     device = read_device(reading, hardware)
     with refused_as(ParameterError, f"{request.file}: [device]", ParameterError):
         device.check_pressurised("a walk, whose controllers fill the chambers,")
-    led = _led_by(reading, request)
     bottle = read_bottle(reading, device, Path() if BOTTLE_NAME in request.instead else request.folder)
     if bottle is not None:
         # A bottle always feeds lines, with the defaults of what the file does not say of them.
@@ -217,7 +219,7 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     if line is not None and bottle is not None:
         line = bottle.fed(line)
     sensors = reading.section("sensors", WALK_SENSORS)
-    motion = _motion(reading, led, line, bottle, sensors)
+    motion = _motion(reading, request, line, bottle, sensors)
     step = reading.number("run.step", STEP)
     controller, links = _control(reading, device, None if line is None else line.row(device.supply), sensors)
     atmosphere = device.supply.atmospheric_pressure
@@ -249,49 +251,46 @@ def build_walk(request: ScenarioRequest, changed: OverriddenDocument) -> Scenari
     return with_duration(scenario, _duration(reading, scenario))
 
 
-class _LegLead(NamedTuple):
-    """Lead of the leg: a gait, whether it was named by the user, and the task sequence, if any."""
-
-    gait: Gait
-    is_named: bool
-    task_sequence: TaskSequence | None
-
-
-def _led_by(reading: DocumentReader, request: ScenarioRequest) -> _LegLead:
-    """Return the gait and the task sequence of a walk, from the files that it names."""
+def _motion(
+    reading: DocumentReader,
+    request: ScenarioRequest,
+    line: SupplyLine | None,
+    bottle: BottleSupply | None,
+    sensors: Mapping[str, float],
+) -> WalkMotion:
+    """Return the wearer, the gait or task sequence, and what fails; ``sensors`` are the settings [SI] of sensors."""
     sequence_file = _named_file("task_sequence", request, reading.document)
     with _named_by("task_sequence", reading, request, ScenarioError):
         sequence = None if sequence_file is None else load_task_sequence(sequence_file)
     with _named_by("gait", reading, request, DataError):
         gait = load_gait(_named_file("gait", request, reading.document) or NORMATIVE)
-    return _LegLead(gait, "gait" in request.instead or "gait" in reading.document, sequence)
-
-
-def _motion(
-    reading: DocumentReader,
-    led: _LegLead,
-    line: SupplyLine | None,
-    bottle: BottleSupply | None,
-    sensors: Mapping[str, float],
-) -> WalkMotion:
-    """Return who walks how, and which sensors and parts fail; ``sensors`` are the settings [SI] of its sensors."""
+    is_named = "gait" in request.instead or "gait" in reading.document
     faults = {sensor: _fault(reading, sensor) for sensor in FAULTY}
+    shut_off = reading.section("shut_off", SHUT_OFF) if "shut_off" in reading.document else {}
+    if shut_off and shut_off["area"] <= 0.0:
+        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
+    broken = {part: fault for part in PLANT_FAULTS if (fault := _fault(reading, part)).kind}
+    own = next((part for part in broken if line is not None and part.startswith(("regulator", "bottle"))), "")
+    if own:
+        raise reading.refusal(
+            f"faults.{own}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
+        )
     person = reading.number(f"wearer.{PERSON.name}", PERSON)
     if person != int(person):
         raise reading.refusal(f"wearer.{PERSON.name}", "must be a whole number")
     return WalkMotion(
         motion_kind=MOTIONS[kind_at(reading.document, "motion") or WALK],
-        gait=led.gait,
-        wearer=read_wearer(reading, led.gait, led.is_named),
+        gait=gait,
+        wearer=read_wearer(reading, gait, is_named),
         timing=timing_of(reading.document),
         forces={name: sensors[name] for name in FORCES},
         faults=faults,
-        task_sequence=led.task_sequence,
+        task_sequence=sequence,
         bottle=bottle,
-        wearer_origin=wearer_origin(reading, led.gait, led.is_named),
+        wearer_origin=wearer_origin(reading, gait, is_named),
         person=person,
-        broken=_broken(reading, line),
-        shut_off=_shut_off(reading),
+        broken=broken,
+        shut_off=shut_off,
     )
 
 
@@ -333,7 +332,18 @@ def _control(
     seconds = DEFAULT_PERIOD if period is None else reading.number("controller.period", PERIOD)
     if rate is not None:
         seconds = 1.0 / reading.number("controller.rate", RATE)
-    terms = _terms(device.valve) | nominal_terms(device, lines) | loop_terms(device, law, IN_WALK)
+    # Lags and delays [s] of valve and sensors, which a controller may follow, from their settings.
+    valve = VALVES[device.valve.kind]
+    names, delay = tuple(quantity.name for quantity in valve.quantities), venting_valve(device.valve).command_delay
+    paths = tuple(f"valve.{name}" for name in names)
+    terms = {
+        VALVE_LAG: LinkFunction(paths, valve.lag or delay, (valve.settings,)),
+        VALVE_DELAY: LinkFunction(paths, delay, (valve.settings,)),
+        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_bandwidth),
+        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_bandwidth),
+        **nominal_terms(device, lines),
+        **loop_terms(device, law, IN_WALK),
+    }
     present = numbers_of_sensors(sensors) | numbers_of_lines(lines) | {PERIOD_PATH: seconds}
     sections = {"controller": law.quantities, "timing": timing.quantities}
     found, links = read_followers(reading, sections, terms, device, present)
@@ -346,31 +356,6 @@ def _fault(reading: DocumentReader, part: str) -> FaultSettings:
     """Return the fault of a sensor or a part of the plant; without a kind where it is sound."""
     kind = kind_at(reading.document, f"faults.{part}")
     return FaultSettings(kind, reading.section(f"faults.{part}", fault_numbers(part, kind)))
-
-
-def _broken(reading: DocumentReader, line: SupplyLine | None) -> dict[str, FaultSettings]:
-    """Return the parts of the plant that fail; ScenarioError for one that a walk with supply lines does not have."""
-    faults = {}
-    for part in PLANT_FAULTS:
-        fault = _fault(reading, part)
-        if not fault.kind:
-            continue
-        if line is not None and part.startswith(("regulator", "bottle")):
-            raise reading.refusal(
-                f"faults.{part}.kind", "a walk with [supply_line] has regulators of its own: leave these lines out"
-            )
-        faults[part] = fault
-    return faults
-
-
-def _shut_off(reading: DocumentReader) -> dict[str, float]:
-    """Return the settings of the shut-off valve [SI], {} where none is fitted."""
-    if "shut_off" not in reading.document:
-        return {}
-    numbers = reading.section("shut_off", SHUT_OFF)
-    if numbers["area"] <= 0.0:
-        raise reading.refusal("shut_off.area", "must be above 0; leave [shut_off] out where none is fitted")
-    return numbers
 
 
 def _assumed(reading: DocumentReader, bottle: BottleSupply | None) -> tuple[Assumption, ...]:
@@ -407,16 +392,3 @@ WALKING = Layout(FILE, OF_A_WALK, walk_file, walk_file, build_walk)
 def lag_of_bandwidth(bandwidth: float) -> float:
     """Time constant [s] of a sensor of a bandwidth [Hz]; 0 for one that follows at once, whose bandwidth is 0."""
     return 1.0 / (_TURN * bandwidth) if bandwidth > 0.0 else 0.0
-
-
-def _terms(valve: Valve) -> dict[str, LinkFunction]:
-    """Return how lags and delays [s] of valve and sensors, which a controller may follow, come from their settings."""
-    kind = VALVES[valve.kind]
-    names = tuple(quantity.name for quantity in kind.quantities)
-    paths, delay = tuple(f"valve.{name}" for name in names), venting_valve(valve).command_delay
-    return {
-        VALVE_LAG: LinkFunction(paths, kind.lag or delay, (kind.settings,)),
-        VALVE_DELAY: LinkFunction(paths, delay, (kind.settings,)),
-        PRESSURE_LAG: LinkFunction(("sensors.pressure_bandwidth",), lag_of_bandwidth),
-        FORCE_LAG: LinkFunction(("sensors.force_bandwidth",), lag_of_bandwidth),
-    }

@@ -11,7 +11,7 @@ import numpy as np
 
 from ppafo.control.walking.timings import TIMINGS
 from ppafo.gait import Gait
-from ppafo.gait.plausible import gait_file_remarks
+from ppafo.gait.plausible_angles import gait_file_remarks
 from ppafo.model.columns import Problem, at, over_runs
 from ppafo.model.declaration import Quantity
 from ppafo.model.shut_off import SHUT_OFF

@@ -132,26 +132,25 @@ class Person(NamedTuple):
 
 
 def person_of(gait: Gait, who: Any) -> Person:
-    """The person with a number, or who is drawn already; for an array (runs,) every number of it is one too."""
+    """Person of the population by number, which may be an array (runs,); a person drawn before stays."""
     if isinstance(who, Person):
         return who
-    person: Person = over_runs(lambda one: _person(gait, one), who)
-    return person
 
+    def numbered(number: float) -> Person:
+        if number == 0.0:
+            return Person(
+                mass=1.0,
+                stature=1.0,
+                series=gait_series(gait),
+                timing=gait_timing(gait),
+                strike_angle=strike_angle(gait),
+                thresholds=1.0,
+                start=0.0,
+            )
+        person: Person = rebuilt(Person, [float(each[1]) for each in leaves(drawn_people(*_drawn(gait, number)))])
+        return person
 
-def _person(gait: Gait, number: float) -> Person:
-    if number == 0.0:
-        return Person(
-            mass=1.0,
-            stature=1.0,
-            series=gait_series(gait),
-            timing=gait_timing(gait),
-            strike_angle=strike_angle(gait),
-            thresholds=1.0,
-            start=0.0,
-        )
-    build, gaits, generator = _drawn(gait, number)
-    person: Person = rebuilt(Person, [float(values[1]) for values in leaves(drawn_people(build, gaits, generator))])
+    person: Person = over_runs(numbered, who)
     return person
 
 

@@ -22,9 +22,9 @@ from ppafo.model.catalog import ACTUATORS
 from ppafo.model.columns import Problem, at, first, larger, over_runs, smaller, truncated, whole
 from ppafo.model.elementary import QUARTER_TURN
 from ppafo.model.fault_catalogue import PLANT_FAULTS
-from ppafo.model.gait import GaitNow, gait_at
+from ppafo.model.gait import gait_at
 from ppafo.model.orifice import area_conductance
-from ppafo.model.plant import PlantParameters, PlantState
+from ppafo.model.plant import PlantParameters
 from ppafo.model.plant_faults import SOUND, PlantFaults
 from ppafo.model.ports import load_torque
 from ppafo.model.sensors import GaitSensors
@@ -104,27 +104,14 @@ def plan_walks(scenario: Scenario) -> tuple[Run, tuple[Problem, ...]]:
         failing=failing_of(scenario),
     )
     # Whoever fits the controller to a person sets its thresholds and the start of its push-off anew.
-    fitted = replace(scenario.controller, settings=settings_of_person(dict(scenario.controller.settings), person))
-    components = components_of_walk(replace(scenario, controller=fitted), device, sensors)
-    run = compose_run(
-        components,
-        with_leg(bare, leg),
-        lambda plant: walk_steps(scenario, plant),
-        lambda plant: start_vented(device, plant, walk.initial.now),
-        walk,
-    )
-    return run, (too_many_steps(scenario, run.step, run.step_count), *stiff_loads(run))
-
-
-def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors) -> Components:
-    """Components of the run of a walk, for any wearer."""
+    settings = settings_of_person(dict(scenario.controller.settings), person)
     # An object in charge is asked between the steps, so the program has no controller of its own.
     is_outside = scenario.controller.is_outside
-    return Components(
+    components = Components(
         device=device,
         valve=venting_valve(device.valve),
         controller=None if is_outside else law_of(scenario),
-        settings={} if is_outside else scenario.controller.settings,
+        settings={} if is_outside else settings,
         reference=NO_REFERENCE,
         path=None,
         sensors=sensor_parameters(scenario),
@@ -133,6 +120,15 @@ def components_of_walk(scenario: Scenario, device: Device, sensors: GaitSensors)
         supply_lines=scenario.supply_lines,
         signal_delay=of_each(longest_delay, sensors) * scenario.controller.period,
     )
+    now = walk.initial.now
+    run = compose_run(
+        components,
+        with_leg(bare, leg),
+        lambda plant: walk_steps(scenario, plant),
+        lambda plant: vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate),
+        walk,
+    )
+    return run, (too_many_steps(scenario, run.step, run.step_count), *stiff_loads(run))
 
 
 def batch_of_many(scenario: Scenario, build: BodyScale, gaits: VariedGaits, generator: np.random.Generator) -> Batch:
@@ -205,11 +201,6 @@ def vented_chambers(device: Device, plant: PlantParameters, angle: Any) -> Chamb
     """Both chambers of a device at an angle [rad] and the pressure of the atmosphere."""
     room = plant.atmospheric_pressure
     return filled_chambers(ACTUATORS[device.actuator.kind].model, plant, angle, room, room)
-
-
-def start_vented(device: Device, plant: PlantParameters, now: GaitNow) -> PlantState:
-    """The state in which a walk begins: the ankle where the gait has it, and vented chambers."""
-    return vented_state(plant, vented_chambers(device, plant, now.ankle), now.ankle, now.ankle_rate)
 
 
 def gait_sensors_of(scenario: Scenario) -> GaitSensors:

@@ -16,6 +16,7 @@ from ppafo.metrics import METRICS, Metric, evaluate
 from ppafo.metrics.metric import MetricKind, Metrics
 from ppafo.signals import Channel, Recording
 from ppafo.signals.meter import LED_SHANK, REQUESTED, STEADY
+from ppafo.signals.recording import OF_SECOND_CHAMBER
 from ppafo.simulation import at_hand
 from ppafo.simulation.motion_kind import Measured
 from ppafo.simulation.scenario import Scenario
@@ -27,21 +28,13 @@ from ppafo.storage.opensim_names import opensim_recording
 from ppafo.units.shown import in_units
 from ppafo.walking.bottle.course import UNITS, SupplyCourse
 from ppafo.walking.contradictions import check_no_bottle
-from ppafo.walking.events import (
-    EVENT_ROW,
-    FRACTION_ROW,
-    PHASE_ROW,
-    REQUEST_ROW,
-    SAFE_ROW,
-    SafetyEvent,
-    clock_row,
-    safety_events,
-)
 from ppafo.walking.gait_series import AnklePath, ankle_path, truncate
 from ppafo.walking.inverse_dynamics import dorsiflexor_moment, swing_knee_torque
 from ppafo.walking.motion import walk_of
 from ppafo.walking.person import as_drawn
 from ppafo.walking.planning import requests_torque, task_sequence_of_walk
+from ppafo.walking.safety_events import SAFE_ROW, SafetyEvent, safety_events
+from ppafo.walking.stride_events import EVENT_ROW, FRACTION_ROW, PHASE_ROW, clock_row
 from ppafo.walking.strides import (
     Curves,
     SegmentResult,
@@ -61,51 +54,8 @@ from ppafo.walking.task_sequence import PlannedSequence, pace_in_time
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Channels of a recorded walk that do not depend on who walks: what the device does, what its controller sees.
-
-Channels = dict[str, tuple[Any, str]]
-"""Values (samples,) and SI unit of channels by name."""
-
-
-def actuator_channels(run: Run, record: Mapping[str, Floats]) -> Channels:
-    """Pressures, torques and power, from rows (samples,) by path."""
-    angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
-    actuator, masses = run.program.actuator, (record["state.mass_1"], record["state.mass_2"])
-    pressure_1, pressure_2 = pressures_of(actuator, run.plant, angle, *masses)
-    return {
-        "pressure_1": (pressure_1, "Pa"),
-        "pressure_2": (pressure_2, "Pa"),
-        "torque": (np.asarray(torque_of(actuator, run.plant, angle, pressure_1, pressure_2)), "N m"),
-        "external_torque": (external, "N m"),
-        "device_power": (external * rate, "W"),
-    }
-
-
-def valve_and_ground_channels(record: Mapping[str, Floats]) -> Channels:
-    """The command, how the foot meets the ground, and the gas taken and vented so far."""
-    return {
-        "command": (record["result.command"], "-"),
-        "contact": (record["walk.contact"], "-"),
-        "heel_force": (record["walk.heel_force"], "N"),
-        "toe_force": (record["walk.toe_force"], "N"),
-        "supplied_mass": (record["state.supplied_mass"], "kg"),
-        "vented_mass": (record["state.vented_mass"], "kg"),
-    }
-
-
-def controller_channels(record: Mapping[str, Floats]) -> Channels:
-    """Channels of a controller: gait phase, assistance level, requested torque, phase in the stride."""
-    channels: Channels = {}
-    if PHASE_ROW in record:
-        channels["controller_phase"] = (record[PHASE_ROW], "-")
-        channels["safe_state"] = (record[SAFE_ROW], "-")
-    if REQUEST_ROW in record:
-        channels["reference"] = (record[REQUEST_ROW], "N m")
-    fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
-    if fraction is not None and event is not None:
-        channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
-    return channels
-
+_REQUEST_ROW = "controller_state.request.torque"
+"""Row of a torque-following controller for the requested torque."""
 
 REMEDY = "the step may be too long, or a value unrealistic: try a smaller run.step, and check the wearer"
 
@@ -124,45 +74,58 @@ def recording_of_walk(
     supply: SupplyCourse | None = None,
 ) -> Recording:
     """The recording of a walk [SI] from its rows (samples,) by path, at these times [s]; with its bottle's course."""
-    run, led = with_cold_gas(run, supply, time), led_leg(run)
-    angle = record["state.angle"]
+    led, plant, actuator = led_leg(run), run.plant, run.program.actuator
+    if supply is not None:
+        # The gas of each time, as it was in force between two meetings of bottle and device.
+        met = np.maximum(np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1, 0)
+        warmth = supply.values["gas_temperature"] / supply.values["gas_temperature"][0]
+        product: Any = plant.gas_product * warmth[np.minimum(met, supply.times.size - 2)]
+        plant = plant._replace(gas_product=product)
+    angle, rate, external = (record[row] for row in ("state.angle", "state.angular_velocity", "walk.external_torque"))
+    pressure_1, pressure_2 = pressures_of(actuator, plant, angle, record["state.mass_1"], record["state.mass_2"])
     path = ankle_path(walk_of(configuration).gait, led.timing, walk_of(configuration).wearer)
-    channels: Channels = {
+    channels: dict[str, tuple[Any, str]] = {
         "angle": (angle, "rad"),
-        "angular_velocity": (record["state.angular_velocity"], "rad/s"),
+        "angular_velocity": (rate, "rad/s"),
         "shank_angle": (record["walk.now.shank"], "rad"),
         "healthy_angle": (record["walk.now.ankle"], "rad"),
-        **actuator_channels(run, record),
+        "pressure_1": (pressure_1, "Pa"),
+        "pressure_2": (pressure_2, "Pa"),
+        "torque": (torque_of(actuator, plant, angle, pressure_1, pressure_2), "N m"),
+        "external_torque": (external, "N m"),
+        "device_power": (external * rate, "W"),
         "swing_knee_torque": (swing_knee_torque(led.leg, time, record), "N m"),
         "toe_height": (path.toe_height(record["walk.now.phase"], record["walk.now.shank"], angle), "m"),
-        **valve_and_ground_channels(record),
+        "command": (record["result.command"], "-"),
+        "contact": (record["walk.contact"], "-"),
+        "heel_force": (record["walk.heel_force"], "N"),
+        "toe_force": (record["walk.toe_force"], "N"),
+        "supplied_mass": (record["state.supplied_mass"], "kg"),
+        "vented_mass": (record["state.vented_mass"], "kg"),
     }
     if led.leg.keeps_gait >= 0.5:
         channels["dorsiflexor_moment"] = (dorsiflexor_moment(led.leg, record), "N m")
-    channels |= gas_channels(configuration.device.gas, run, record)
+    channels |= gas_channels(configuration.device.gas, replace(run, plant=plant), record)
     if supply is not None:
-        channels |= supply_channels(supply, time, record)
-    channels |= controller_channels(record)
+        # The bottle's, straight between the times at which it met the device.
+        for name, course in supply.values.items():
+            channels[name] = (np.interp(time, supply.times, course), UNITS[name])
+        channels["bottle_mass"] = (supply.first.mass - record["line_state.regulated_mass"], "kg")
+    if PHASE_ROW in record:
+        channels["controller_phase"] = (record[PHASE_ROW], "-")
+        channels["safe_state"] = (record[SAFE_ROW], "-")
+    if _REQUEST_ROW in record:
+        channels["reference"] = (record[_REQUEST_ROW], "N m")
+    fraction, event = clock_row(record, FRACTION_ROW), clock_row(record, EVENT_ROW)
+    if fraction is not None and event is not None:
+        channels["gait_fraction"], channels["gait_event"] = (fraction, "-"), (event, "-")
     if led.task_sequence is not None:
         channels |= _task_sequence_channels(configuration, run, path, time, record)
-    values = {name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items()}
+    absent = OF_SECOND_CHAMBER if run.program.has_one_chamber else frozenset()
+    values = {
+        name: Channel(np.asarray(series), unit) for name, (series, unit) in channels.items() if name not in absent
+    }
     return Recording(f"walk, {configuration.name}", time, values, kind="simulated")
-
-
-def supply_channels(supply: SupplyCourse, time: Floats, record: Mapping[str, Floats]) -> dict[str, tuple[Floats, str]]:
-    """Channels of the bottle of a walk with their units, straight between the times at which it met the device."""
-    channels = {name: (np.interp(time, supply.times, values), UNITS[name]) for name, values in supply.values.items()}
-    return channels | {"bottle_mass": (supply.first.mass - record["line_state.regulated_mass"], "kg")}
-
-
-def with_cold_gas(run: Run, supply: SupplyCourse | None, time: Floats) -> Run:
-    """The run with the gas of each time [s], as it was in force between two meetings of bottle and device, if any."""
-    if supply is None:
-        return run
-    met = np.maximum(np.searchsorted(supply.times, time + 1.0e-9 * run.step, side="right") - 1, 0)
-    warmth = supply.values["gas_temperature"] / supply.values["gas_temperature"][0]
-    product: Any = run.plant.gas_product * warmth[np.minimum(met, supply.times.size - 2)]
-    return replace(run, plant=run.plant._replace(gas_product=product))
 
 
 def _task_sequence_channels(

@@ -121,22 +121,20 @@ def walk_metrics(
             rms = float(np.sqrt(np.mean(error**2)))
             summary = "RMS of requested torque less actuator torque in push-off"
             metrics["push_off_error"] = Metric(rms, "N m", summary)
-    return metrics | torque_metrics(recording) | first_less_help(recording)
-
-
-def torque_metrics(recording: Recording) -> dict[str, Metric]:
-    """Metrics of the torque: tracking of the request, peak, and reversals of the command."""
-    metrics: dict[str, float | None] = {
+    of_torque: dict[str, float | None] = {
         "torque_error": torque_error(recording) if "reference" in recording else None,
         "requested_torque": requested_torque(recording) if "reference" in recording else None,
         "peak_torque": peak_torque(recording),
         "command_reversals": command_reversals(recording),
     }
-    return {
-        name: Metric(value, METRICS[name].unit, METRICS[name].summary)
-        for name, value in metrics.items()
-        if value is not None
-    }
+    for name, value in of_torque.items():
+        if value is not None:
+            metrics[name] = Metric(value, METRICS[name].unit, METRICS[name].summary)
+    if "safe_state" in recording and recording["safe_state"].any():
+        time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
+        summary = "time at which the controller first lifted only, paused or stopped"
+        metrics["safe_state_time"] = Metric(time, "s", summary)
+    return metrics
 
 
 def settled(chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -192,14 +190,6 @@ def lowest_toes(configuration: Scenario, height: Floats) -> Metric:
         "m",
         "lowest toe height above ground in mid-swing of the mean stride; below 0 they would drag",
     )
-
-
-def first_less_help(recording: Recording) -> dict[str, Metric]:
-    """When the controller first helped less; nothing where it never did."""
-    if "safe_state" not in recording or not recording["safe_state"].any():
-        return {}
-    time = float(recording.time[int(np.argmax(recording["safe_state"] > 0.5))])
-    return {"safe_state_time": Metric(time, "s", "time at which the controller first lifted only, paused or stopped")}
 
 
 def healthy_positive_work(configuration: Scenario) -> float:

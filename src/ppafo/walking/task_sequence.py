@@ -15,7 +15,7 @@ from ppafo.documents.models import SchemaVersion, make_schema, one_of, optional,
 from ppafo.documents.problems import NAME, quote
 from ppafo.documents.toml_text import TomlKind, label
 from ppafo.engine.rows import leaves
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.gait import Gait
 from ppafo.model.declaration import Quantity
 from ppafo.model.elementary import sine_and_cosine
@@ -25,6 +25,7 @@ from ppafo.signals.recording import Floats
 from ppafo.simulation.declaration import DocumentReader
 from ppafo.simulation.schema import kind_field, model_name, number_type, quantity_fields
 from ppafo.walking.preparation import standing_on
+from ppafo.wording import nearest_name
 
 FILE = TomlKind("task sequence", "task-sequence", resources.files("ppafo.walking") / "task_sequences", ScenarioError)
 
@@ -222,7 +223,7 @@ class _Planner:
 
     def stay(self, length: Numbers, load: float) -> None:
         """Stand for a time [s]; the load changes over it."""
-        self._add(length, 0.0, 0.0, 0.0, load)
+        self.go(0.0, 0.0, 0.0, load, length=length)
 
     def go(
         self,
@@ -233,26 +234,15 @@ class _Planner:
         tilt: Numbers = 0.0,
         scuff: float = 0.0,
         slope: float = 0.0,
+        length: Numbers = None,
     ) -> None:
         """Walk some strides, over which strides per second and stride go to these values over the recorded ones.
 
-        The slope of the ground [rad] goes to another one too.
+        The slope of the ground [rad] goes to another one too. ``length`` [s] follows from the strides unless given.
         """
-        # The frequency changes evenly over the part, so its mean is that of both ends.
-        length = turns / (0.5 * (self.ratio + ratio) * self.frequency)
-        self._add(length, turns, ratio, stride, load, tilt, scuff, slope)
-
-    def _add(
-        self,
-        length: Numbers,
-        turns: Numbers,
-        ratio: float,
-        stride: float,
-        load: float,
-        tilt: Numbers = 0.0,
-        scuff: float = 0.0,
-        slope: float = 0.0,
-    ) -> None:
+        if length is None:
+            # The frequency changes evenly over the part, so its mean is that of both ends.
+            length = turns / (0.5 * (self.ratio + ratio) * self.frequency)
         frequency = self.ratio * self.frequency
         self.parts.append(
             SequencePart(
@@ -341,31 +331,18 @@ def _strides(
         # Both feet turn by the same angle about the middle of the curve, each on its own circle.
         shorter = 1.0 - 0.5 * STEP_WIDTH / values["radius"] if kind == "turn" else 1.0
         slope = values.get("slope", 0.0)
-        is_level = kind == "walk" and slope == 0.0
-        yield from _walk(planner, values, ratio, ratio * shorter, tilt, slope, is_level)
-
-
-def _walk(
-    planner: _Planner,
-    values: dict[str, float],
-    ratio: float,
-    stride: float,
-    tilt: Numbers,
-    slope: float,
-    is_level: bool,
-) -> Iterator[tuple[Numbers, Numbers]]:
-    """Walk at one speed, stride and slope; where one is another than before, the first stride leads to it."""
-    begun, changes = planner.time, (planner.ratio, planner.stride, planner.slope) != (ratio, stride, slope)
-    if changes:
-        planner.go(1.0, ratio, stride, tilt=tilt, slope=slope)
-    if changes and values.get("strides") == 1.0:
-        return
-    count = values["strides"] - changes if "strides" in values else None
-    whole = _count(planner, values, ratio, planner.time - begun) if count is None else count
-    start = planner.time
-    planner.go(whole, ratio, stride, tilt=tilt, slope=slope)
-    if is_level:
-        yield start, planner.time
+        stride, begun = ratio * shorter, planner.time
+        # Where speed, stride or slope is another than before, the first stride leads to it.
+        changes = (planner.ratio, planner.stride, planner.slope) != (ratio, stride, slope)
+        if changes:
+            planner.go(1.0, ratio, stride, tilt=tilt, slope=slope)
+        if changes and values.get("strides") == 1.0:
+            return
+        whole = _count(planner, values, ratio, planner.time - begun) - (changes if "strides" in values else 0)
+        start = planner.time
+        planner.go(whole, ratio, stride, tilt=tilt, slope=slope)
+        if kind == "walk" and slope == 0.0:
+            yield start, planner.time
 
 
 def _count(planner: _Planner, values: dict[str, float], ratio: float, used: Numbers) -> Numbers:
@@ -445,8 +422,7 @@ def turns_walked(sequence: TimedSequence, time: float) -> Numbers:
 def standing_gait(leg: LegParameters, timing: GaitTiming, sequence: TimedSequence) -> GaitNow:
     """Start of a task sequence: shank vertical, foot flat, both at rest; numbers may be arrays (wearers,)."""
     first = sequence.parts[0]
-    sine, cosine = flat_foot(timing)
-    return standing_on(leg, timing.ground_angle, sine, cosine, first.turns, first.load)
+    return standing_on(leg, timing.ground_angle, *flat_foot(timing), first.turns, first.load)
 
 
 def flat_foot(timing: GaitTiming) -> tuple[Numbers, Numbers]:

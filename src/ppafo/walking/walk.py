@@ -32,13 +32,13 @@ from ppafo.walking.bottle.coupling import BottleLife, Schedule, life_on_bottle, 
 from ppafo.walking.bottle.course import WALKED
 from ppafo.walking.contradictions import check_no_bottle
 from ppafo.walking.declaration import THRESHOLDS
-from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import SHORTEST_STRIDES, duration_problems, walk_of, with_duration
 from ppafo.walking.person import crowd_of, draw_gaits
 from ppafo.walking.planning import fed_device, plan_walk, plan_walks, task_sequence_of_walk, unrecorded
 from ppafo.walking.preparation import FaultSettings
 from ppafo.walking.result import REMEDY, WalkResult, result_of_walk
+from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW
 from ppafo.walking.strides import PHASES, healthy_positive_work, healthy_toe_height, lowest_toes
 from ppafo.walking.task_sequence import turns_walked
 from ppafo.walking.wearer import draw_builds
@@ -399,7 +399,14 @@ def walk_population(
     seconds = lasting(configuration, minutes).run.duration
     run, _ = plan_walks(with_duration(crowd, seconds))
     batch = unrecorded(run, wearers)
-    states = _run_in_groups(batch, progress)
+    # Groups small enough for an interrupt to be seen and for progress to be reported.
+    group, results = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES, []
+    for first in range(0, wearers, group):
+        part = slice(first, first + group)
+        one = Batch(batch.program, batch.clock, batch.parameters[:, part], batch.states[:, part])
+        results.append(run_batch(one).states)
+        progress(float(min(first + group, wearers)), float(wearers))
+    states = np.concatenate(results, axis=1)
     rows = {path: states[row] for path, row in row_numbers(batch.program.state_rows()).items()}
     good = (rows["result.failure_time"] >= NEVER_FAILED) & np.isfinite(states).all(axis=0)
     walked = run.step * run.step_count
@@ -423,16 +430,3 @@ def walk_population(
         flags.update(FAULT_FLAGS[flag].name for flag in rows[f"{FINDING_ROW}.fault_flag"][good][less].tolist())
     lost, last = int((~good).sum()), dict(flags.most_common())
     return Population(configuration, seconds / 60.0, seed, kept[0], kept[1], lost, vented, paused, last)
-
-
-def _run_in_groups(batch: Batch, progress: Progress) -> Floats:
-    """Final states, in groups small enough for an interrupt to be seen and for progress to be reported."""
-    count = batch.states.shape[1]
-    group = max(1, int(STEPS_AT_ONCE / batch.clock.step_count / LANES)) * LANES
-    results = []
-    for first in range(0, count, group):
-        part = slice(first, first + group)
-        one = Batch(batch.program, batch.clock, batch.parameters[:, part], batch.states[:, part])
-        results.append(run_batch(one).states)
-        progress(float(min(first + group, count)), float(count))
-    return np.concatenate(results, axis=1)

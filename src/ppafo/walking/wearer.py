@@ -266,7 +266,7 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
 
     Where it gives the stature, segments follow that and the body mass.
     """
-    paper = subject = paper_subject()
+    paper = subject = _PAPER
     # The built-in gait, where nobody names it, is walked by the paper's subject and not by its own.
     if is_named:
         # A subject of unknown stature has the lengths of the paper's.
@@ -296,18 +296,6 @@ def read_wearer(reading: DocumentReader, gait: Gait, is_named: bool) -> Wearer:
     return Wearer(**reading.section("wearer", quantities))
 
 
-def _of_stature(wearer: Wearer, gait: Gait, origin: str) -> str:
-    """Return the stature in words where it is not the named subject's, and where nobody was measured."""
-    own = gait.stature if origin.startswith("the subject of") else None
-    if abs(wearer.stature - (own or paper_subject().stature)) <= _SAME * wearer.stature:
-        return ""
-    low, high = STATURES
-    remark = f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
-    if not low <= wearer.stature <= high:
-        remark += f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
-    return f"{remark}; the curves of the gait are not scaled by stature"
-
-
 SCALED_MASS = (0.6, 1.7)
 """Body masses, as multiples of the gait's subject, over which moment and force are scaled without a remark.
 
@@ -325,8 +313,16 @@ def wearer_origin(reading: DocumentReader, gait: Gait, is_named: bool) -> str:
 
 def who_walks(wearer: Wearer, gait: Gait, origin: str) -> str:
     """Return one line on the person who walks, and on the gait's own subject where that is another."""
-    line = f"wearer: {wearer.body_mass:.4g} kg, {origin}{_of_stature(wearer, gait, origin)}"
-    if origin.startswith("the subject of"):
+    line = f"wearer: {wearer.body_mass:.4g} kg, {origin}"
+    is_subject = origin.startswith("the subject of")
+    usual = (gait.stature if is_subject else None) or _PAPER.stature
+    if abs(wearer.stature - usual) > _SAME * wearer.stature:
+        low, high = STATURES
+        line += f"; {wearer.stature:.4g} m tall, and the segments follow mass and stature"
+        if not low <= wearer.stature <= high:
+            line += f", outside the {low:g} to {high:g} m of adults of whom that is known: give the segments themselves"
+        line += "; the curves of the gait are not scaled by stature"
+    if is_subject:
         return line if gait.stature is None or wearer.stature != gait.stature else f"{line}, {gait.stature:.4g} m"
     if abs(wearer.body_mass - gait.body_mass) <= _SAME * gait.body_mass:
         return line

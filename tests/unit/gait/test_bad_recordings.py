@@ -314,7 +314,7 @@ def test_the_remedy_changes_the_gait_map_only_where_one_was_given(
     csv_of: Callable[..., Path], columns: dict[str, Floats], key: str
 ) -> None:
     path = csv_of(SIGNS[key](columns))
-    columns_map = package_map("right").model_copy(update={"centre_of_pressure": None})
+    columns_map = package_map().model_copy(update={"centre_of_pressure": None})
     with pytest.raises(DataError, match=f"change (the sign of )?{re.escape(key)} in the gait map"):
         import_gait([path], ImportSettings(62.0, columns=columns_map))
     with pytest.raises(DataError, match=f"correct it in the file, or change .*{re.escape(key)} in a gait map"):
@@ -356,7 +356,7 @@ def test_noise_is_remarked_before_it_is_refused(csv_of: Callable[..., Path], col
     found = import_gait([path], ImportSettings(62.0))
     (remark,) = (line for line in found.remarks if line.startswith("shank_angle"))
     assert remark.startswith("shank_angle differs between strides by 1")
-    assert "that is noise, or the walk is not steady; smooth the recording (--low-pass '6 Hz')" in remark
+    assert "that is noise, or the walk is not steady; smooth the recording (low_pass=6)" in remark
     assert import_gait([path], ImportSettings(62.0, low_pass=6.0)).remarks == ()
 
 
@@ -408,7 +408,7 @@ def test_a_record_of_one_heel_strike_has_the_right_column(
     part = {name: values[first:last] for name, values in columns.items()}
     with pytest.raises(DataError, match=said) as refused:
         import_gait([csv_of(part, walk.time[first:last])], ImportSettings(62.0))
-    assert "--minimum-strides" not in str(refused.value)
+    assert "least_strides" not in str(refused.value)
 
 
 def test_a_record_of_two_cycles_is_not_called_one_that_wraps_around(
@@ -416,7 +416,7 @@ def test_a_record_of_two_cycles_is_not_called_one_that_wraps_around(
 ) -> None:
     part = {name: values[60:500] for name, values in columns.items() if name != FORCE}
     path = csv_of(part, walk.time[60:500])
-    with pytest.raises(DataError, match=r"has 1 whole stride .* or accept fewer with --minimum-strides"):
+    with pytest.raises(DataError, match=r"has 1 whole stride .* or accept fewer with least_strides"):
         import_gait([path], ImportSettings(62.0))
     found = import_gait([path], ImportSettings(62.0, least_strides=1))
     assert found.gait.stride_time == pytest.approx(6.2304 / 6.0, rel=0.02)

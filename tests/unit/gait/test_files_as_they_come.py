@@ -173,7 +173,7 @@ def test_a_neutral_reading_is_taken_off_the_angle_of_markers_too(tmp_path: Path)
         assert np.degrees(usual - found.gait.ankle_angle.mean) == pytest.approx(neutral, abs=0.01)
     shifted = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(10.0)))
     (said,) = [line for line in shifted.remarks if "zero of ankle_angle" in line]
-    advised = float(said.split("--ankle-neutral '")[1].split(" deg")[0])
+    advised = np.degrees(float(said.split("ankle_neutral=")[1].split(",")[0]))
     assert abs(advised) < 5.0, "the advice leads back to the foot that stands flat"
     mapped = AngleMap(heel="RHEE", toe="RTOE", vertical="y", positive="dorsiflexion", neutral="10 deg")
     columns = GaitMap(shank_angle=ShankMap(knee="RKNE", ankle="RANK", vertical="y"), ankle_angle=mapped)
@@ -194,7 +194,7 @@ def test_the_foot_says_which_way_a_part_of_a_stride_on_a_treadmill_goes(tmp_path
 
 def test_gaps_are_filled_up_to_the_length_that_is_stated_and_named(tmp_path: Path) -> None:
     path = walked(tmp_path, (120, 126))
-    with pytest.raises(DataError, match=r"has 1 whole stride without a lost .*fill the gaps .--fill-gaps '0.07 s'"):
+    with pytest.raises(DataError, match=r"has 1 whole stride without a lost .*fill the gaps .longest_gap=0.07"):
         import_gait([path], PERSON)
     with pytest.raises(DataError, match="has 1 whole stride without a lost sample"):
         import_gait([path], ImportSettings(MASS, longest_gap=0.05))
@@ -254,7 +254,7 @@ def test_the_reading_of_a_neutral_ankle_may_be_given(tmp_path: Path) -> None:
     path = opensim(tmp_path / "ik.mot", TIME, columns, "inDegrees=yes")
     (said,) = [line for line in import_gait([path], PERSON).remarks if "zero of ankle_angle" in line]
     assert "off by 12." in said
-    assert "--ankle-neutral '-12." in said
+    assert "ankle_neutral=-0.2" in said
     found = import_gait([path], ImportSettings(MASS, ankle_neutral=np.radians(-8.0)))
     assert_true(found.gait, ("ankle_angle",))
     assert not any("zero of ankle_angle" in line for line in found.remarks)
@@ -366,7 +366,7 @@ def test_a_column_without_unit_is_one_that_a_gait_map_may_name(tmp_path: Path) -
     table = read_table(path)
     assert (table.units["Kraft"], np.array_equal(table.columns["Kraft"], force(TIME))) == ("", True)
     path.write_text(f"time [s],Kraft\n{''.join(f'{0.01 * k},1{chr(10)}' for k in range(30))}")
-    with pytest.raises(DataError, match=r"Kraft\); name the columns in a gait map \(--map\)"):
+    with pytest.raises(DataError, match=r"Kraft\); name the columns in a gait map \(columns\)"):
         import_gait([path], PERSON)
 
 

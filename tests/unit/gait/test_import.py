@@ -116,15 +116,15 @@ def test_the_knee_is_read_as_acceleration_as_position_or_from_the_hip(
     lean = 0.3 * np.cos(6.0 * walk.time)
     hip = {"hip_x [m]": forward - 0.4 * np.sin(lean), "hip_y [m]": up + 0.4 * np.cos(lean), "thigh [rad]": lean}
     files, knee = {
-        "acceleration": (columns, package_map("right").knee),
-        "position": (rest | {"knee_forward [mm]": 1000.0 * forward, "knee_up [m]": up}, package_map("right").knee),
+        "acceleration": (columns, package_map().knee),
+        "position": (rest | {"knee_forward [mm]": 1000.0 * forward, "knee_up [m]": up}, package_map().knee),
         "backwards": (rest | {"back [m]": -forward, "up [m]": up}, KneeMap(forward=("-back",), up=("up",))),
         "hip and thigh": (
             rest | hip,
             KneeMap(forward=("hip_x",), up=("hip_y",), thigh=("thigh",), thigh_length="40 cm"),
         ),
     }[how]
-    columns_map = package_map("right").model_copy(update={"knee": knee, "centre_of_pressure": None})
+    columns_map = package_map().model_copy(update={"knee": knee, "centre_of_pressure": None})
     found = import_gait([csv_of(files)], ImportSettings(62.0, columns=columns_map)).gait
     for name in KNEE:
         assert largest_difference(found, normative, name) < KNEE_LIMIT
@@ -135,7 +135,7 @@ def test_opensim_angles_give_the_knee_once_the_thigh_is_known(opensim_files: dic
     files = list(opensim_files.values())
     without = import_gait(files, ImportSettings(62.0))
     assert without.gait.knee_forward is None
-    assert any("give --stature, or a gait map with knee.thigh_length" in remark for remark in without.remarks)
+    assert any("give stature, or a gait map with knee.thigh_length" in remark for remark in without.remarks)
     found = import_gait(files, ImportSettings(62.0, stature=0.4 / 0.245))
     assert max(largest_difference(found.gait, normative, name) for name in KNEE) < KNEE_LIMIT
     assert "thigh of 0.400 m: 0.245 of the stature (Winter 2009)" in found.remarks
@@ -207,7 +207,7 @@ def test_a_knee_that_cannot_be_worked_out_is_refused(
     csv_of: Callable[..., Path], columns: dict[str, Floats], walk: Recording, knee: dict[str, Any], message: str
 ) -> None:
     mapped = KneeMap(forward=("knee_forward",), up=("knee_up",), **{"unit": "m", **knee})
-    columns_map = package_map("right").model_copy(update={"knee": mapped, "centre_of_pressure": None})
+    columns_map = package_map().model_copy(update={"knee": mapped, "centre_of_pressure": None})
     path = csv_of({**columns, "thigh [rad]": 0.3 * np.cos(6.0 * walk.time)})
     with pytest.raises(DataError, match=re.escape(message)):
         import_gait([path], ImportSettings(62.0, columns=columns_map))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ppafo.gait import Gait
-from ppafo.gait.plausible import FOOT_FLAT, turning_about_ankle
+from ppafo.gait.plausible_knee import FOOT_FLAT, turning_about_ankle
 from ppafo.gait.recorded.walk import acceleration_of, knee_position
 from ppafo.signals.recording import Floats
 

@@ -174,9 +174,7 @@ def test_without_events_the_shank_gives_the_strides_and_the_plate_corrects_them(
     text = "\n".join(found.remarks)
     assert "the walk goes along -y, upwards is z" in text
     assert "strides from the shank, its strikes moved by" in text
-    with pytest.raises(
-        DataError, match=r"trial.c3d: does not state the body mass; give it, such as --body-mass '62 kg'"
-    ):
+    with pytest.raises(DataError, match=r"trial.c3d: does not state the body mass; give it, such as body_mass=62"):
         import_gait([path], ImportSettings())
 
 
@@ -193,7 +191,7 @@ def test_a_single_stride_past_a_plate_is_a_gait_unless_more_are_asked_for(trial:
     found = import_gait([path], ImportSettings())
     assert found.gait.strides == 1
     assert_true(found)
-    with pytest.raises(DataError, match=r"has 1 whole stride within .*2 are needed; .* fewer with --minimum-strides"):
+    with pytest.raises(DataError, match=r"has 1 whole stride within .*2 are needed; .* fewer with least_strides"):
         import_gait([path], ImportSettings(least_strides=2))
 
 

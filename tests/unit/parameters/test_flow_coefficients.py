@@ -2,10 +2,11 @@
 
 import pytest
 
-from ppafo.errors import ParameterError, nearest_name
+from ppafo.errors import ParameterError
 from ppafo.parameters.flow_coefficients import conductance_of, conductance_of_nominal_flow, nominal_flow_of_cv
 from ppafo.parameters.loading import load_parameter_set
 from ppafo.parameters.overrides import apply_overrides
+from ppafo.wording import nearest_name
 
 LITRE_PER_SECOND_BAR = 1e-8
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from ppafo.errors import DataError
-from ppafo.storage.clock import clock_seconds
+from ppafo.storage.clock import clock_seconds, counted_on
 from ppafo.storage.column_map import ColumnMap
-from ppafo.storage.counter import counted_on
 from ppafo.storage.foreign import read_foreign
 
 # Three instants, 0, 10.5 and 70.25 s.

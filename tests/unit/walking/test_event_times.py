@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from ppafo.model.contact import FLAT, HEEL, SWING, TOE
-from ppafo.walking.events import EVENTS, event_errors, known_events, true_events
+from ppafo.walking.stride_events import EVENTS, event_errors, known_events, true_events
 
 
 def test_events_begin_where_the_foot_changes_how_it_stands() -> None:

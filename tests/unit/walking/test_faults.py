@@ -19,9 +19,9 @@ from ppafo.model.plant import chamber_pressures
 from ppafo.model.sensors import Fault, GaitSensors
 from ppafo.units import parse_quantity
 from ppafo.walking import load_walk, walk_population
-from ppafo.walking.events import SAFE_ROW
 from ppafo.walking.motion import walk_of, with_duration
 from ppafo.walking.planning import gait_sensors_of, plan_walk
+from ppafo.walking.safety_events import SAFE_ROW
 from ppafo.walking.walk import walk
 
 PAGE = (Path(__file__).parents[3] / "docs" / "evidence.md").read_text(encoding="utf-8")

@@ -12,13 +12,13 @@ from ppafo.analyses.walk.wearers import wearers_finding
 from ppafo.report.finding import Section, text_of
 from ppafo.signals import Channel, Recording
 from ppafo.walking import WalkComparison, WalkResult, compare_walks, load_walk, walk, walk_population
-from ppafo.walking.events import acting_phase, failure_times
 from ppafo.walking.figures import whole_walk
 from ppafo.walking.figures.legs import animation, drags, frames_figure, last_phases, legs_of, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.population import population_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import walk_of
+from ppafo.walking.safety_events import acting_phase, failure_times
 from ppafo.walking.strides import settled
 
 if TYPE_CHECKING:

@@ -4,8 +4,8 @@ import numpy as np
 
 from ppafo.control.walking.fault_flags import FAULT_FLAGS
 from ppafo.model.helping import PAUSED
-from ppafo.walking.events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW, safety_events
 from ppafo.walking.loading import load_walk
+from ppafo.walking.safety_events import FINDING_ROW, SAFE_ROW, VENTINGS_ROW, safety_events
 
 
 def test_readings_of_pressure_count_from_the_atmosphere_of_the_device() -> None:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ppafo.analyses.compare.pairs import Paired, pareto_front
-from ppafo.errors import count_of
 from ppafo.metrics import Metric
 from ppafo.report.display_units import display_difference
 from ppafo.report.finding import Column, Finding, Section
@@ -24,6 +23,7 @@ from ppafo.simulation.tracking.pair_step import coarse_pair
 from ppafo.studies.distributions import Floats, fraction_text, is_carried
 from ppafo.study.runs import Rows
 from ppafo.units import without_exponent
+from ppafo.wording import count_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -126,6 +126,7 @@ def bottle(
             continue
         if stride_time is not None:
             stride = f"its whole task sequence '{gas.task_sequence}'" if gas.task_sequence else "one stride of its walk"
-            raise ParameterError(f"--stride-time: a stride of {name} is {stride}; omit --stride-time")
+            given_time = argument_text("stride_time")
+            raise ParameterError(f"{given_time}: a stride of {name} is {stride}; omit {given_time}")
         found[name] = endurance_of_walk_gas(gas, bottle, schedule, changed)
     return finding_of(*found.values()) if len(found) == 1 else finding_of_several(Endurances(found))

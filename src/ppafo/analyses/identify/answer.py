@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.documents.json_text import plain
-from ppafo.errors import DataError, count_of
+from ppafo.errors import DataError
 from ppafo.identification.bench.result import BenchResult, bench_figure, figure_3
 from ppafo.identification.estimate import Estimate
 from ppafo.identification.new_set import NewSet, in_set_unit
@@ -27,6 +27,7 @@ from ppafo.report.style import ACTUAL, CHAMBER_1, CHAMBER_2
 from ppafo.signals import Recording, RecordingKind
 from ppafo.units import percentage
 from ppafo.units.shown import counted_from, in_units
+from ppafo.wording import count_of
 
 
 @dataclass(frozen=True, slots=True)

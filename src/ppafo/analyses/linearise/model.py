@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.engine.lanes import Floats
-from ppafo.errors import ScenarioError, nearest_name, one_line
+from ppafo.errors import ScenarioError
 from ppafo.simulation.scenario import Scenario
 from ppafo.version import __version__
+from ppafo.wording import nearest_name, one_line
 
 MISSING_CONTROL = "a system for python-control needs the package control: pip install ppafo[control]"
 _SINGULAR = 1.0e13

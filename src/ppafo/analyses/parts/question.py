@@ -28,8 +28,9 @@ def parts(
     'festo-mpye-5-m5-010-b: Festo MPYE-5-M5-010-B (valves, proportional)'
     """
     from ppafo.analyses.parts.answer import finding_of_catalogue, finding_of_part
-    from ppafo.errors import ParameterError, nearest_name
+    from ppafo.errors import ParameterError
     from ppafo.parameters.parts import load_catalogue
+    from ppafo.wording import nearest_name
 
     loaded = load_catalogue(catalogue)
     if part is None:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ppafo.analyses.reproduce.claim import Verdict
-from ppafo.analyses.reproduce.event_times import WEARERS, rms_of, timed_events, uneven_task_sequence
+from ppafo.analyses.reproduce.event_times import WEARERS, event_error, uneven_task_sequence
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.toml_text import label
-from ppafo.errors import ScenarioError, SimulationError, UnitError, nearest_name, refused_as
+from ppafo.errors import ScenarioError, SimulationError, UnitError, refused_as
 from ppafo.parameters import load_device
 from ppafo.parameters.publications.publication import FILE, PAPER, ClaimEntry, read_publication
 from ppafo.progress import Progress, Report
@@ -23,6 +23,7 @@ from ppafo.walking.loading import load_walk
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult, integral_of_a_stride
 from ppafo.walking.walk import healthy_metrics, walk
+from ppafo.wording import nearest_name
 
 DEVICE = "ppafo2011"
 MINUTES = 0.5
@@ -108,8 +109,7 @@ def event_reduction(wearer: str, _values: Values) -> float:
     errors = []
     for timing in ("thresholds", "estimated"):
         walked = load_walk(PAIR, (*WEARERS[wearer], f"timing.kind={timing}"))
-        walked = replace(walked, motion=replace(walk_of(walked), task_sequence=sequence))
-        errors.append(rms_of([event.errors for event in timed_events(walked, 1.0).values()]))
+        errors.append(event_error(replace(walked, motion=replace(walk_of(walked), task_sequence=sequence))))
     return 1.0 - errors[1] / errors[0]
 
 
@@ -257,14 +257,6 @@ class JudgedClaim:
         }
 
 
-@dataclass(frozen=True, slots=True)
-class PublicationClaims:
-    """A publication with the judged claims of it."""
-
-    publication: Publication
-    claims: tuple[JudgedClaim, ...]
-
-
 def study_names() -> tuple[str, ...]:
     """Return every name that ``--study`` takes."""
     return (SEED, *(name for name in FILE.names() if name != SEED), ALL)
@@ -286,15 +278,15 @@ def check_study(study: str, overrides: Sequence[str]) -> None:
         raise ScenarioError(f"--set {overrides[0]}: goes with the study '{SEED}' only; leave --set or --study out")
 
 
-def run_studies(study: str, report: Report) -> tuple[PublicationClaims, ...]:
-    """Return one study, or all but the paper's, with every claim judged; ScenarioError, SimulationError."""
+def run_studies(study: str, report: Report) -> tuple[tuple[Publication, tuple[JudgedClaim, ...]], ...]:
+    """Return one study, or all but the paper's, each with its claims judged; ScenarioError, SimulationError."""
     studies = []
     for name in study_names()[1:-1] if study == ALL else (study,):
         publication, claims = load_publication(name), []
         for claim in publication.claims:
             report(Progress(f"{publication.name}: {claim.entry.id}"))
             claims.append(judge(claim))
-        studies.append(PublicationClaims(publication, tuple(claims)))
+        studies.append((publication, tuple(claims)))
     return tuple(studies)
 
 

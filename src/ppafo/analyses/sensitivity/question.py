@@ -62,10 +62,11 @@ def sensitivity(
     from ppafo.analyses.sensitivity.answer import finding_of
     from ppafo.analyses.sensitivity.methods import METHODS
     from ppafo.analyses.sensitivity.solve import DEFAULT_SAMPLES, SensitivitySettings, analyse
-    from ppafo.errors import StudyError, nearest_name
+    from ppafo.errors import StudyError
     from ppafo.simulation.tracking.pair_step import tell_coarse_pairs
     from ppafo.studies.draws import drawn_in
     from ppafo.study.runs import RunCounter, Runs, with_companions
+    from ppafo.wording import nearest_name
 
     if method is not None and method not in METHODS:
         raise StudyError(

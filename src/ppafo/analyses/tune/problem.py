@@ -14,7 +14,7 @@ from ppafo.arguments import Overrides, checked
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, validate
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, beside
-from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, first_twice, refused_as
+from ppafo.errors import ParameterError, ScenarioError, StudyError, UnitError, refused_as
 from ppafo.loading import load_scenario, placed, reloaded
 from ppafo.parameters.graph import ATMOSPHERE_PATH
 from ppafo.plugins import Plugins, name_plugins
@@ -32,6 +32,7 @@ from ppafo.studies.draws import (
 from ppafo.studies.loading import list_studies, load_study, read_source
 from ppafo.studies.sampling import NOISE
 from ppafo.studies.varying import VariedPath, given_in, in_its_unit, value_at, varied_path
+from ppafo.wording import first_twice
 
 LARGEST_SEED = 2**32 - 1
 MAXIMUM_DRAWS = 4096

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from ppafo.analyses.validate.result import Validation, kind_of_channel, verdict
-from ppafo.errors import count_of
 from ppafo.report.display_units import display_value
 from ppafo.report.finding import Finding, Section, columns_of, facts
 from ppafo.report.kind import TIME, Kind
@@ -19,6 +18,7 @@ from ppafo.units.shown import in_units
 from ppafo.validation import ChannelAgreement
 from ppafo.validation.agreement import RecordingAgreement, measured_values
 from ppafo.validation.compared import COMPARED, PRESSURE_1, PRESSURE_2
+from ppafo.wording import count_of
 
 # Panels of a validation: each channel of a recording with the model, and its residual below.
 

@@ -87,7 +87,7 @@ def validate(
     name_plugins(plugins)
     from ppafo.analyses.validate.answer import finding_of
     from ppafo.analyses.validate.result import Validation
-    from ppafo.errors import DataError, nearest_name, one_line
+    from ppafo.errors import DataError
     from ppafo.parameters import load_device
     from ppafo.storage.column_map import column_map_of
     from ppafo.validation.agreement import ReplaySettings, compare_recording
@@ -96,6 +96,7 @@ def validate(
     from ppafo.validation.initial import parse_initial
     from ppafo.validation.measured import MeasuredRecording, read_measured
     from ppafo.validation.replay import MOTIONS
+    from ppafo.wording import nearest_name, one_line
 
     report = progress or report_nothing
     device = load_device(parameter_set, overrides=overrides, valve=valve)

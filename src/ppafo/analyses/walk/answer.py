@@ -30,17 +30,17 @@ from ppafo.report.live_parts import live_part
 from ppafo.running import tried
 from ppafo.simulation.gains import gains_of
 from ppafo.simulation.scenario import Scenario
-from ppafo.simulation.tracking import Tracking
+from ppafo.simulation.tracking import Tracking, following_text
 from ppafo.storage.comma_separated import marked_csv_bytes
 from ppafo.storage.netcdf import netcdf_bytes
 from ppafo.units.shown import in_units
-from ppafo.walking.events import event_lines, failure_times
 from ppafo.walking.figures.legs import animation, frames_figure, strip_figure
 from ppafo.walking.figures.mean_stride import walk_figure
 from ppafo.walking.figures.whole_walk import whole_walk_figure
 from ppafo.walking.motion import person_remarks, walk_of
 from ppafo.walking.planning import law_of
 from ppafo.walking.result import WALK_FORMAT, WalkResult
+from ppafo.walking.safety_events import event_lines, failure_times
 from ppafo.walking.strides import PHASES
 from ppafo.walking.walk import WalkComparison
 
@@ -322,9 +322,11 @@ def per_stride_values(metrics: Mapping[str, Metric]) -> dict[str, float | None]:
 
 
 def first_lines(worn: WalkResult, verdict: Tracking | None) -> list[str]:
-    """Return that the torque does not follow, where it does not, and the gains in force with where they come from."""
+    """Return how the torque follows what is requested, and the gains in force with their origin."""
     in_force = gains_of(worn.scenario, law_of(worn.scenario))
-    return [side.sentence for side in (verdict, in_force) if side is not None]
+    follows = following_text(worn) if verdict is None and "strides" in worn.metrics else ""
+    said = [follows if verdict is None else verdict.sentence, "" if in_force is None else in_force.sentence]
+    return [sentence for sentence in said if sentence]
 
 
 def strides_csv(result: WalkResult) -> bytes:

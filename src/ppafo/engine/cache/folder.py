@@ -7,7 +7,7 @@ from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 
-from ppafo.errors import reason
+from ppafo.wording import reason
 
 CACHE_VARIABLE = "PPAFO_CACHE_DIR"
 TEXTS = "made"

@@ -25,7 +25,7 @@ from ppafo.engine.cache.folder import LOCK, cache_folder, refusal
 from ppafo.engine.cache.kept import CHECKSUMS, RequestedProgram, is_kept, load_kept_module, remove
 from ppafo.engine.cache.tidying import PROGRAM, entries_named, evict
 from ppafo.engine.compilers import Compiler, Effort
-from ppafo.errors import reason
+from ppafo.wording import reason
 
 # One process compiles a program while others wait for it.
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from ppafo.documents.regular_file import read_regular_file
 from ppafo.engine.cache.folder import LEFT_OUT_FOR, LOCK, NOTE, TEXTS
 from ppafo.engine.cache.kept import remove
-from ppafo.errors import one_line
+from ppafo.wording import one_line
 
 LONGEST_UNUSED = 90.0 * 86400.0
 """Seconds after which a program or text that no run has used is removed: about a season."""

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib.resources import files
 
 from ppafo.arguments.door import argument_text
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.exports import filled, template
 from ppafo.exports.c_library.files import library_files
 from ppafo.exports.fmu.description import build_description_of_fmi3, description_of_fmi2, description_of_fmi3
@@ -17,6 +17,7 @@ from ppafo.exports.fmu.platforms import FLAGS, PLATFORMS, build, host_platform
 from ppafo.exports.fmu.trial import check_unit
 from ppafo.exports.fmu.variables import tuning_of, variability_of
 from ppafo.version import __version__
+from ppafo.wording import nearest_name
 
 _FIRST_DAY = (1980, 1, 1, 0, 0, 0)
 """The earliest date of a zip file: a unit does not depend on the day on which it was made."""

@@ -12,11 +12,12 @@ from typing import Any, final
 
 import numpy as np
 
-from ppafo.errors import DataError, reason
+from ppafo.errors import DataError
 from ppafo.exports.hil import wire
 from ppafo.signals import CHANNELS as KNOWN
 from ppafo.signals import Channel, Recording, RecordingKind
 from ppafo.storage.comma_separated import mark_of
+from ppafo.wording import reason
 
 MOST_SAMPLES = 5_000_000
 ASIDE = ".recording"

@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, Protocol, final
 
 from ppafo.arguments.door import argument_text
-from ppafo.errors import ScenarioError, one_line, reason
+from ppafo.errors import ScenarioError
+from ppafo.wording import one_line, reason
 
 try:
     from termios import error as TerminalError  # noqa: N812 - an exception, by a name in lower case

@@ -11,6 +11,7 @@ import numpy as np
 from ppafo.errors import DataError, raise_noted
 from ppafo.gait.gait import HARMONICS, FitError
 from ppafo.gait.recorded.footfalls import Stride
+from ppafo.gait.recorded.mapping import setting_text
 from ppafo.gait.recorded.walk import Signal, acceleration_of
 from ppafo.signals.recording import Floats
 
@@ -24,7 +25,6 @@ REMARKED_MISFIT, REFUSED_MISFIT = 0.03, 0.1
 """RMS residual of the series over the range [-] that is remarked, and refused; below 0.01 for true curves."""
 _UNLOADED_PHASE = 0.02
 """Fraction of the stride at either end of the stance with too little force for a centre of pressure."""
-_REMEDY = "smooth the recording (--low-pass '6 Hz'), or give better or more strides"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,49 +81,37 @@ def over_strides(name: str, curves: Floats, strides: Sequence[Stride]) -> CurveS
     return CurveStatistics(curves, mean, deviation, tuple(strides))
 
 
-@dataclass(frozen=True, slots=True)
-class _Scatter:
-    """Spread and misfit of one curve as fractions of its range."""
-
-    name: str
-    spread: float
-    misfit: float
-
-
 def check_scatter(
     curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], walk: Mapping[str, Signal]
 ) -> None:
     """Raise DataError for curves that scatter by a quarter of their range, or that no series fits."""
-    raise_noted(
-        [
-            DataError(
-                f"{walk[scatter.name].file}: {_statement(scatter)}; at most {100.0 * REFUSED_SPREAD:.0f} % and "
-                f"{100.0 * REFUSED_MISFIT:.0f} % are accepted; {_REMEDY}"
-            )
-            for scatter in _scatters(curves, errors)
-            if scatter.spread > REFUSED_SPREAD or scatter.misfit > REFUSED_MISFIT
-        ]
-    )
+    most = f"at most {100.0 * REFUSED_SPREAD:.0f} % and {100.0 * REFUSED_MISFIT:.0f} % are accepted"
+    scatters = _scatters(curves, errors, REFUSED_SPREAD, REFUSED_MISFIT)
+    raise_noted([DataError(f"{walk[name].file}: {said}; {most}; {_remedy()}") for name, said in scatters])
 
 
-def _statement(scatter: _Scatter) -> str:
-    return (
-        f"{scatter.name} differs between strides by {100.0 * scatter.spread:.0f} % of its range and its series misses "
-        f"{100.0 * scatter.misfit:.1f} % (standard deviation, root mean square)"
-    )
-
-
-def _scatters(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> Iterator[_Scatter]:
+def _scatters(
+    curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError], most_spread: float, most_misfit: float
+) -> Iterator[tuple[str, str]]:
+    """Yield the curves whose spread or misfit, as fractions of the range, is above these, and a sentence on each."""
     for name, curve in curves.items():
         moved = float(np.ptp(curve.mean))
-        if moved > 0.0:
-            yield _Scatter(name, curve.spread / moved, errors[name].root_mean_square / moved)
+        if moved <= 0.0:
+            continue
+        spread, misfit = curve.spread / moved, errors[name].root_mean_square / moved
+        if spread > most_spread or misfit > most_misfit:
+            yield (
+                name,
+                f"{name} differs between strides by {100.0 * spread:.0f} % of its range and its series misses "
+                f"{100.0 * misfit:.1f} % (standard deviation, root mean square)",
+            )
+
+
+def _remedy() -> str:
+    return f"smooth the recording ({setting_text('low_pass', 6.0, '6 Hz')}), or give better or more strides"
 
 
 def scatter_remarks(curves: Mapping[str, CurveStatistics], errors: Mapping[str, FitError]) -> list[str]:
     """Return a line on each curve that scatters more than a steady walk does, or that its series misses by more."""
-    return [
-        f"{_statement(scatter)}: that is noise, or the walk is not steady; {_REMEDY}"
-        for scatter in _scatters(curves, errors)
-        if scatter.spread > REMARKED_SPREAD or scatter.misfit > REMARKED_MISFIT
-    ]
+    scatters = _scatters(curves, errors, REMARKED_SPREAD, REMARKED_MISFIT)
+    return [f"{said}: that is noise, or the walk is not steady; {_remedy()}" for _, said in scatters]

@@ -10,10 +10,9 @@ from ppafo.documents.regular_file import decoded
 from ppafo.errors import DataError
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
-from ppafo.storage.comma_separated import SPLIT_NUMBERS
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart, without_copies
+from ppafo.storage.comma_separated import SPLIT_NUMBERS, check_clock
 from ppafo.storage.files import read_bytes
-from ppafo.storage.text_table import check_growing, number_in
+from ppafo.storage.text_table import doubled, number_in, said_of_doubled, told_apart, without_copies
 
 UNSEEN = ("", "nan", "-nan", "n/a", "na", "null")
 """Cells of a sample that was not recorded, in small letters."""
@@ -91,19 +90,13 @@ def rows_of(block: NumberBlock, cells: Cells, clock: Sequence[int] = ()) -> tupl
 
 
 class PerFrame(NamedTuple):
-    """Clock of a table whose column ``name`` counts frames from 1, at a rate [Hz]."""
+    """Clock of a table with a frame in each row, at a rate [Hz]; ``name`` is the column that counts from 1, if any."""
 
     name: str
     rate: float
 
 
-class PerRow(NamedTuple):
-    """Clock of a table with a row for each frame, at a rate [Hz]."""
-
-    rate: float
-
-
-Clock = str | PerFrame | PerRow
+Clock = str | PerFrame
 """Clock of a table: its column of time, or frames at a rate."""
 
 
@@ -125,16 +118,14 @@ def table_of(
     apart = told_apart(written)
     own = iter(apart)
     named = Cells([next(own) if name else "" for name in cells.names], cells.units)
-    timed = "" if isinstance(clock, PerRow) else clock.name if isinstance(clock, PerFrame) else clock
+    timed = clock.name if isinstance(clock, PerFrame) else clock
     at = written.index(timed) if timed else None
     try:
         values, numbers = rows_of(block, named, () if at is None else (at,))
         time: Floats = np.arange(len(values), dtype=np.float64) if at is None else values[:, at]
-        if isinstance(clock, str):
-            time = time * seconds
-        else:
-            time = (time - (1.0 if isinstance(clock, PerFrame) else 0.0)) / clock.rate
-        check_growing(time, numbers)
+        first = 0.0 if at is None else 1.0
+        time = time * seconds if isinstance(clock, str) else (time - first) / clock.rate
+        check_clock(time, numbers, may_have_trials=False)
     except DataError as error:
         raise DataError(f"{path}: {error}") from error
     twins = {name: others for name, others in doubled(written, apart).items() if name != timed}

@@ -12,13 +12,13 @@ from itertools import pairwise
 import numpy as np
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import DataError, count_of
+from ppafo.errors import DataError
 from ppafo.gait.gait import REQUIRED
-from ppafo.gait.plausible import check_shank_range
+from ppafo.gait.plausible_angles import SHANK_RANGE, check_angle_range
 from ppafo.gait.recorded.mapping import Side
 from ppafo.gait.recorded.table import OFF, STRIKE, MotionTable
 from ppafo.gait.recorded.walk import LOADS, CurveColumns, Signal, low_pass, with_absence
-from ppafo.signals.recording import Floats
+from ppafo.wording import count_of
 
 LOADED, UNLOADED = 0.05, 0.03
 """Body weights: above the first the foot is on the ground, below the second it is off it."""
@@ -57,12 +57,11 @@ class Stride:
 
 def strides_from_force(force: Signal) -> list[Stride]:
     """Return the whole strides in a vertical force [body weights]; thresholds with hysteresis, interpolated in time."""
-    contacts = contacts_of(force)
-    strides = []
-    for (start, toe_off), (following, _) in pairwise(contacts):
-        if start is not None and toe_off is not None and following is not None:
-            strides.append(Stride(start, toe_off, following))
-    return strides
+    return [
+        Stride(start, toe_off, following)
+        for (start, toe_off), (following, _) in pairwise(contacts_of(force))
+        if start is not None and toe_off is not None and following is not None
+    ]
 
 
 Contact = tuple[float | None, float | None]
@@ -77,32 +76,23 @@ def contacts_of(force: Signal) -> list[Contact]:
     loaded = decided[before] == 1
     edges = [0, *(np.flatnonzero(np.diff(loaded.astype(int))) + 1).tolist(), loaded.size]
     stretches = list(pairwise(edges))
-    kept = _without_short(force.time, [(first, last) for first, last in stretches if loaded[first]])
-    size = loaded.size
+    time, size = force.time, loaded.size
+    # Short breaks are closed first: a contact in pieces would otherwise be dropped piece by piece.
+    joined: list[tuple[int, int]] = []
+    for first, last in stretches:
+        if not loaded[first]:
+            continue
+        if joined and time[first] - time[joined[-1][1]] < SHORTEST_CONTACT:
+            joined[-1] = joined[-1][0], last
+        else:
+            joined.append((first, last))
     return [
         (
             None if first == 0 else _crossing(force, first, LOADED),
             None if last == size else _crossing(force, last, UNLOADED),
         )
-        for first, last in kept
-    ]
-
-
-def _without_short(time: Floats, contacts: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Return the contacts with short breaks closed, and then without short ones."""
-    # Breaks are closed first: a contact in pieces would otherwise be dropped piece by piece.
-    joined: list[tuple[int, int]] = []
-    for first, last in contacts:
-        if joined and time[first] - time[joined[-1][1]] < SHORTEST_CONTACT:
-            joined[-1] = joined[-1][0], last
-        else:
-            joined.append((first, last))
-    final = time.size - 1
-    at_an_end = (0, time.size)
-    return [
-        (first, last)
         for first, last in joined
-        if first in at_an_end or last in at_an_end or time[min(last, final)] - time[first] >= SHORTEST_CONTACT
+        if first == 0 or last == size or time[last] - time[first] >= SHORTEST_CONTACT
     ]
 
 
@@ -123,7 +113,7 @@ def strides_from_shank(shank: Signal) -> list[Stride]:
     smooth = low_pass(shank, _SMOOTH)
     high, low = float(np.max(smooth.values)), float(np.min(smooth.values))
     # A unit that is wrong would be told as a sign that is.
-    check_shank_range(f"{shank.file}: shank_angle", float(np.degrees(high - low)))
+    check_angle_range(f"{shank.file}: shank_angle", float(np.degrees(high - low)), SHANK_RANGE, is_whole=True)
     peaks = _ends_of_swings(smooth)
     rate = np.gradient(smooth.values, smooth.time)
     strides = []

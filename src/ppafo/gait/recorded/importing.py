@@ -7,21 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, PpafoError, count_of, noted_in, raise_noted
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
 from ppafo.gait.agreement import check_side, delay_remarks, size_remarks
 from ppafo.gait.document import load_gait
 from ppafo.gait.gait import HARMONICS, REQUIRED, FitError, Gait, GaitCurve, Origin, fit_curve
-from ppafo.gait.plausible import (
-    MeanStride,
-    check_force_scale,
-    check_plausible,
-    force_remarks,
-    moment_remarks,
-    sign_remarks,
-    standing_tilt,
-    turning_remarks,
-    zero_remarks,
-)
+from ppafo.gait.mean_stride import MeanStride
+from ppafo.gait.plausible import check_force_scale, check_plausible, force_remarks, moment_remarks
+from ppafo.gait.plausible_angles import sign_remarks, standing_tilt, zero_remarks
+from ppafo.gait.plausible_knee import turning_remarks
 from ppafo.gait.recorded.curves import CurveStatistics, check_scatter, over_strides, scatter_remarks, statistics
 from ppafo.gait.recorded.footfalls import (
     FORCE,
@@ -37,11 +30,12 @@ from ppafo.gait.recorded.footfalls import (
     strides_within,
     usable_strides,
 )
-from ppafo.gait.recorded.mapping import ImportSettings, KneeMap, check_settings
+from ppafo.gait.recorded.mapping import ImportSettings, check_settings, setting_text
 from ppafo.gait.recorded.source import GaitSource, of_largest_one, read_source
 from ppafo.gait.recorded.strides import StrideSelection, of_usual_time, without_drop_outs, without_odd_shapes
 from ppafo.gait.recorded.table import LONGEST_FILLED, MotionTable
-from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, lost_span, low_pass
+from ppafo.gait.recorded.walk import LOADS, Signal, check_way, knee_remarks, low_pass
+from ppafo.wording import count_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,13 +68,19 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
     wrong: list[PpafoError] = []
     source = read_source(files, settings, wrong)
     settings = source.settings
-    walk = _with_sound_force(source, wrong)
-    footfalls = None
+    walk, footfalls = dict(source.walk), None
+    if FORCE in walk:
+        try:
+            check_force_scale(walk[FORCE].file, walk[FORCE].values, source.signs_from)
+        except DataError as error:
+            wrong.append(error)
+            # Scaled to 1, so that its events are still found.
+            walk[FORCE] = of_largest_one(walk[FORCE], is_upwards=True)
     with noted_in(wrong):
         footfalls = find_footfalls(walk, source.tables, settings.side, settings.least_strides)
     if footfalls is None:
         raise_noted(wrong)
-    walk = footfalls.walk
+    walk = dict(footfalls.walk)
     strides = _steady_strides(footfalls, settings, wrong)
     covered = {name: strides_of_curve(footfalls, name, signal, strides.taken) for name, signal in walk.items()}
     # A load that no plate measured for a whole stance would otherwise look like one whose file is too short.
@@ -98,19 +98,6 @@ def import_gait(files: Sequence[str | Path], settings: ImportSettings) -> Import
         raise_noted(wrong)
     walk = {name: signal for name, signal in walk.items() if name in curves}
     return _finish(source, replace(footfalls, walk=walk), curves, strides, remarks, wrong)
-
-
-def _with_sound_force(source: GaitSource, wrong: list[PpafoError]) -> Mapping[str, Signal]:
-    """Return the signals; a force in a wrong unit is noted, and scaled to 1 so that its events are still found."""
-    force = source.walk.get(FORCE)
-    if force is None:
-        return source.walk
-    try:
-        check_force_scale(force.file, force.values, source.signs_from)
-    except DataError as error:
-        wrong.append(error)
-        return {**source.walk, FORCE: of_largest_one(force, is_upwards=True)}
-    return source.walk
 
 
 def _steady_strides(footfalls: Footfalls, settings: ImportSettings, wrong: list[PpafoError]) -> StrideSelection:
@@ -172,15 +159,17 @@ def _finish(
 ) -> ImportedGait:
     """Return the gait of mean curves that legs can have; DataError where any cannot, with everything in ``wrong``."""
     taken, walk, settings, signs_from = strides.taken, footfalls.walk, source.settings, source.signs_from
-    share, time = (
-        float(np.mean([stride.stance_share for stride in taken])),
-        float(np.mean([stride.time for stride in taken])),
-    )
+    share, time = (float(np.mean([getattr(each, name) for each in taken])) for name in ("stance_share", "time"))
     means = {name: curve.mean for name, curve in curves.items()}
     fitted = {name: fit_curve(curve.mean, HARMONICS[name], curve.spread) for name, curve in curves.items()}
     errors = {name: error for name, (_, error) in fitted.items()}
     files = {name: signal.file for name, signal in walk.items()}
-    mean_stride = MeanStride(files, means, share, time, signs_from, _is_one_marker(source.columns.knee))
+    # Both coordinates of the knee may be from one marker, whose unit is one.
+    knee, is_one_marker = source.columns.knee, False
+    if knee is not None and knee.thigh is None and len(knee.forward) == len(knee.up) == 1:
+        forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
+        is_one_marker = forward == up != ""
+    mean_stride = MeanStride(files, means, share, time, signs_from, is_one_marker)
     with noted_in(wrong):
         check_scatter(curves, errors, walk)
     with noted_in(wrong):
@@ -192,7 +181,7 @@ def _finish(
     raise_noted(wrong)
     gait = _gait(settings, source.tables, taken, {name: curve for name, (curve, _) in fitted.items()}, footfalls.events)
     said = [*remarks, *_remarks(curves, strides, footfalls.events)]
-    said += knee_remarks(source.columns.knee, walk, settings.stature)
+    said += knee_remarks(knee, walk, settings.stature)
     said += sign_remarks(means["shank_angle"], means["ankle_angle"])
     said += moment_remarks(means["ankle_moment"]) if "ankle_moment" in means else []
     said += turning_remarks(mean_stride)
@@ -201,8 +190,9 @@ def _finish(
     tilt = standing_tilt(means["shank_angle"], means["ankle_angle"])
     sign, taken_off = source.columns.ankle_angle.sign_and_neutral()
     # The reading of the file that would be neutral.
-    neutral = f"{float(np.degrees(taken_off)) + sign * tilt:.1f} deg"
-    said += zero_remarks(tilt, f"--ankle-neutral '{neutral}', or ankle_angle.neutral in a gait map, corrects it")
+    neutral = float(np.degrees(taken_off)) + sign * tilt
+    given = setting_text("ankle_neutral", math.radians(neutral), f"{neutral:.1f} deg")
+    said += zero_remarks(tilt, f"{given}, or ankle_angle.neutral in a gait map, corrects it")
     said += scatter_remarks(curves, errors)
     names = tuple(table.file for table in source.tables)
     return ImportedGait(
@@ -217,14 +207,6 @@ def _finish(
     )
 
 
-def _is_one_marker(knee: KneeMap | None) -> bool:
-    """Tell whether a map takes both coordinates of the knee from one marker, whose unit is one."""
-    if knee is None or knee.thigh is not None or len(knee.forward) != 1 or len(knee.up) != 1:
-        return False
-    forward, up = (terms[0].removeprefix("-").rpartition(".")[0] for terms in (knee.forward, knee.up))
-    return forward == up != ""
-
-
 def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[str, Signal]) -> None:
     """Raise DataError for fewer strides than are needed; ``usable`` are all that the events show."""
     taken, least = len(strides.taken), strides.least
@@ -233,13 +215,24 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
     spans = ", ".join(f"{name} {signal.time[0]:.4g} to {signal.time[-1]:.4g} s" for name, signal in walk.items())
     count = count_of(taken, "whole stride")
     where = FORCE if FORCE in walk else SHANK
-    events = f"{len(usable)} in the events" if usable else _said_of_no_stride(where, walk)
-    fewer = ", or accept fewer with --minimum-strides" if taken else ""
-    longest = max(lost_span(signal) for signal in walk.values())
+    events = f"{len(usable)} in the events"
+    if not usable:
+        strikes = heel_strikes(where, walk)
+        if strikes:
+            events = f"the only heel strike in {where} is at {strikes[0]:.3g} s, and a stride ends with the next one"
+        elif where == FORCE and any(off is not None for _, off in contacts_of(walk[FORCE])):
+            events = f"no heel strike in {where}: the foot stands at the start, and a strike has a swing before it"
+        else:
+            events = f"no heel strikes were found in {where}: is it the right column?"
+    fewer = f", or accept fewer with {setting_text('least_strides')}" if taken else ""
+    # From the last sample before the longest gap to the first one after it.
+    longest = max(
+        0.0 if signal.lost is None else float(np.max(np.diff(signal.time[~signal.lost]))) for signal in walk.values()
+    )
     if longest > 0.0:
         # Rounded up, so that the value in the remedy fills the gap.
         needed = math.ceil(100.0 * longest - 1e-6) / 100.0
-        filled = f"fill the gaps (--fill-gaps '{needed:g} s')"
+        filled = f"fill the gaps ({setting_text('longest_gap', needed, f'{needed:g} s')})"
         remedy = filled if needed <= LONGEST_FILLED else f"the longest gap of {longest:.3g} s cannot be filled"
         raise DataError(
             f"{walk['shank_angle'].file}: has {count} without a lost sample, {least} are needed; {remedy}"
@@ -249,16 +242,6 @@ def _check_enough(strides: StrideSelection, usable: list[Stride], walk: Mapping[
         f"{walk['shank_angle'].file}: has {count} within angles and events ({events}; {spans}), {least} are needed; "
         f"give a longer recording{fewer}"
     )
-
-
-def _said_of_no_stride(where: str, walk: Mapping[str, Signal]) -> str:
-    """Return why the events of a force or a shank make no stride: none, one alone, or none with a swing before it."""
-    strikes = heel_strikes(where, walk)
-    if strikes:
-        return f"the only heel strike in {where} is at {strikes[0]:.3g} s, and a stride ends with the next one"
-    if where == FORCE and any(off is not None for _, off in contacts_of(walk[FORCE])):
-        return f"no heel strike in {where}: the foot stands at the start, and a strike has a swing before it"
-    return f"no heel strikes were found in {where}: is it the right column?"
 
 
 def _spread(values: Sequence[float]) -> float:
@@ -328,7 +311,7 @@ def _sampling_remarks(walk: Mapping[str, Signal], strides: Sequence[Stride]) -> 
     if scatter > _NOISY_FORCE:
         said.append(
             f"the vertical force scatters by {scatter:.2g} body weights while the foot is in the air: events are found "
-            "at 0.05 and 0.03; a low pass of the plate, or --low-pass, makes them surer"
+            f"at 0.05 and 0.03; a low pass of the plate, or {setting_text('low_pass')}, makes them surer"
         )
     return said
 
@@ -346,4 +329,4 @@ def _remarks(curves: Mapping[str, CurveStatistics], strides: StrideSelection, ev
     if "vertical_force" in curves:
         return remarks + force_remarks(curves["vertical_force"].mean)
     less = ": heel strikes and toe-offs come from the shank and are less exact" if events == SHANK else ""
-    return [*remarks, f"no vertical force{less}; a column of another name needs a gait map (--map)"]
+    return [*remarks, f"no vertical force{less}; a column of another name needs a gait map ({setting_text('columns')})"]

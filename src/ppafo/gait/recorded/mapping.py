@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from ppafo.arguments.door import argument_text
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, make_schema, read_model
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind
@@ -170,7 +171,7 @@ def unsaid_axes(columns: GaitMap) -> list[str]:
 Side = Literal["right", "left"]
 
 
-def package_map(_side: Side) -> GaitMap:
+def package_map() -> GaitMap:
     """Return the map of a CSV file whose columns have the names and signs of the package."""
     return GaitMap(
         shank_angle=ShankMap(terms=("shank_angle",)),
@@ -209,9 +210,6 @@ def json_schema() -> dict[str, Any]:
     return make_schema(GaitMap, "ppafo gait map")
 
 
-_NAME = "imported-gait"
-
-
 @dataclass(frozen=True, slots=True)
 class ImportSettings:
     """Settings of an import: body mass [kg], side, speed [m/s], map, low pass [Hz], least number of strides.
@@ -229,7 +227,7 @@ class ImportSettings:
     walking_speed: float | None = None
     low_pass: float | None = None
     least_strides: int | None = None
-    name: str = _NAME
+    name: str = "imported-gait"
     title: str = ""
     stature: float | None = None
     start: float | None = None
@@ -237,6 +235,21 @@ class ImportSettings:
     longest_gap: float = 0.0
     ankle_neutral: float | None = None
     form: str = ""
+
+
+_OPTIONS = {"columns": "--map", "least_strides": "--minimum-strides", "longest_gap": "--fill-gaps"}
+"""Options of ``ppafo gait import`` that are not called as the settings."""
+
+
+def setting_text(name: str, value: float | None = None, shown: str = "") -> str:
+    """Return a setting as who called writes it, with its value [SI], ``shown`` with a unit where it is an option.
+
+    >>> setting_text("least_strides"), setting_text("low_pass", 6.0, "6 Hz")
+    ('least_strides', 'low_pass=6')
+    """
+    text = argument_text(name, shown, _OPTIONS.get(name, ""))
+    # A field of ``ImportSettings`` is a plain number, and no text with a unit.
+    return text if value is None or text.startswith("--") else f"{name}={value:.4g}"
 
 
 def check_settings(settings: ImportSettings) -> None:

@@ -6,17 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from ppafo.errors import DataError, PpafoError, nearest_name, noted_in, one_line, raise_noted
-from ppafo.gait.plausible import SignSource
+from ppafo.errors import DataError, PpafoError, noted_in, raise_noted
+from ppafo.gait.mean_stride import SignSource
 from ppafo.gait.recorded.footfalls import FORCE, force_of_plates
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.markers import convention_of_map
-from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names
+from ppafo.gait.recorded.mapping import GaitMap, ImportSettings, Side, column_names, setting_text
 from ppafo.gait.recorded.table import MotionTable, cut_table, fill_gaps, without_lost_markers
-from ppafo.gait.recorded.walk import LOADS, Signal, Subject, walk_signals
+from ppafo.gait.recorded.walk import LOADS, Signal, walk_signals
 from ppafo.kinds import Kinds
 from ppafo.storage.frames import written_as_csv
 from ppafo.units import format_quantity
+from ppafo.wording import nearest_name, one_line
 
 # The forms of gait recordings, tables of files in any of them, and the one map of files that come without one.
 
@@ -138,9 +139,9 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
         tables = [FORMS[table.form].arrange(table) for table in tables]
     settings, said = _with_subject(settings, tables, wrong)
     # Without a body mass loads are looked at per kg of 1 kg, and scaled to 1 below.
-    person = Subject(settings.body_mass or 1.0, settings.stature)
+    body_mass = settings.body_mass or 1.0
     convention = (
-        find_convention(tables, settings.side, person.body_mass)
+        find_convention(tables, settings.side, body_mass)
         if settings.columns is None
         else convention_of_map(settings.columns, tables, settings.side)
     )
@@ -154,12 +155,12 @@ def read_source(files: Sequence[str | Path], settings: ImportSettings, wrong: li
     names = [column.removeprefix("-") for terms in used.values() for column in terms]
     moved = [column.removeprefix("-") for name, terms in used.items() if name not in LOADS for column in terms]
     tables = [fill_gaps(without_lost_markers(table, moved), names, settings.longest_gap) for table in tables]
-    walk = walk_signals(tables, columns, person, settings.columns is None, wrong)
+    walk = walk_signals(tables, columns, body_mass, settings.stature, settings.columns is None, wrong)
     if settings.body_mass is None:
         walk |= {name: of_largest_one(walk[name]) for name in ("ankle_moment", FORCE) if name in walk}
     if convention.plates and FORCE not in walk and settings.body_mass is not None:
         with noted_in(wrong):
-            force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], person.body_mass)
+            force, more = force_of_plates(tables, convention.plates, walk["shank_angle"], body_mass)
             walk |= {} if force is None else {FORCE: force}
             said += more
     mended = [f"{Path(table.file).name}: {remark}" for table in tables for remark in table.remarks]
@@ -189,8 +190,9 @@ def _with_subject(
     if settings.body_mass is None and not masses:
         wrong.append(
             DataError(
-                f"{tables[0].file}: does not state the body mass; give it, such as --body-mass '62 kg' (until then "
-                "loads are taken relative to their largest value)"
+                f"{tables[0].file}: does not state the body mass; give it, such as "
+                f"{setting_text('body_mass', 62.0, '62 kg')} (until then loads are taken relative to their largest "
+                "value)"
             )
         )
     elif settings.body_mass is None:

@@ -109,31 +109,26 @@ def without_drop_outs(
 
 def constant_stretches(time: Floats, values: Floats, spans: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
     """Return start and end [s] of all stretches with one value that cover more than 0.1 s of the spans."""
-    steps = np.diff(values)
+    steps = np.abs(np.diff(values))
     # A gap ends a stretch, too, but a column with gaps alone never moves.
     moves = np.flatnonzero(steps != 0.0)
-    if not np.any(np.abs(steps) > 0.0):
+    if not np.any(steps > 0.0):
         return []
+    # Rounding makes equal steps of a sensor differ in the last digits.
+    smallest = 1.001 * float(np.min(steps[steps > 0.0]))
+    is_coarse = smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values))
     starts, ends = np.concatenate([[0], moves + 1]), np.concatenate([moves, [values.size - 1]])
     long = time[ends] - time[starts] > LONGEST_HELD
     stretches = []
     for first, last in zip(starts[long].tolist(), ends[long].tolist(), strict=True):
         start, end = float(time[first]), float(time[last])
         inside = sum(max(0.0, min(end, high) - max(start, low)) for low, high in spans)
-        if inside > LONGEST_HELD and not _by_coarse_steps(values, first, last):
+        # A coarse sensor rests at a value that it enters and leaves by a few of its smallest steps.
+        beside = [float(steps[place]) for place in (first - 1, last) if 0 <= place < steps.size]
+        by_coarse_steps = is_coarse and max(beside) <= _STEPS_OF_REST * smallest
+        if inside > LONGEST_HELD and not by_coarse_steps:
             stretches.append((start, end))
     return stretches
-
-
-def _by_coarse_steps(values: Floats, first: int, last: int) -> bool:
-    """Return whether the value changes by a few of a coarse sensor's smallest steps on both sides of a stretch."""
-    steps = np.abs(np.diff(values))
-    # Rounding makes equal steps of a sensor differ in the last digits.
-    smallest = 1.001 * float(np.min(steps[steps > 0.0]))
-    beside = [float(steps[place]) for place in (first - 1, last) if 0 <= place < steps.size]
-    return (
-        smallest > _COARSE * float(np.nanmax(values) - np.nanmin(values)) and max(beside) <= _STEPS_OF_REST * smallest
-    )
 
 
 def without_odd_shapes(curves: Mapping[str, CurveStatistics], strides: StrideSelection) -> StrideSelection:

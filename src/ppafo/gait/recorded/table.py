@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ppafo.arguments.door import argument_text
 from ppafo.errors import DataError
 from ppafo.signals.recording import Floats
 
@@ -16,6 +17,12 @@ STRIKE, OFF = "foot strike", "foot off"
 AXES = "xyz"
 _COORDINATES = (".x", ".y", ".z")
 """Ends of the columns of a marker, ``LABEL.x``."""
+
+
+def bare_label(label: str) -> str:
+    """Return a marker's label without the subject's name before a colon."""
+    return label.rpartition(":")[2].strip()
+
 
 Events = dict[tuple[str, str], list[float]]
 
@@ -88,7 +95,7 @@ def cut_table(
     if not inside.any():
         raise DataError(
             f"{table.file}: has no samples from {low:g} to {high:g} s; the recording covers {table.time[0]:g} to "
-            f"{table.time[-1]:g} s: choose --start and --end within that"
+            f"{table.time[-1]:g} s: choose {argument_text('start')} and {argument_text('end')} within that"
         )
     columns = {name: values[inside] for name, values in table.columns.items()}
     return replace(table, time=table.time[inside], columns=columns)

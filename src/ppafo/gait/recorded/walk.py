@@ -15,28 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_GRAVITY
-from ppafo.errors import (
-    DataError,
-    PpafoError,
-    UnitError,
-    noted_in,
-    one_line,
-    raise_noted,
-    refused_as,
-)
+from ppafo.errors import DataError, PpafoError, UnitError, noted_in, raise_noted, refused_as
 from ppafo.gait.gait import HARMONICS, REQUIRED, fit_curve
-from ppafo.gait.plausible import SHANK_RANGE, SignSource, other_sign
+from ppafo.gait.mean_stride import SignSource, other_sign
+from ppafo.gait.plausible_angles import SHANK_RANGE
 from ppafo.gait.recorded.mapping import (
     AngleMap,
     GaitMap,
     KneeMap,
     ShankMap,
     column_names,
+    setting_text,
 )
 from ppafo.gait.recorded.near_columns import nearest_column
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.signals.recording import Floats
 from ppafo.units import parse_quantity, to_si
+from ppafo.wording import one_line
 
 _MINIMUM_SAMPLES = 20
 """Samples without which a low pass has no inside."""
@@ -145,7 +140,8 @@ class CurveColumns:
         unit = stated or self.table.units[name]
         values = self.table.columns[name]
         if not unit:
-            raise DataError(f"{where}: the file does not state its unit; give {self.unit_key} in a gait map (--map)")
+            a_map = f"a gait map ({setting_text('columns')})"
+            raise DataError(f"{where}: the file does not state its unit; give {self.unit_key} in {a_map}")
         given = "" if unit == "-" else unit
         problem = ""
         for si_unit in si_units:
@@ -163,13 +159,6 @@ def check_recorded(values: Floats, where: str) -> None:
     """Raise DataError for a column without a number; ``where`` is its name in the message."""
     if not np.isfinite(values).any():
         raise DataError(f"{where} contains no numbers; use another file, or map another column")
-
-
-def lost_span(signal: Signal) -> float:
-    """Length of the longest gap of a motion [s], from the last sample before it to the first one after it."""
-    if signal.lost is None:
-        return 0.0
-    return float(np.max(np.diff(signal.time[~signal.lost])))
 
 
 def find_columns(
@@ -201,7 +190,7 @@ def _why_missing(curve: str, bare: Sequence[str], tables: Sequence[MotionTable])
         either = " or ".join(repr(_whole(name)) for name in twins if name[-2:] not in (".y", ".z"))
         raise DataError(
             f"{curve}: {files} has {_whole(missing)!r} more than once, and they differ: choose one, "
-            f"{either}, in a gait map (--map)"
+            f"{either}, in a gait map ({setting_text('columns')})"
         )
     hint = nearest_column(missing, known)
     return f"{curve}: " + (
@@ -219,7 +208,8 @@ def _said_of_columns(tables: Sequence[MotionTable]) -> str:
     )
     files = ", ".join(table.file for table in tables)
     listed = "; ".join([shorten(shown, _LONGEST_SAID, placeholder=" ..."), *said])
-    return f"({files}: {listed}); name the columns in a gait map (--map), 'ppafo doctor --schema gait-map'"
+    a_map = f"a gait map ({setting_text('columns')}), 'ppafo doctor --schema gait-map'"
+    return f"({files}: {listed}); name the columns in {a_map}"
 
 
 def _whole(name: str) -> str:
@@ -340,8 +330,10 @@ def knee_remarks(mapped: KneeMap | None, walk: Mapping[str, Signal], stature: fl
     if mapped is None:
         return []
     if "knee_forward" not in walk:
-        what = "no acceleration of the knee: it needs a length of the thigh; give --stature, or a gait map with "
-        return [f"{what}knee.thigh_length"] if mapped.thigh is not None else []
+        missing = (
+            f"it needs a length of the thigh; give {setting_text('stature')}, or a gait map with knee.thigh_length"
+        )
+        return [f"no acceleration of the knee: {missing}"] if mapped.thigh is not None else []
     remarks = []
     if mapped.thigh is not None and mapped.thigh_length is None:
         remarks.append(
@@ -398,18 +390,17 @@ def _thigh_length(mapped: KneeMap, stature: float | None) -> float:
 _RIGHT_ANGLE = 0.5 * np.pi
 
 
-@dataclass(frozen=True, slots=True)
-class Subject:
-    """Body mass [kg], by which moments and forces are divided, and stature [m], which gives the length of the thigh."""
-
-    body_mass: float
-    stature: float | None = None
-
-
 def walk_signals(
-    tables: Sequence[MotionTable], columns: GaitMap, person: Subject, is_default: bool, wrong: list[PpafoError]
+    tables: Sequence[MotionTable],
+    columns: GaitMap,
+    body_mass: float,
+    stature: float | None,
+    is_default: bool,
+    wrong: list[PpafoError],
 ) -> dict[str, Signal]:
     """Return the signals that a map finds in tables; all that is wrong with their columns is added to ``wrong``.
+
+    Loads are per ``body_mass`` [kg], and the ``stature`` [m] gives the length of the thigh.
 
     With a convention of the package (``is_default``) only both angles have to be there; what a map of the user names
     has to be there. A motion goes from its first number to its last, a load is 0 where it was not measured. DataError
@@ -435,7 +426,7 @@ def walk_signals(
             if found is None:
                 continue
             if not isinstance(mapped, AngleMap) or mapped.terms is not None:
-                signal = _curve_of(name, found, mapped, person.body_mass)
+                signal = _curve_of(name, found, mapped, body_mass)
             elif "shank_angle" in walk:
                 signal = foot_markers_angle(found, mapped, walk["shank_angle"])
             else:
@@ -446,7 +437,7 @@ def walk_signals(
             # Nothing else that is wrong matters in what is no walk.
             check_walks(walk[name], found, mapped)
     with noted_in(wrong):
-        knee = {} if columns.knee is None else knee_signals(columns.knee, tables, person.stature, is_default)
+        knee = {} if columns.knee is None else knee_signals(columns.knee, tables, stature, is_default)
         walk |= {name: without_ends(signal) for name, signal in knee.items()}
     if any(name not in walk for name in REQUIRED):
         raise_noted(wrong)

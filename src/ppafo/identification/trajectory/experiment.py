@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from ppafo.errors import IdentificationError, nearest_name
+from ppafo.errors import IdentificationError
 from ppafo.identification.source import UsedRecording
 from ppafo.signals import Recording
 from ppafo.simulation.recorded.channels import (
@@ -24,6 +24,7 @@ from ppafo.simulation.recorded.inputs import between_stops, with_highest_supply
 from ppafo.simulation.recorded.replay import replay_control
 from ppafo.simulation.recorded.rest import value_at_rest
 from ppafo.simulation.scenario import FreeMotion, Scenario, Sensors, vane_motion, with_control
+from ppafo.wording import nearest_name
 
 FITTED_CHANNELS = ("angle", "pressure_1", "pressure_2")
 """Channels compared with a recording [rad], [Pa], [Pa]."""

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
-from ppafo.errors import IdentificationError, first_twice, nearest_name
+from ppafo.errors import IdentificationError
 from ppafo.identification.source import double_use
 from ppafo.identification.trajectory.experiment import FittedExperiment, check_experiment, use_of
 from ppafo.identification.trajectory.numbers import FitNumber, FreeParameter, number_of
+from ppafo.wording import first_twice, nearest_name
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from ppafo.errors import DataError, IdentificationError, ScenarioError, nearest_name
+from ppafo.errors import DataError, IdentificationError, ScenarioError
 from ppafo.identification.estimate import Estimate, interval_factor
 from ppafo.identification.keys import positive_in, quantity_in
 from ppafo.identification.source import RecordingSource, UsedRecording, double_use, told_of_readings
@@ -40,6 +40,7 @@ from ppafo.simulation.recorded.replay import locked_vane, replay_scenario, with_
 from ppafo.simulation.recorded.rest import start_of
 from ppafo.simulation.recorded.usual_errors import deviation_of_limit
 from ppafo.simulation.scenario import Scenario
+from ppafo.wording import nearest_name
 
 _NOISE_UNITS = {"angle": "rad", "pressure_1": "Pa_d", "pressure_2": "Pa_d"}
 

@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator
 
 from ppafo.constants import UNIVERSAL_GAS_CONSTANT
-from ppafo.errors import ParameterError, UnitError, count_of
+from ppafo.errors import ParameterError, UnitError
 from ppafo.model.effects.second_virial import SECOND_VIRIAL
 from ppafo.model.gas import SPECIES
 from ppafo.parameters.audit.evidence import AuditFinding, ComparedNumber, Evidence
@@ -14,6 +14,7 @@ from ppafo.parameters.declaration import is_within
 from ppafo.parameters.parameter_set import entry_in_si, number_in_si, number_text
 from ppafo.parameters.publications.publication import FILE, read_publication
 from ppafo.units import to_si
+from ppafo.wording import count_of
 
 # Is every value that has the key of a published statement the number that this states?
 

@@ -20,7 +20,7 @@ from ppafo.constants import GRAMS_PER_KILOGRAM
 from ppafo.documents.models import SchemaVersion, make_schema, optional, read_model, table
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as, said_missing
+from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.cold_gas import ColdSupply, Passage
 from ppafo.model.declaration import Quantity, range_rule
 from ppafo.model.gas import SPECIES
@@ -43,6 +43,7 @@ from ppafo.parameters.parts import Part, load_catalogue
 from ppafo.parameters.parts.catalogue import Figure
 from ppafo.units import format_quantity, split_quantity, to_si
 from ppafo.units.shown import shown_text
+from ppafo.wording import nearest_name, said_missing
 
 _FOLDER = resources.files("ppafo.parameters.bottles") / "fluid_tables"
 _SUFFIX = ".json"

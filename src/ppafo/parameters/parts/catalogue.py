@@ -15,11 +15,12 @@ from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.documents.models import SchemaVersion, StrictTable, make_schema, one_of, optional, table, validate
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind, label
-from ppafo.errors import ParameterError, UnitError, nearest_name, refused_as
+from ppafo.errors import ParameterError, UnitError, refused_as
 from ppafo.model.catalog import VALVES
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.declaration import ACTUATOR, AREA_FORM, ORIFICE, SONIC_FORM, is_within, limits_text
 from ppafo.units import to_si
+from ppafo.wording import nearest_name
 
 MASS = Quantity("mass", "kg", "mass of the part, of both valves for a pair", minimum=0.0, maximum=100.0)
 RATING = Quantity(

@@ -16,7 +16,8 @@ from pydantic import Field
 from ppafo.documents.models import SchemaVersion, StrictTable, Text, Texts, make_schema, read_model
 from ppafo.documents.problems import NAME
 from ppafo.documents.toml_text import TomlKind
-from ppafo.errors import ScenarioError, first_twice
+from ppafo.errors import ScenarioError
+from ppafo.wording import first_twice
 
 PAPER = "ppafo-2011"
 """The publication that this package starts from."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ppafo.engine.lanes import Floats
-from ppafo.errors import ScenarioError, nearest_name
+from ppafo.errors import ScenarioError
 from ppafo.model.catalog import find_effects
 from ppafo.model.declaration import Quantity
 from ppafo.parameters.graph import ATMOSPHERE_PATH
@@ -15,6 +15,7 @@ from ppafo.parameters.overrides import either, in_two_forms, one_path
 from ppafo.simulation.declaration import TEXTS, WALL_AREA
 from ppafo.simulation.numbers import ORIFICES, declared_numbers, moving_together, other_form
 from ppafo.simulation.scenario import Scenario
+from ppafo.wording import nearest_name
 
 _TEXTS = (
     *TEXTS,

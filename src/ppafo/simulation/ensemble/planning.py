@@ -20,7 +20,6 @@ from ppafo.simulation.clock import TIMES
 from ppafo.simulation.ensemble.columns import ScenarioColumns
 from ppafo.simulation.motion_kind import MotionKind, RunTimes
 from ppafo.simulation.numbers import declared_numbers, with_numbers
-from ppafo.simulation.plan import plan_runs
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 
@@ -35,27 +34,29 @@ Rule = Callable[[Scenario], tuple[Problem, ...]]
 class ValidRuns:
     """The runs that are left: their places in the ensemble, their columns and clocks; and why others are not.
 
-    Without a ``clock`` it is the scenario's.
+    Without a ``clock``, which is set before anything asks for the scenario, it is the scenario's.
     """
 
     columns: ScenarioColumns
     members: Members
     reasons: dict[int, str]
     clock: RunTimes | None = None
+    _scenario: Scenario | None = None
 
     @property
     def scenario(self) -> Scenario:
-        """The scenario that represents the runs that are left."""
-        # What the clock came to stands in the place of the times that were given.
-        numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
-        scenario, clock = with_numbers(self.columns.base, numbers), self.clock
-        if clock is None:
-            return scenario
-        return replace(
-            scenario,
-            run=replace(scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval),
-            controller=replace(scenario.controller, period=clock.period),
-        )
+        """The scenario that represents the runs that are left, made once for all rules that ask for it."""
+        if self._scenario is None:
+            # What the clock came to stands in the place of the times that were given.
+            numbers = {path: column for path, column in self.columns.values.items() if path not in TIMES}
+            scenario, clock = with_numbers(self.columns.base, numbers), self.clock
+            if clock is not None:
+                run = replace(
+                    scenario.run, duration=clock.duration, step=clock.step, output_interval=clock.output_interval
+                )
+                scenario = replace(scenario, run=run, controller=replace(scenario.controller, period=clock.period))
+            self._scenario = scenario
+        return self._scenario
 
     def at(self, places: Members) -> "ValidRuns":
         """The screen of some of these runs, which writes its reasons to the same place."""
@@ -75,7 +76,7 @@ class ValidRuns:
         for place in np.flatnonzero(bad):
             self.reasons[int(self.members[place])] = line(int(place))
         left = self.at(np.flatnonzero(~bad))
-        self.members, self.columns, self.clock = left.members, left.columns, left.clock
+        self.members, self.columns, self.clock, self._scenario = left.members, left.columns, left.clock, None
 
 
 def screen_columns(columns: ScenarioColumns) -> ValidRuns:
@@ -141,7 +142,7 @@ def _plan_batches(
     """Batches of some runs that ask for one program; what cannot be planned is refused."""
     part = screen.at(places)
     while part.members.size:
-        run, problems = plan_runs(part.scenario)
+        run, problems = part.scenario.motion.motion_kind.plan(part.scenario)
         bad = [problem for problem in problems if np.any(problem[0])]
         if not bad:
             run = run if change is None else change(run)
@@ -172,8 +173,9 @@ def _inconsistent(scenario: Scenario) -> tuple[Problem, ...]:
         first, second = operator.attrgetter(path, other)(scenario.device)
 
         def line(run: int) -> str:
-            unit = declared_numbers(scenario)[path].unit
-            return f"{path} = {at(first, run):.9g} {unit} must be {relation} {other} = {at(second, run):.9g} {unit}"
+            unit, room = declared_numbers(scenario)[path].unit, at(scenario.device.supply.atmospheric_pressure, run)
+            number, limit = (shown_text(at(value, run), unit, ".9g", room) for value in (first, second))
+            return f"{path} = {number} must be {relation} {other} = {limit}"
 
         return np.logical_not(holds), line
 

@@ -189,10 +189,15 @@ def _use_bottle(
     # The line starts at the set pressure.
     gauges = [(0, 1.0)]
     done, first = 0, float(batch.states[regulated, 0].sum())
-    before, until_rest = first, _steps_until_rest(schedule, use.walked, run)
+    before, until_rest = first, count
+    if schedule is not None and schedule.rest > 0.0:
+        until_rest = max(1, round((schedule.walk - use.walked % schedule.walk) / run.step))
     while use.ending is None and done < count:
         meeting = use.met[-1]
-        steps = min(_steps_to_meet(meeting, run.step, every), count - done, until_rest)
+        # More often where much of what is left may flow out between two meetings.
+        largest_flow = max(meeting.offered.largest_flow, _LEAST_FLOW)
+        most = max(1, min(every, int(_LARGEST_DRAW * meeting.state.mass / (largest_flow * run.step))))
+        steps = min(most, count - done, until_rest)
         block.set_parameters(lanes.rows, lanes.parameters(meeting.offered))
         block.advance(steps)
         done, until_rest = done + steps, until_rest - steps
@@ -200,8 +205,10 @@ def _use_bottle(
         time = use.walked + use.rested
         progress(use.walked / 60.0, (walked_before + count * run.step) / 60.0)
         # Divergence first: a gas mass that is no number must not reach the supply.
-        use.ending = _divergence(block.states, states["result.failure_time"], meeting.state, time)
-        if use.ending is not None:
+        failed = float(block.states[states["result.failure_time"], 0])
+        if failed < NEVER_FAILED or not bool(np.isfinite(block.states).all()):
+            message = f"the walk diverged, and {_grams(meeting.state.mass)} were left in the bottle before"
+            use.ending = SupplyEnding(DIVERGED, message, min(time, failed))
             break
         regulated_mass = float(block.states[regulated, 0].sum())
         drawn, before = regulated_mass - before, regulated_mass
@@ -216,7 +223,13 @@ def _use_bottle(
             if time >= schedule.longest:
                 break
             if until_rest <= 0 and schedule.rest > 0.0:
-                _rest(supply, use, min(schedule.rest, schedule.longest - time))
+                rest = min(schedule.rest, schedule.longest - time)
+                parts = max(1, math.ceil(rest / _RESTING))
+                # The bottle warms, and no gas flows.
+                for _ in range(parts):
+                    meeting = use.met[-1]
+                    use.met.append(_met_again(supply, meeting, 0.0, rest / parts, meeting.time + rest / parts))
+                use.rested += rest
                 # Gauges of before the rest say nothing of the bottle that has warmed in it.
                 gauges, until_rest = [(done, 1.0)], round(schedule.walk / run.step)
                 if use.walked + use.rested >= schedule.longest:
@@ -225,42 +238,11 @@ def _use_bottle(
     return block.result(), done
 
 
-def _steps_until_rest(schedule: Schedule | None, walked: float, run: Run) -> int:
-    """Return the steps until a rest is due after a time walked [s], all of the run where there is none."""
-    if schedule is None or schedule.rest <= 0.0:
-        return batch_of(run).clock.step_count
-    return max(1, round((schedule.walk - walked % schedule.walk) / run.step))
-
-
 def _met_again(supply: BottleSupply, meeting: _Meeting, drawn: float, duration: float, time: float) -> _Meeting:
     """Return the supply after ``duration`` [s] in which a mass was drawn [kg], at a time [s]."""
     table, content = supply.bottle.fluid.table, meeting.offered.content
     state = advance_supply(table, supply.line, supply.bottle.supply, meeting.state, content, drawn, duration)
     return _Meeting(time, state, supply.offers(state, content.temperature, drawn))
-
-
-def _rest(supply: BottleSupply, use: _BottleInUse, rest: float) -> None:
-    """Let a bottle warm for a time [s] in which no gas flows."""
-    parts = max(1, math.ceil(rest / _RESTING))
-    for _ in range(parts):
-        meeting = use.met[-1]
-        use.met.append(_met_again(supply, meeting, 0.0, rest / parts, meeting.time + rest / parts))
-    use.rested += rest
-
-
-def _steps_to_meet(meeting: _Meeting, step: float, every: int) -> int:
-    """Return how many steps [of ``step`` s] the lanes go until they meet the supply again, at most ``every``."""
-    largest_flow = max(meeting.offered.largest_flow, _LEAST_FLOW)
-    return max(1, min(every, int(_LARGEST_DRAW * meeting.state.mass / (largest_flow * step))))
-
-
-def _divergence(states: Floats, failure: int, state: SupplyState, time: float) -> SupplyEnding | None:
-    """Return that a walk left what is possible by a time [s], None where it did not; ``state`` is the last before."""
-    failed = float(states[failure, 0])
-    if failed >= NEVER_FAILED and bool(np.isfinite(states).all()):
-        return None
-    message = f"the walk diverged, and {_grams(state.mass)} were left in the bottle before"
-    return SupplyEnding(DIVERGED, message, min(time, failed))
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,11 @@ from ppafo.report.kind import TIME, Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, GREY
 from ppafo.signals.recording import Floats, Recording
-from ppafo.walking.events import acting_phase
 from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES
 from ppafo.walking.figures.mean_stride import ANGLE, WITH, WITHOUT
 from ppafo.walking.motion import walk_of
 from ppafo.walking.result import WalkResult
+from ppafo.walking.safety_events import acting_phase
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,9 +12,9 @@ from ppafo.report.kind import Kind
 from ppafo.report.panels import Mark, Panel, draw_panels
 from ppafo.report.style import BLACK, GREY, VERMILION
 from ppafo.signals.recording import Recording
-from ppafo.walking.events import acting_phase, failure_times
 from ppafo.walking.figures.axes import GAS, GROUND, THIN, TOES, time_axis
 from ppafo.walking.result import WalkResult
+from ppafo.walking.safety_events import acting_phase, failure_times
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

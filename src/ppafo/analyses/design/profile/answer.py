@@ -48,23 +48,6 @@ class SizingMargins:
     gas: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class SizingRemarks:
-    """Remarks on a sized valve.
-
-    ``fails_above`` is a higher pressure [Pa absolute] at which the error limit is exceeded again, ``rated`` the rated
-    pressure [Pa absolute] of its parts, where it works at none and none above was tried. ``is_cold`` is true where a
-    lighter bottle has gas enough and ends before, as it is too cold. ``largest_bottle`` and the ``share`` of the use
-    [-] for which it lasts are there where no bottle is large enough.
-    """
-
-    fails_above: float | None = None
-    rated: float | None = None
-    is_cold: bool = False
-    largest_bottle: Part | None = None
-    share: float = 0.0
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SizedValve:
     """A valve at a supply pressure [Pa absolute] that keeps the error limit: the one with the lightest bottle.
@@ -73,7 +56,8 @@ class SizedValve:
     ``lowest_pressure`` [Pa absolute] is the lowest that works, and ``limit`` what keeps it from being lower. ``gains``
     are the controller's, by path, in SI. Error [N m], gas per repetition [kg], total gas with the reserve [kg];
     ``bottle`` None where none is large enough; ``mass`` [kg] of valve, bottle, regulators, and actuator where one was
-    named. ``curve`` has pressures [Pa absolute], errors [N m] and gas per repetition [kg] with the best gains of each.
+    named. ``remark`` says what is worth knowing of it, empty for nothing; ``curve`` has pressures [Pa absolute], errors
+    [N m] and gas per repetition [kg] with the best gains of each.
     """
 
     valve: Part
@@ -88,23 +72,8 @@ class SizedValve:
     mass: float | None
     margins: SizingMargins | None
     limit: Limit
-    notes: SizingRemarks
+    remark: str
     curve: tuple[Floats, Floats, Floats]
-
-    @property
-    def remark(self) -> str:
-        """The notes in words; empty without any."""
-        notes, said = self.notes, []
-        if notes.fails_above is not None:
-            said.append(f"at {_PRESSURE.text(notes.fails_above)} the error limit is exceeded again")
-        if notes.rated is not None:
-            said.append(f"not tried above {_PRESSURE.text(notes.rated)}, the rated pressure of its parts")
-        if notes.is_cold:
-            said.append("a lighter bottle has enough gas, but gets too cold before the end")
-        if notes.largest_bottle is not None:
-            lasts = f"{notes.largest_bottle.name} lasts for {100 * notes.share:.0f} % of the use"
-            said.append(f"no bottle is large enough: {lasts}")
-        return "; ".join(said)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,7 +160,7 @@ class Sizing:
         }
 
 
-_PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
+PRESSURE = Kind("Supply pressure", "Pa_a", "pressure", ".3g")
 _TORQUE = Kind("Torque", "N m", "torque", ".3g")
 _GAS = Kind("Gas per repetition", "kg", "gas mass", ".3g")
 _MASS = Kind("Mass", "kg", "part mass")
@@ -224,21 +193,21 @@ def pressure_panels(sizing: Sizing) -> list[Panel]:
 
     return [
         Panel(
-            _PRESSURE,
+            PRESSURE,
             torque_kind,
             errors,
             "RMS error, limit dashed",
             legend="figure",
             then=lambda axes: axes.set_ylim(0.0, highest),
         ),
-        Panel(_PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
+        Panel(PRESSURE, _GAS, gases, "Gas per repetition within the limit", then=set_gas),
     ]
 
 
 _HEAD = (
     "valve",
-    ("pressure", _PRESSURE),
-    ("lowest", _PRESSURE),
+    ("pressure", PRESSURE),
+    ("lowest", PRESSURE),
     ("RMS error", _TORQUE),
     ("gas per repetition", _GAS),
     ("total gas", _GAS),
@@ -353,7 +322,7 @@ def _torque_panels(sizing: Sizing) -> list[Panel]:
     marks = [Mark("line", times, profile, (), "prescribed", REFERENCE.colour, prescribed)]
     recording, choice = sizing.recording, sizing.choice
     if recording is not None and choice is not None:
-        label = f"{choice.valve.title} at {_PRESSURE.number(choice.pressure, '.3g')} {_PRESSURE.axis_unit}"
+        label = f"{choice.valve.title} at {PRESSURE.number(choice.pressure, '.3g')} {PRESSURE.axis_unit}"
         colour = _COLOURS[sizing.valves.index(choice) % len(_COLOURS)]
         marks.append(Mark("line", recording.time, recording["torque"], label=label, colour=colour))
     return [Panel(TIME, _TORQUE, marks, then=lambda axes: axes.margins(x=0.0))]
@@ -402,7 +371,7 @@ def suggestion_sentence(sizing: Sizing) -> str:
     cut = 0.0 if choice.margins is None else -choice.margins.torque
     peak = f", with {100.0 * cut:.0f} % of the peak cut off" if cut > 0.0 else ""
     return (
-        f"suggested: {choice.valve.name} at {_PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
+        f"suggested: {choice.valve.name} at {PRESSURE.text(choice.pressure)}{bottle}, the lightest that lasts "
         f"and keeps the error limit{peak}, {_MASS.text(choice.mass or 0.0, '.0f')}; a lower pressure is "
         f"prevented by {LIMITS[choice.limit]}"
     )

@@ -249,6 +249,11 @@ class SizingProblem:
     gain_factors: tuple[float, ...]
 
     @property
+    def atmosphere(self) -> float:
+        """Atmospheric pressure [Pa absolute]."""
+        return self.scenario.device.supply.atmospheric_pressure
+
+    @property
     def torque_constant(self) -> float:
         """Torque constant [m^3] of the actuator."""
         own = self.scenario.device.actuator.torque_constant

@@ -4,8 +4,8 @@ Each pressure is tried with many gains, and some openings, of one valve at once.
 granted about how the error depends on the pressure.
 """
 
+from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import product
 from typing import Any, Literal, final
 
@@ -13,17 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.trials import STREAMS, run_trials
 from ppafo.constants import PASCALS_PER_PSI
 from ppafo.control.catalog import CONTROLLERS
 from ppafo.control.torque_loop import PROPORTIONAL_GAIN
 from ppafo.errors import StudyError
 from ppafo.parameters.parts import Part, rated_pressure
 from ppafo.signals.recording import Floats
+from ppafo.simulation.ensemble import run_ensemble
 from ppafo.simulation.law_signals import IN_SCENARIO
 from ppafo.simulation.numbers import number_at
 from ppafo.simulation.torque_loop import loop_terms
+from ppafo.simulation.tracking import REVERSALS
 from ppafo.studies.draws import seeds_of_noise
+from ppafo.studies.sampling import NOISE
+from ppafo.study.runs import oscillating
 
 Limit = Literal["torque", "flow", "control", "pressure"]
 LIMITS: dict[Limit, str] = {
@@ -34,10 +37,15 @@ LIMITS: dict[Limit, str] = {
 }
 """Quantity that keeps a valve from working at a lower pressure, or at any pressure, in words."""
 ERROR, GAS = "rms_error", "gas_supplied"
+OSCILLATES = "the torque loop oscillates"
 _OPENINGS = ("valve.area", "valve.sonic_conductance")
 
+STREAMS = 16
+"""Noise streams in each of which a limit must be kept, the same for all trials, where sensors are noisy."""
 _SEED = 1
 """Seed of the sensor noise: every pressure that is tried has the same."""
+_AT_ONCE = 16_384
+"""Runs handed over at once: enough to fill the batches of all threads, little enough memory."""
 GRID = 17
 """Pressures of a grid."""
 FINENESS = 0.1 * PASCALS_PER_PSI
@@ -54,43 +62,13 @@ OPENINGS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25, 0.2, 0.15, 0.1, 0.05)
 """Fractions of a valve's opening that are tried, one after the other, for that margin."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ProfileTrials:
-    """RMS error [N m], gas per repetition [kg] and number of the set of gains of trials; all (trials,).
+Trial = NDArray[np.void]
+"""Trials as a structured array of ``TRIAL``."""
+TRIAL = np.dtype([("pressure", np.float64), ("error", np.float64), ("gas", np.float64), ("gains", np.intp)])
+"""Supply pressure [Pa absolute], RMS error [N m], gas per repetition [kg] and number of the set of gains of a trial.
 
-    Error and gas are nan where a run failed.
-    """
-
-    error: Floats
-    gas: Floats
-    gains: NDArray[np.intp]
-
-    def at(self, members: NDArray[np.intp]) -> "ProfileTrials":
-        """Return some of the trials."""
-        return ProfileTrials(self.error[members], self.gas[members], self.gains[members])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Pressures:
-    """Pressures [Pa absolute] (pressures,) that were tried, growing, with the best trial of each.
-
-    ``works`` tells which keep the error limit.
-    """
-
-    pressure: Floats
-    trial: ProfileTrials
-    works: NDArray[np.bool_]
-
-    @property
-    def first(self) -> int | None:
-        """Place of the lowest pressure that works, None where none does."""
-        return int(self.works.argmax()) if self.works.any() else None
-
-    @property
-    def fails_above(self) -> float | None:
-        """A pressure above the lowest that works at which the limit is missed again; None where there is none."""
-        failing = np.flatnonzero(~self.works[self.first :]) if self.first is not None else np.empty(0, dtype=int)
-        return float(self.pressure[(self.first or 0) + failing[0]]) if failing.size else None
+Error and gas are nan where a run failed or oscillated.
+"""
 
 
 @final
@@ -98,48 +76,58 @@ class Trials:
     """Runs trials of a problem and counts the runs and their failures.
 
     ``gain_sets`` (sets, gains) has every combination of the gain factors, one for each gain. ``seeds`` name the streams
-    of noise that every trial meets, its error being the largest and its gas the mean; none where there is no noise.
+    of noise that every trial meets, its error being the largest and its gas the mean, so that trials differ by what is
+    tried and not by luck; none where there is no noise.
     """
 
     def __init__(self, problem: SizingProblem, threads: int | None = None) -> None:
         self.problem = problem
         self.gain_sets: Floats = np.array(list(product(problem.gain_factors, repeat=len(problem.gains))))
         self.runs = 0
-        self.failures: dict[str, int] = {}
+        self.failures: Counter[str] = Counter()
         # The scenario's own seed plays no part, so that two scenarios are judged in the same noise.
         self.seeds = seeds_of_noise([problem.scenario], (), 0, STREAMS, _SEED)
         self._threads = threads
 
-    def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> ProfileTrials:
-        """Return what came of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
+    def run(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> Trial:
+        """Return the trials of a valve at pressures [Pa absolute], with sets of gains and factors on its opening."""
+        scenario, streams, count = self.problem.scenario, max(1, self.seeds.size), pressure.size
         columns = self.columns(valve, pressure, gains, opening)
-        outcome = run_trials(self.problem.scenario, columns, (ERROR, GAS), self.seeds, self._threads)
-        self.runs += outcome.runs
-        for reason in outcome.reasons:
-            self.failures[reason] = self.failures.get(reason, 0) + 1
-        error, gas = outcome.metrics[ERROR].max(axis=0), outcome.metrics[GAS].mean(axis=0)
-        return ProfileTrials(error, gas / self.problem.simulated, gains)
+        error, gas = np.empty((2, streams, count))
+        chunk = max(1, _AT_ONCE // streams)
+        for start in range(0, count, chunk):
+            part = slice(start, start + chunk)
+            tiled = {path: np.tile(values[part], streams) for path, values in columns.items()}
+            if self.seeds.size:
+                tiled[NOISE] = np.repeat(self.seeds, pressure[part].size)
+            # How far a loop may lag is the limit of the design, so that no other number of tracking is asked for.
+            result = run_ensemble(scenario, tiled, (ERROR, GAS, REVERSALS), threads=self._threads)
+            # A loop that oscillates is no design, whatever its error is.
+            turns = oscillating(result.metrics, scenario)
+            error[:, part] = np.where(turns, np.nan, result.metrics[ERROR]).reshape(streams, -1)
+            gas[:, part] = np.where(turns, np.nan, result.metrics[GAS]).reshape(streams, -1)
+            self.runs += turns.size
+            self.failures.update(result.reasons.values())
+            self.failures += Counter({OSCILLATES: int(np.count_nonzero(turns))})
+        trial = np.empty(count, TRIAL)
+        trial["pressure"], trial["gains"] = pressure, gains
+        trial["error"], trial["gas"] = error.max(axis=0), gas.mean(axis=0) / self.problem.simulated
+        return trial
 
-    def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> ProfileTrials:
+    def best(self, valve: Part, pressure: Floats, opening: float = 1.0) -> Trial:
         """Return for each pressure the trial with the best set of gains.
 
         Of those that keep the error limit the one that uses least gas; where none does, the one with the minimum error.
         """
         sets = self.gain_sets.shape[0]
         pressures, gains = np.repeat(pressure, sets), np.tile(np.arange(sets), pressure.size)
-        trial = self.run(valve, pressures, gains, np.full(pressures.size, opening))
-        shape = (pressure.size, sets)
+        trial = self.run(valve, pressures, gains, np.full(pressures.size, opening)).reshape(pressure.size, sets)
         # Infinite for failed runs: argmin would take nan for the smallest.
-        error = np.where(np.isnan(trial.error), np.inf, trial.error).reshape(shape)
+        error = np.where(np.isnan(trial["error"]), np.inf, trial["error"])
         works = error <= self.problem.largest_error
-        gas = np.where(works, trial.gas.reshape(shape), np.inf)
+        gas = np.where(works, trial["gas"], np.inf)
         chosen = np.where(works.any(axis=1), gas.argmin(axis=1), error.argmin(axis=1))
-        return trial.at(np.arange(pressure.size) * sets + chosen)
-
-    def gain_numbers(self, valve: Part, pressure: float, number: int) -> dict[str, float]:
-        """Return the gains of a set in SI, by path, with a valve at a pressure [Pa absolute]."""
-        columns = self.columns(valve, np.array([pressure]), np.array([number]), np.ones(1))
-        return {path: float(columns[path][0]) for path in self.problem.gains}
+        return np.asarray(trial[np.arange(pressure.size), chosen])
 
     def columns(self, valve: Part, pressure: Floats, gains: NDArray[np.intp], opening: Floats) -> dict[str, Floats]:
         """Return the columns of trials in SI: figures of the parts, both supply pressures, gains.
@@ -172,53 +160,50 @@ def highest_pressure(problem: SizingProblem, valve: Part) -> float:
     return min(problem.highest_pressure, rated_pressure(valve, *problem.carried))
 
 
-def try_pressures(trials: Trials, valve: Part) -> Pressures:
-    """Return the pressures that were tried with a valve, the lowest that works to within a tenth of a psi."""
+def try_pressures(trials: Trials, valve: Part) -> Trial:
+    """Return the best trials of a valve, pressure by pressure; the lowest that works is within a tenth of a psi."""
     problem = trials.problem
-    pressure = np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID)
-    tried = _pressures(trials, valve, pressure)
-    if np.isnan(tried.trial.error).all():
+    tried = trials.best(valve, np.linspace(problem.lowest_pressure, highest_pressure(problem, valve), GRID))
+    if np.isnan(tried["error"]).all():
         reason = next(iter(trials.failures), "no reason was given")
         raise StudyError(f"{problem.file}: every run with '{valve.name}' failed; the first: {reason}")
-    while tried.first and tried.pressure[tried.first] - tried.pressure[tried.first - 1] > FINENESS:
-        lower, upper = tried.pressure[tried.first - 1], tried.pressure[tried.first]
+    while first := first_of(works_in(problem, tried)):
+        lower, upper = tried["pressure"][first - 1 : first + 1]
+        if upper - lower <= FINENESS:
+            break
         # Without both ends, which were tried before.
-        finer = _pressures(trials, valve, np.linspace(lower, upper, GRID)[1:-1])
-        both = (tried, finer)
-        pressure = np.concatenate([part.pressure for part in both])
-        trial = ProfileTrials(
-            np.concatenate([part.trial.error for part in both]),
-            np.concatenate([part.trial.gas for part in both]),
-            np.concatenate([part.trial.gains for part in both]),
-        )
-        order = np.argsort(pressure, kind="stable")
-        tried = Pressures(pressure[order], trial.at(order), np.concatenate([part.works for part in both])[order])
+        tried = np.concatenate([tried, trials.best(valve, np.linspace(lower, upper, GRID)[1:-1])])
+        tried = tried[np.argsort(tried["pressure"], kind="stable")]
     return tried
 
 
-def _pressures(trials: Trials, valve: Part, pressure: Floats) -> Pressures:
-    trial = trials.best(valve, pressure)
-    problem = trials.problem
-    works = (trial.error <= problem.largest_error) & (pressure >= peak_pressure(problem))
-    return Pressures(pressure, trial, works)
+def works_in(problem: SizingProblem, tried: Trial) -> NDArray[np.bool_]:
+    """Return which trials keep the error limit and hold the least share of the peak."""
+    return np.asarray((tried["error"] <= problem.largest_error) & (tried["pressure"] >= peak_pressure(problem)))
 
 
-def limit_of(trials: Trials, valve: Part, tried: Pressures) -> Limit:
+def first_of(members: NDArray[np.bool_]) -> int | None:
+    """Return the place of the first that is true; None where none is."""
+    return int(members.argmax()) if members.any() else None
+
+
+def limit_of(trials: Trials, valve: Part, tried: Trial) -> Limit:
     """Return what keeps a valve from a lower pressure, or from working at all.
 
     The torque ceiling where the lowest pressure is near the one that it alone demands. Else larger openings are tried,
     half way between the two (between that one and the highest where none works): where one works, the flow limits.
     """
     problem = trials.problem
+    first = first_of(works_in(problem, tried))
     # The lowest of all that were tried.
-    if tried.first == 0:
+    if first == 0:
         return "pressure"
-    atmosphere, alone = problem.scenario.device.supply.atmospheric_pressure, ceiling_pressure(problem)
-    reached = float(tried.pressure[-1 if tried.first is None else tried.first])
+    atmosphere, alone = problem.atmosphere, ceiling_pressure(problem)
+    reached = float(tried["pressure"][-1 if first is None else first])
     if reached - atmosphere <= NEAR_CEILING * (alone - atmosphere):
         return "torque"
     pressure = np.array([0.5 * (reached + alone)])
-    would_do = any(trials.best(valve, pressure, wider).error[0] <= problem.largest_error for wider in WIDER)
+    would_do = any(trials.best(valve, pressure, wider)["error"][0] <= problem.largest_error for wider in WIDER)
     return "flow" if would_do else "control"
 
 
@@ -226,7 +211,7 @@ def ceiling_pressure(problem: SizingProblem) -> float:
     """Return the pressure [Pa absolute] below which the cut crest alone breaks the error limit; equation (2)."""
     from scipy.optimize import brentq
 
-    atmosphere = problem.scenario.device.supply.atmospheric_pressure
+    atmosphere = problem.atmosphere
     whole = atmosphere + problem.profile.largest / problem.torque_constant
     least = peak_pressure(problem)
     # No root is there to be found where the limit is kept without any torque: brentq needs a change of sign.
@@ -238,8 +223,7 @@ def ceiling_pressure(problem: SizingProblem) -> float:
 
 def peak_pressure(problem: SizingProblem) -> float:
     """Return the pressure [Pa absolute] that holds the least share of the peak; equation (2)."""
-    atmosphere = problem.scenario.device.supply.atmospheric_pressure
-    return atmosphere + LEAST_PEAK * problem.profile.largest / problem.torque_constant
+    return problem.atmosphere + LEAST_PEAK * problem.profile.largest / problem.torque_constant
 
 
 def cut_error(problem: SizingProblem, pressure: float) -> float:
@@ -254,7 +238,7 @@ def cut_error(problem: SizingProblem, pressure: float) -> float:
 
 def ceiling(problem: SizingProblem, pressure: float) -> float:
     """Return the largest torque [N m] that a pressure [Pa absolute] can hold; equation (2) of the paper."""
-    return problem.torque_constant * (pressure - problem.scenario.device.supply.atmospheric_pressure)
+    return problem.torque_constant * (pressure - problem.atmosphere)
 
 
 def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
@@ -262,12 +246,12 @@ def flow_margin(trials: Trials, valve: Part, pressure: float) -> float:
 
     At the lowest pressure itself nothing might be smaller: that is what makes it the lowest.
     """
-    atmosphere = trials.problem.scenario.device.supply.atmospheric_pressure
+    atmosphere = trials.problem.atmosphere
     higher = np.array([atmosphere + MORE_PRESSURE * (pressure - atmosphere)])
     smallest = 1.0
     for opening in OPENINGS:
         # Negated, so that a failed run, whose error is nan, ends the search too.
-        if not trials.best(valve, higher, opening).error[0] <= trials.problem.largest_error:
+        if not trials.best(valve, higher, opening)["error"][0] <= trials.problem.largest_error:
             break
         smallest = opening
     return 1.0 - smallest

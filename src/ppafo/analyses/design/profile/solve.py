@@ -2,13 +2,21 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from ppafo.analyses.design.profile.answer import SizedValve, Sizing, SizingMargins, SizingRemarks
+from ppafo.analyses.design.profile.answer import PRESSURE, SizedValve, Sizing, SizingMargins
 from ppafo.analyses.design.profile.problem import SizingProblem
-from ppafo.analyses.design.profile.search import Trials, ceiling, flow_margin, highest_pressure, limit_of, try_pressures
+from ppafo.analyses.design.profile.search import (
+    Trials,
+    ceiling,
+    first_of,
+    flow_margin,
+    highest_pressure,
+    limit_of,
+    try_pressures,
+    works_in,
+)
 from ppafo.analyses.endurance.discharge import TIME_IS_UP
 from ppafo.analyses.endurance.gas_demand import demand_of_numbers
 from ppafo.analyses.endurance.solve import follow_bottle
@@ -18,6 +26,7 @@ from ppafo.parameters.parts import Part
 from ppafo.progress import Progress, Report, report_nothing
 from ppafo.simulation.numbers import with_numbers
 from ppafo.simulation.simulate import simulate
+from ppafo.units.shown import in_units
 from ppafo.walking.bottle.coupling import Schedule
 
 
@@ -57,47 +66,58 @@ def smallest_bottle(bottles: Sequence[Part], gas: float) -> Part | None:
     return min(enough, key=lambda bottle: bottle.full_mass, default=None)
 
 
+@in_units(lambda trials, _valve: trials.problem.scenario.device.shown)
 def _size_valve(trials: Trials, valve: Part) -> SizedValve:
     """Return a valve at the pressure that needs the lightest bottle, or at which it comes nearest to the limit."""
     problem = trials.problem
     tried = try_pressures(trials, valve)
-    in_all = tried.trial.gas * problem.repetitions * (1.0 + problem.reserve)
+    works = works_in(problem, tried)
+    first = first_of(works)
+    in_all = tried["gas"] * problem.repetitions * (1.0 + problem.reserve)
     bottles = [smallest_bottle(problem.bottles, gas) for gas in in_all.tolist()]
     # The pressure with the lightest bottle, of these the lowest. Without a bottle it is the lowest that works; where
     # none works, the one with the smallest error, which is infinite for failed runs: argmin would take nan for it.
-    if tried.first is None:
-        least = int(np.argmin(np.where(np.isnan(tried.trial.error), np.inf, tried.trial.error)))
+    if first is None:
+        least = int(np.argmin(np.where(np.isnan(tried["error"]), np.inf, tried["error"])))
     else:
         full = [np.inf if bottle is None else bottle.full_mass for bottle in bottles]
-        masses = np.where(tried.works, full, np.inf)
-        least = int(np.argmin(masses)) if np.isfinite(masses).any() else tried.first
-    pressure, error, gas = (float(series[least]) for series in (tried.pressure, tried.trial.error, tried.trial.gas))
-    gas_in_all, works = float(in_all[least]), tried.first is not None
-    bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure) if works else (None, False)
-    rated = highest_pressure(problem, valve)
-    notes = SizingRemarks(
-        fails_above=tried.fails_above,
-        rated=rated if rated < problem.highest_pressure and not works else None,
-        is_cold=is_cold,
-    )
-    if works and bottles[least] is None:
+        masses = np.where(works, full, np.inf)
+        least = int(np.argmin(masses)) if np.isfinite(masses).any() else first
+    pressure, error, gas, gains = tried[least].tolist()
+    gas_in_all = float(in_all[least])
+    bottle, is_cold, remarks = None, False, []
+    if first is None:
+        rated = highest_pressure(problem, valve)
+        if rated < problem.highest_pressure:
+            remarks.append(f"not tried above {PRESSURE.text(rated)}, the rated pressure of its parts")
+    else:
+        bottle, is_cold = _lasting_bottle(problem, gas, gas_in_all, pressure)
+        failing = np.flatnonzero(~works[first:])
+        if failing.size:
+            text = PRESSURE.text(float(tried["pressure"][first + failing[0]]))
+            remarks.append(f"at {text} the error limit is exceeded again")
+    if is_cold:
+        remarks.append("a lighter bottle has enough gas, but gets too cold before the end")
+    if first is not None and bottles[least] is None:
         largest = max(problem.bottles, key=lambda part: part.values["content"])
-        notes = replace(notes, largest_bottle=largest, share=largest.values["content"] / gas_in_all)
+        lasts = f"{largest.name} lasts for {100.0 * largest.values['content'] / gas_in_all:.0f} % of the use"
+        remarks.append(f"no bottle is large enough: {lasts}")
     used = gas * problem.repetitions
     margins = None
-    if works:
+    if first is not None:
         margins = SizingMargins(
             error=1.0 - error / problem.largest_error,
             torque=ceiling(problem, pressure) / problem.profile.largest - 1.0,
             flow=flow_margin(trials, valve, pressure),
             gas=None if bottle is None or used <= 0.0 else bottle.values["content"] / used - 1.0,
         )
+    columns = trials.columns(valve, np.array([pressure]), np.array([gains]), np.ones(1))
     return SizedValve(
         valve=valve,
-        works=works,
+        works=first is not None,
         pressure=pressure,
-        lowest_pressure=None if tried.first is None else float(tried.pressure[tried.first]),
-        gains=trials.gain_numbers(valve, pressure, int(tried.trial.gains[least])),
+        lowest_pressure=None if first is None else float(tried["pressure"][first]),
+        gains={path: float(columns[path][0]) for path in problem.gains},
         error=error,
         gas=gas,
         gas_in_all=gas_in_all,
@@ -105,8 +125,8 @@ def _size_valve(trials: Trials, valve: Part) -> SizedValve:
         mass=None if bottle is None else sum(part.full_mass for part in (valve, bottle, *problem.carried)),
         margins=margins,
         limit=limit_of(trials, valve, tried),
-        notes=notes,
-        curve=(tried.pressure, tried.trial.error, tried.trial.gas),
+        remark="; ".join(remarks),
+        curve=(tried["pressure"], tried["error"], tried["gas"]),
     )
 
 

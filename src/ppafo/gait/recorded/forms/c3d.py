@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
-from ppafo.gait.recorded.table import Events, MotionTable, TrialData
+from ppafo.gait.recorded.table import Events, MotionTable, TrialData, bare_label
 from ppafo.signals.recording import Floats
-from ppafo.storage.doubled_names import doubled, said_of_doubled, told_apart
 from ppafo.storage.files import read_bytes
+from ppafo.storage.text_table import doubled, said_of_doubled, told_apart
 from ppafo.storage.trial_reading import check_can_be_read
+from ppafo.wording import one_line
 
 _AXES = "xyz"
 _MARK = b"\x50"
@@ -62,9 +63,9 @@ def read_c3d(path: str | Path) -> MotionTable:
     # The labels, without the subject's name before a colon.
     group = parameters["POINT"]
     number = points.shape[1]
-    written = [_bare(label) for label in _texts(group, "LABELS")][:number]
+    written = [bare_label(label) for label in _texts(group, "LABELS")][:number]
     # A point whose label is not its own has its description for a name, or its number.
-    labels = told_apart(written, [_bare(text) for text in _texts(group, "DESCRIPTIONS")])
+    labels = told_apart(written, [bare_label(text) for text in _texts(group, "DESCRIPTIONS")])
     twins = doubled(written, labels)
     frames = points.shape[2]
     columns = {
@@ -75,10 +76,15 @@ def read_c3d(path: str | Path) -> MotionTable:
     units = {name: unit for name, unit in _units(parameters["POINT"], labels).items() if name in columns}
     analogs: Floats = content["data"]["analogs"][0]
     if analogs.shape[0] and frames:
-        for name, values, unit in _channels(parameters["ANALOG"], analogs, frames):
+        # Analog samples are a whole multiple of the points' by the format.
+        step, analog = analogs.shape[1] // frames, parameters["ANALOG"]
+        channels = [bare_label(label) for label in _texts(analog, "LABELS")][: analogs.shape[0]]
+        stated = _texts(analog, "UNITS")
+        for row, name in enumerate(channels):
             # A channel named like a coordinate of a point must not take its place.
-            if name not in columns:
-                columns[name], units[name] = values, unit
+            if name and channels.count(name) == 1 and name not in columns:
+                columns[name] = analogs[row, ::step][:frames]
+                units[name] = _unit_name(stated[row]) if row < len(stated) else ""
     for name, values in _plates(content, frames):
         columns[name], units[name] = values, "N"
     # A trial that was cut keeps its clock: events count from the beginning of the capture.
@@ -103,21 +109,6 @@ def open_c3d(path: str | Path) -> Any:
         raise DataError(f"{path}: ezc3d cannot read it: {one_line(error)}") from error
 
 
-def _bare(label: str) -> str:
-    return label.rpartition(":")[2].strip()
-
-
-def _channels(group: Any, analogs: Floats, frames: int) -> Iterator[tuple[str, Floats, str]]:
-    """Yield name, values at the times of the points and unit of each channel whose label is its own."""
-    # Analog samples are a whole multiple of the points' by the format.
-    step = analogs.shape[1] // frames
-    labels = [_bare(label) for label in _texts(group, "LABELS")][: analogs.shape[0]]
-    stated = _texts(group, "UNITS")
-    for number, label in enumerate(labels):
-        if label and labels.count(label) == 1:
-            yield label, analogs[number, ::step][:frames], _unit_name(stated[number]) if number < len(stated) else ""
-
-
 def _plates(content: Any, frames: int) -> Iterator[tuple[str, Floats]]:
     """Yield the forces [N] of every plate in the axes of the laboratory, upwards above 0, as often as the points."""
     for number, plate in enumerate(content["data"].get("platform", ()), start=1):
@@ -139,7 +130,7 @@ def _units(group: Any, labels: Iterable[str]) -> dict[str, str]:
     units = {label: usual for label in labels}
     for names, unit in _GROUPS:
         stated = _unit_name(next(iter(_texts(group, unit)), ""))
-        units.update({_bare(label): stated for label in _texts(group, names)})
+        units.update({bare_label(label): stated for label in _texts(group, names)})
     return {f"{label}.{axis}": unit for label, unit in units.items() for axis in _AXES}
 
 

@@ -6,13 +6,14 @@ A CSV file need not have the header ``name [unit]``: names alone or with the uni
 import re
 from pathlib import Path
 
-from ppafo.errors import DataError, UnitError, one_line, refused_as
+from ppafo.errors import DataError, UnitError, refused_as
 from ppafo.gait.recorded.delimited import Cells, NumberBlock, lines_of, table_of
 from ppafo.gait.recorded.form import Convention, GaitForm
-from ppafo.gait.recorded.mapping import Side, package_map
+from ppafo.gait.recorded.mapping import Side, package_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.storage.comma_separated import kind_of_comments
 from ppafo.units import to_si
+from ppafo.wording import one_line
 
 _DELIMITERS = ",;\t"
 
@@ -35,8 +36,8 @@ def _recognises(path: str | Path) -> bool:
 def _convention(_table: MotionTable, side: Side, _body_mass: float) -> Convention:
     """Return the map of columns with the names and signs of the package, which do not name the foot."""
     if side != "right":
-        raise DataError("a CSV file without a gait map has the columns of one foot; omit --side left")
-    return Convention(package_map(side))
+        raise DataError(f"a CSV file without a gait map has the columns of one foot; omit {setting_text('side')} left")
+    return Convention(package_map())
 
 
 def is_plain(path: str | Path) -> bool:
@@ -74,7 +75,11 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     at = next((place for place, name in enumerate(names) if name.lower() in _TIMES), 0)
     if not all(name.lower() in _COUNTERS for name in names[:at]):
         at = 0
-    _check_first_name(path, names[at])
+    if names[at].lower() not in _TIMES:
+        raise DataError(
+            f"{path}: the first column must be 'time', it is {one_line(names[at])[:_LONGEST_SHOWN]!r}; write a mean "
+            f"stride over 0 to 100 % against time, repeated at least twice"
+        )
     if "" in names[at:]:
         raise DataError(f"{path}: a column has no name; every column needs a name of its own")
     # A decimal comma shows only where commas do not separate the cells.
@@ -88,14 +93,6 @@ def read_plain_csv(path: str | Path) -> MotionTable:
     )
     cells = Cells([*[""] * at, *names[at:]], units)
     return table_of(path, block, cells, names[at], seconds=seconds, kind=kind)
-
-
-def _check_first_name(path: str | Path, name: str) -> None:
-    if name.lower() not in _TIMES:
-        raise DataError(
-            f"{path}: the first column must be 'time', it is {one_line(name)[:_LONGEST_SHOWN]!r}; write a mean "
-            f"stride over 0 to 100 % against time, repeated at least twice"
-        )
 
 
 def _header(path: str | Path) -> str:

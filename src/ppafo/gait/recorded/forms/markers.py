@@ -60,10 +60,22 @@ def marker_convention(table: MotionTable, side: Side, body_mass: float) -> Conve
     """Return the map of markers and outputs of Plug-in Gait, with the axes of the laboratory found in the markers."""
     foot = side[0]
     labels = _recorded_labels(table)
-    knee, ankle = _pair(labels, foot)
+    pairs = (tuple(_label(labels, f"{foot}{name}") for name in names) for names in zip(_KNEES, _ANKLES, strict=True))
+    # Where there are none Plug-in Gait's, for the message that says so.
+    usual = (f"{foot.upper()}KNE", f"{foot.upper()}ANK")
+    knee, ankle = next(((str(knee), str(ankle)) for knee, ankle in pairs if knee and ankle), usual)
     forward, vertical, remarks = _axes(table, knee, ankle, foot, labels)
     backwards = "-" if forward.startswith("-") else ""
-    angle, said = _ankle_map(labels, foot, (forward, vertical))
+    angles = _label(labels, foot + _ANGLES)
+    heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
+    said: tuple[str, ...] = ()
+    # The model's own angle is preferred: its zero comes from a static trial.
+    if angles is None and heel is not None and toe is not None:
+        angle = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")
+        said = (f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat",)
+    else:
+        column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
+        angle = AngleMap(terms=(column,), positive="dorsiflexion", unit="deg")
     loads, units = _load_maps(table, labels, foot, vertical, body_mass)
     columns = GaitMap(
         shank_angle=ShankMap(knee=knee, ankle=ankle, forward=forward, vertical=vertical),
@@ -112,15 +124,6 @@ def _recorded_labels(table: MotionTable) -> list[str]:
     return list(dict.fromkeys(name.rpartition(".")[0] for name in names))
 
 
-def _pair(labels: Sequence[str], foot: str) -> tuple[str, str]:
-    """Return the labels of knee and ankle; where there are none Plug-in Gait's, for the message that says so."""
-    for names in zip(_KNEES, _ANKLES, strict=True):
-        knee, ankle = (_label(labels, f"{foot}{name}") for name in names)
-        if knee is not None and ankle is not None:
-            return knee, ankle
-    return f"{foot.upper()}KNE", f"{foot.upper()}ANK"
-
-
 def _label(labels: Sequence[str], pattern: str) -> str | None:
     """Return the shortest label that matches, whatever its case; points and lines in it do not count."""
     # The shortest: model outputs often add a suffix to the plain name.
@@ -131,20 +134,6 @@ def _label(labels: Sequence[str], pattern: str) -> str | None:
 def _first(labels: Sequence[str], foot: str, names: Sequence[str]) -> str | None:
     """Return the label of a foot's marker by the first of its usual names that is there."""
     return next(filter(None, (_label(labels, foot + name) for name in names)), None)
-
-
-def _ankle_map(labels: Sequence[str], foot: str, axes: tuple[Axis, Vertical]) -> tuple[AngleMap, tuple[str, ...]]:
-    """Return the ankle angle of the model, or from heel and toe where the file has only markers."""
-    angles = _label(labels, foot + _ANGLES)
-    heel, toe = (_first(labels, foot, names) for names in (_HEELS, _TOES))
-    # The model's own angle is preferred: its zero comes from a static trial.
-    if angles is None and heel is not None and toe is not None:
-        forward, vertical = axes
-        said = f"ankle angle from the markers {heel} and {toe}; its zero is the foot that stands flat"
-        mapped = AngleMap(heel=heel, toe=toe, forward=forward, vertical=vertical, positive="plantarflexion")
-        return mapped, (said,)
-    column = f"{angles or foot.upper() + 'AnkleAngles'}.x"
-    return AngleMap(terms=(column,), positive="dorsiflexion", unit="deg"), ()
 
 
 def _load_maps(

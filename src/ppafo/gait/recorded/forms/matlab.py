@@ -11,7 +11,7 @@ from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.opensim import opensim_convention, unit_of_label
 from ppafo.gait.recorded.mapping import Side, package_map
 from ppafo.gait.recorded.table import MotionTable
-from ppafo.storage.matlab import MATLAB_SUFFIX, MatlabFile, read_matlab
+from ppafo.storage.matlab import MATLAB_SUFFIX, read_matlab
 
 _TIMES = ("time", "t", "tout")
 _OPENSIM = re.compile(r"ankle_angle_[rl].*|.*_force_v[xyz]|.*_moment|pelvis_.*")
@@ -40,7 +40,9 @@ def _read(path: str | Path) -> MotionTable:
     stalled = np.flatnonzero(np.diff(time) <= 0.0)
     if stalled.size:
         raise DataError(f"{path}: {name} does not increase after its sample {stalled[0] + 1}")
-    angle = _angle(file)
+    # The unit of angles that the kept header of an OpenSim table states.
+    stated = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
+    angle = {"yes": "deg", "no": "rad"}[stated[0]] if stated else ""
     is_opensim = _has_opensim(columns)
     units = {other: unit_of_label(other, other, angle) if is_opensim else "" for other in columns}
     return MotionTable(str(path), time, columns, units)
@@ -50,17 +52,11 @@ def _has_opensim(names: Iterable[str]) -> bool:
     return any(map(_OPENSIM.fullmatch, names))
 
 
-def _angle(file: MatlabFile) -> str:
-    """Return the unit of angles that the kept header of an OpenSim table states, empty where it is not there."""
-    said = [match[1].lower() for word in file.words if (match := _DEGREES.search(word))]
-    return {"yes": "deg", "no": "rad"}[said[0]] if said else ""
-
-
 def _convention(table: MotionTable, side: Side, body_mass: float) -> Convention:
     """Return the map of OpenSim's labels where they are there, else of the names of the package."""
     if _has_opensim(table.columns):
         return opensim_convention(table, side, body_mass)
-    return Convention(package_map(side))
+    return Convention(package_map())
 
 
 FORM = GaitForm(

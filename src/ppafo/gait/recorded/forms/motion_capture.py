@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ppafo.errors import DataError, one_line
+from ppafo.errors import DataError
 from ppafo.gait.recorded.delimited import (
     Cells,
     Clock,
     NumberBlock,
     PerFrame,
-    PerRow,
     cells_of,
     lines_of,
     rows_of,
@@ -26,8 +25,9 @@ from ppafo.gait.recorded.delimited import (
 )
 from ppafo.gait.recorded.form import GaitForm
 from ppafo.gait.recorded.forms.markers import PLATE, marker_convention
-from ppafo.gait.recorded.table import AXES, MotionTable
+from ppafo.gait.recorded.table import AXES, MotionTable, bare_label
 from ppafo.signals.recording import Floats
+from ppafo.wording import one_line
 
 _NEXUS_MOTION, _NEXUS_DEVICES = ("Trajectories", "Model Outputs"), "Devices"
 """Blocks of a Nexus export: markers, angles and moments of models; force plates and other analog channels."""
@@ -35,17 +35,9 @@ _LENGTHS = {"Meters": "m", "Centimeters": "cm", "Millimeters": "mm"}
 _MOTIVE_ROWS = 3
 """Rows above the axes of a Motive export: types, names and quantities at least."""
 _DFLOW = {"Pos": "m", "Cop": "m", "For": "N", "Mom": "N m"}
+_NUMBER = re.compile(r"[+-]?\.?\d|nan", re.IGNORECASE)
+"""Start of a cell with a number."""
 _DFLOW_COLUMN = re.compile(r"(.+)\.(Pos|Cop|For|Mom)([XYZ])")
-
-
-def _first_cell(path: str | Path) -> str:
-    """First cell of a text file; empty for a file that is no text."""
-    line = next((line for line in lines_of(path) if line.strip()), "")
-    return re.split(r"[,;\t]", line, maxsplit=1)[0].strip().strip('"').strip()
-
-
-def _bare(label: str) -> str:
-    return label.rpartition(":")[2].strip()
 
 
 def _head_of(line: str) -> str:
@@ -86,7 +78,15 @@ def _read_nexus(path: str | Path) -> MotionTable:
         for start, line in enumerate(lines)
         if _head_of(line) in (*_NEXUS_MOTION, _NEXUS_DEVICES)
     ]
-    motions = [_nexus_motion(path, block) for kind, block in blocks if kind != _NEXUS_DEVICES]
+    motions = []
+    for block in (block for kind, block in blocks if kind != _NEXUS_DEVICES):
+        # Velocities and accelerations, X' and X'', are not read.
+        names = [
+            f"{bare_label(label)}.{axis.lower()}" if label and axis.lower() in AXES else ""
+            for label, axis in zip(block.labels, block.axes, strict=True)
+        ]
+        cells = Cells(["Frame", *names[1:]], block.units)
+        motions.append(table_of(path, block.rows, cells, PerFrame("Frame", block.rate), noun="markers"))
     if not motions:
         raise DataError(f"{path}: has no block 'Trajectories' or 'Model Outputs'; export the trajectories from Nexus")
     whole = motions[0]
@@ -124,17 +124,6 @@ def _nexus_block(path: str | Path, lines: Sequence[str], start: int) -> _NexusBl
     return _NexusBlock(rate=rate, labels=labels, axes=axes, units=units, rows=rows)
 
 
-def _nexus_motion(path: str | Path, block: _NexusBlock) -> MotionTable:
-    # Velocities and accelerations, X' and X'', are not read.
-    names = [
-        f"{_bare(label)}.{axis.lower()}" if label and axis.lower() in AXES else ""
-        for label, axis in zip(block.labels, block.axes, strict=True)
-    ]
-    return table_of(
-        path, block.rows, Cells(["Frame", *names[1:]], block.units), PerFrame("Frame", block.rate), noun="markers"
-    )
-
-
 def _nexus_forces(path: str | Path, block: _NexusBlock, time: Floats) -> dict[str, Floats]:
     """Return the forces [N] of plates at the times of the frames [s], upwards above 0, by ``force plate 1.x``."""
     plates = list(dict.fromkeys(label for label in block.labels if label.lower().endswith("force")))
@@ -168,10 +157,10 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     if "MARKER_NAMES" not in keys:
         raise DataError(f"{path}: has no line MARKER_NAMES; export the 3D data of Qualisys as TSV")
     at, labels = keys["MARKER_NAMES"]
-    labels = [_bare(label) for label in labels if label]
+    labels = [bare_label(label) for label in labels if label]
     line, (rate, *_) = keys.get("FREQUENCY", (0, ["not there"]))
     names = [f"{label}.{axis}" for label in labels for axis in AXES]
-    first = next((n for n in range(at + 1, len(lines)) if _is_number(cells_of(lines[n], "\t")[0])), len(lines))
+    first = next((n for n in range(at + 1, len(lines)) if _NUMBER.match(cells_of(lines[n], "\t")[0])), len(lines))
     width = len(cells_of(lines[first], "\t")) if first < len(lines) else 0
     # Newer exports have a header line, and the number of the frame and the time before the markers.
     is_counted = cells_of(lines[first - 1], "\t")[:2] == ["Frame", "Time"]
@@ -180,16 +169,8 @@ def _read_qualisys(path: str | Path) -> MotionTable:
     cells = Cells([*before, *names], [*["", "s"][: len(before)], *["mm"] * len(names)])
     if width < len(before) + len(names) - 2:
         raise DataError(f"{path}: line {first + 1} has {width} values for {len(labels)} markers")
-    clock: Clock = "time" if is_counted else PerRow(_rate_in(path, rate, line + 1))
+    clock: Clock = "time" if is_counted else PerFrame("", _rate_in(path, rate, line + 1))
     return table_of(path, block, cells, clock, noun="markers")
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return False
-    return True
 
 
 def _read_motive(path: str | Path) -> MotionTable:
@@ -212,7 +193,7 @@ def _read_motive(path: str | Path) -> MotionTable:
     for place, axis in enumerate(axes):
         kind, label, quantity = (cells[place] if place < len(cells) else "" for cells in (kinds, labels, quantities))
         is_marker = "marker" in kind.lower() and quantity.lower() == "position" and axis.lower() in AXES
-        names.append(f"{_bare(label)}.{axis.lower()}" if is_marker else "")
+        names.append(f"{bare_label(label)}.{axis.lower()}" if is_marker else "")
     if not any(names):
         raise DataError(f"{path}: has no columns of markers; export the take with Markers, and their Position")
     names[1] = "time"
@@ -232,7 +213,7 @@ def _read_dflow(path: str | Path) -> MotionTable:
     for cell in cells_of(lines[0].lstrip("% "), "\t"):
         column = _DFLOW_COLUMN.fullmatch(cell)
         is_marker = column is not None and column[2] == "Pos"
-        names.append(f"{_bare(column[1])}.{column[3].lower()}" if column is not None and is_marker else cell)
+        names.append(f"{bare_label(column[1])}.{column[3].lower()}" if column is not None and is_marker else cell)
         units.append(_DFLOW[column[2]] if column is not None else "")
     names = ["" if name == "FrameNumber" else name for name in names]
     return table_of(path, NumberBlock(lines, 1, "\t"), Cells(names, units), "TimeStamp", noun="markers")
@@ -253,7 +234,7 @@ def _read_bts(path: str | Path) -> MotionTable:
     names = ["", "time"]
     for cell in cells_of(lines[at], "\t")[2:]:
         label, _, axis = cell.rpartition(".")
-        names.append(f"{_bare(label)}.{axis.lower()}" if axis.lower() in AXES else "")
+        names.append(f"{bare_label(label)}.{axis.lower()}" if axis.lower() in AXES else "")
     while not names[-1]:
         names.pop()
     is_decimal_comma = "," in lines[min(at + 1, len(lines) - 1)]
@@ -263,12 +244,16 @@ def _read_bts(path: str | Path) -> MotionTable:
 
 
 def _form(name: str, summary: str, first: Sequence[str], read: Callable[[str | Path], MotionTable]) -> GaitForm:
+    def recognises(path: str | Path) -> bool:
+        line = next((line for line in lines_of(path) if line.strip()), "")
+        return re.split(r"[,;\t]", line, maxsplit=1)[0].strip().strip('"').strip() in first
+
     return GaitForm(
         name=name,
         summary=summary,
         suffixes=(".csv", ".txt", ".tsv"),
         read=read,
-        recognises=lambda path: _first_cell(path) in first,
+        recognises=recognises,
         convention=marker_convention,
     )
 

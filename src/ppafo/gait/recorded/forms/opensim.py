@@ -1,7 +1,6 @@
 """OpenSim's tables of motion and force, .mot and .sto, and CSV files whose columns have OpenSim's names."""
 
 import re
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 
 from ppafo.gait.recorded.form import Convention, GaitForm
 from ppafo.gait.recorded.forms.comma_separated import is_plain, plain_names, read_plain_csv
-from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map
+from ppafo.gait.recorded.mapping import ForceMap, KneeMap, PressureMap, ShankMap, Side, opensim_map, setting_text
 from ppafo.gait.recorded.table import MotionTable
 from ppafo.storage.files import read_bytes
 from ppafo.storage.opensim import GAPS, read_opensim
@@ -91,28 +90,22 @@ def opensim_convention(table: MotionTable, side: Side, _body_mass: float) -> Con
     if "centre_of_pressure" in table.columns:
         maps["centre_of_pressure"] = PressureMap(terms=("centre_of_pressure",), unit="m")
     usual = usual.model_copy(update=maps)
-    own, other, numbered = _forces(table.columns, side)
-    if own or (other and len(numbered) == 1):
-        plates = own or numbered
-        said = (f"vertical force: the sum of {' and '.join(plates)}",) if len(plates) > 1 else ()
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), (), said)
-    if len(numbered) == 1 and side == "right":
-        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=numbered)}))
-    return Convention(usual.model_copy(update={"vertical_force": None}), numbered)
-
-
-def _forces(names: Iterable[str], side: Side) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """Return the columns of vertical force that name this foot, the other foot, or none."""
-    own: list[str] = []
-    other: list[str] = []
-    numbered: list[str] = []
-    for name in names:
+    # Columns of vertical force that name this foot, the other foot, or none.
+    forces: tuple[list[str], list[str], list[str]] = ([], [], [])
+    own, other, numbered = forces
+    for name in table.columns:
         words = _WORD.findall(name.lower())
         if "force" not in words or words[-1] != "vy":
             continue
         sides = {foot for foot, marks in _SIDES.items() if marks & set(words)}
         (numbered if len(sides) != 1 else own if side in sides else other).append(name)
-    return tuple(own), tuple(other), tuple(numbered)
+    if own or (other and len(numbered) == 1):
+        plates = tuple(own or numbered)
+        said = (f"vertical force: the sum of {' and '.join(plates)}",) if len(plates) > 1 else ()
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=plates)}), (), said)
+    if len(numbered) == 1 and side == "right":
+        return Convention(usual.model_copy(update={"vertical_force": ForceMap(terms=tuple(numbered))}))
+    return Convention(usual.model_copy(update={"vertical_force": None}), tuple(numbered))
 
 
 _TURN = 45.0
@@ -142,7 +135,7 @@ def _turned_forward(table: MotionTable) -> MotionTable:
             remarks=(
                 *table.remarks,
                 f"the walker turns by {turned:.0f} deg within the record (pelvis_rotation), and the walk is seen along "
-                "its mean direction: give a straight part with --start and --end",
+                f"its mean direction: give a straight part with {setting_text('start')} and {setting_text('end')}",
             ),
         )
     if abs(facing) <= _ALONG:

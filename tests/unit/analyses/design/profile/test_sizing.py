@@ -10,15 +10,16 @@ import jsonschema
 import numpy as np
 import pytest
 
-from ppafo.analyses.design import trials
 from ppafo.analyses.design.loading import json_schema, load_design
+from ppafo.analyses.design.profile import search
 from ppafo.analyses.design.profile.answer import Sizing, finding_of, suggestion_sentence
 from ppafo.analyses.design.profile.problem import choose_knots
-from ppafo.analyses.design.profile.search import Trials, ceiling, ceiling_pressure, cut_error
+from ppafo.analyses.design.profile.search import OSCILLATES, Trials, ceiling, ceiling_pressure, cut_error
 from ppafo.analyses.design.profile.solve import _lasting_bottle, smallest_bottle
 from ppafo.analyses.design.question import design
 from ppafo.control.profiles import KNOTS
 from ppafo.errors import PpafoError
+from ppafo.loading import load_scenario
 from ppafo.parameters.parts import load_catalogue
 from ppafo.signals import Channel, Recording
 from ppafo.signals.recording import Floats
@@ -103,7 +104,7 @@ def test_a_sizing_is_drawn_and_told_as_data_like_any_answer(sizing: Sizing) -> N
 def test_a_tenth_of_a_psi_less_is_not_enough(sizing: Sizing) -> None:
     assert sizing.choice is not None
     below = np.array([sizing.choice.lowest_pressure or 0.0]) - 700.0
-    assert Trials(sizing.problem).best(sizing.choice.valve, below).error[0] > 0.4
+    assert Trials(sizing.problem).best(sizing.choice.valve, below)["error"][0] > 0.4
 
 
 def test_gas_bottle_mass_and_margins_belong_together(sizing: Sizing) -> None:
@@ -261,7 +262,7 @@ def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_deci
         metrics = {"rms_error": error, "gas_supplied": 2.0 * error}
         return SimpleNamespace(metrics=metrics, status=np.full(error.size, COMPLETED), reasons={})
 
-    monkeypatch.setattr(trials, "run_ensemble", run)
+    monkeypatch.setattr(search, "run_ensemble", run)
     found = []
     for seed in (1, 2):
         noisy = dataclasses.replace(problem.scenario.sensors, pressure_noise=1000.0, seed=seed)
@@ -269,10 +270,22 @@ def test_a_limit_is_kept_in_every_noise_stream_and_the_seed_of_the_scenario_deci
         found.append(Trials(own).run(problem.valves[0], np.full(3, 5e5), np.zeros(3, dtype=np.intp), np.ones(3)))
     streams = np.array([np.random.default_rng(int(seed)).random() for seed in np.unique(seen[0])])
     assert streams.size == 16
-    assert found[0].error == pytest.approx(np.full(3, streams.max()))
-    assert found[0].gas == pytest.approx(np.full(3, 2.0 * streams.mean() / problem.simulated))
-    assert np.array_equal(found[0].error, found[1].error)
+    assert found[0]["error"] == pytest.approx(np.full(3, streams.max()))
+    assert found[0]["gas"] == pytest.approx(np.full(3, 2.0 * streams.mean() / problem.simulated))
+    assert np.array_equal(found[0]["error"], found[1]["error"])
     assert Trials(problem).seeds.size == 0
+
+
+def test_a_trial_whose_loop_oscillates_is_no_design_however_small_its_error_is(sizing: Sizing) -> None:
+    overrides = ["reference.level=4 N m", "run.duration=1 s", "reference.ramp_time=0.5 s", "valve.delay=10 ms"]
+    scenario = load_scenario("torque-task-proportional", overrides)
+    gain = scenario.controller.settings["proportional_gain"]
+    factors = tuple(number / gain for number in (0.02, 1.0, 8.0))
+    gains = ("controller.proportional_gain",)
+    trials = Trials(dataclasses.replace(sizing.problem, scenario=scenario, gains=gains, gain_factors=factors))
+    found = trials.run(sizing.problem.valves[0], np.full(3, 4.5e5), np.arange(3), np.ones(3))
+    assert np.isfinite(found["error"]).tolist() == [True, True, False]
+    assert (trials.runs, trials.failures) == (3, {OSCILLATES: 1})
 
 
 def test_a_pressure_that_cuts_half_of_the_peak_is_not_suggested(tmp_path: Path) -> None:

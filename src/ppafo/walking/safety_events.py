@@ -1,44 +1,21 @@
-"""Events of a walk and their times: events of the stride, true and detected, and every loss of help.
-
-Less help, a pause, a stop or a return of help is listed with its fault flag, the readings and the settings.
-"""
+"""Safety events of a walk: less help, a pause, a stop or a return of help, with fault flag, readings and settings."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ppafo.constants import STANDARD_ATMOSPHERE
 from ppafo.control.walking.fault_flags import FAULT_FLAGS, FaultFlag
 from ppafo.engine.lanes import Floats
-from ppafo.model import contact as ground
-from ppafo.model.helping import HELPS, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED, SWING
-from ppafo.model.shut_off import NEVER
+from ppafo.model.helping import HELPS, LIFTS, MID_STANCE, PAUSED, PUSH_OFF, STOPPED
 from ppafo.signals import Recording
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 from ppafo.walking.motion import walk_of
-from ppafo.walking.planning import gait_sensors_of, law_of
+from ppafo.walking.planning import law_of
 
-EVENTS = ("heel strike", "toes on", "heel off", "toes off")
-"""Events of a stride, in order; 'toes on' is the foot that has come down flat."""
-
-Samples = NDArray[np.intp]
-
-TOO_FAR = 0.25
-"""Fraction of a stride: what the controller takes for an event further from it than this is not that event."""
-
-_FAULT_SUFFIX = "_fault"
-"""Suffix of the sensor fields that hold faults."""
-_AFTER = {ground.HEEL: 0, ground.FLAT: 1, ground.TOE: 2, ground.SWING: 3}
-_STATE = "controller_state."
-EVENT_ROW, FRACTION_ROW = "clock.event", "clock.fraction"
-"""Suffixes of the rows for the last event and the phase in the stride, of a predicting controller."""
-
-
-PHASE_ROW = "controller_state.phase.phase"
 SAFE_ROW = "controller_state.safety.level"
 """Row of an event-based controller for its assistance level: full, paused or stopped."""
 
@@ -56,9 +33,6 @@ VENTINGS_ROW = "controller_state.safety.ventings"
 FINDING_ROW = "controller_state.safety.finding"
 """Row of the last fault flag that reduced the help, with the readings at that time."""
 
-REQUEST_ROW = "controller_state.request.torque"
-"""Row of a torque-following controller for the requested torque."""
-
 _WORDS = {LIFTS: "lift-only (no push-off) from", PAUSED: "paused at", STOPPED: "stopped for good at"}
 _RETURNS = {HELPS: "help came back", LIFTS: "the foot is lifted again"}
 _NAMES = {HELPS: "help", LIFTS: "lift", PAUSED: "pause", STOPPED: "stop"}
@@ -68,14 +42,10 @@ SHOWN = 5
 
 
 def failure_times(configuration: Scenario) -> dict[str, float]:
-    """Return when which sensor or part of the plant fails [s], by its name, in this order; {} where all are sound."""
-    sensors = gait_sensors_of(configuration)._asdict()
-    times = {
-        name.removesuffix(_FAULT_SUFFIX): fault.time
-        for name, fault in sensors.items()
-        if name.endswith(_FAULT_SUFFIX) and fault.time < NEVER
-    }
-    times |= {part: fault.numbers["time"] for part, fault in walk_of(configuration).broken.items()}
+    """Return the times [s] at which sensors and parts of the plant fail, by name, in order; {} if all are sound."""
+    motion = walk_of(configuration)
+    faults = {**motion.faults, **motion.broken}
+    times = {part: float(fault.numbers["time"]) for part, fault in faults.items() if fault.kind}
     return dict(sorted(times.items(), key=lambda failure: failure[1]))
 
 
@@ -89,78 +59,6 @@ def acting_phase(recording: Recording) -> Floats:
     level = recording["safe_state"] if "safe_state" in recording else np.zeros(seen.size)
     is_idle = (level > LIFTS) | ((level == LIFTS) & (seen == PUSH_OFF))
     return np.where(is_idle, MID_STANCE, seen)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class EventErrors:
-    """Errors [s] of one kind of event, above 0 where it is known late, one for each that is known at all.
-
-    ``missed`` are true events that the controller did not know of, ``false`` those that it thought of for nothing.
-    """
-
-    errors: Floats
-    missed: int
-    false: int
-
-    @property
-    def rms(self) -> float:
-        """Root mean square of the errors [s]; nan without any."""
-        return float(np.sqrt(np.mean(self.errors**2))) if self.errors.size else float("nan")
-
-
-def clock_row(record: Mapping[str, Floats], ending: str) -> Floats | None:
-    """The row of a controller that predicts the gait phase, by the end of its path; None where it does not."""
-    return next((row for name, row in record.items() if name.startswith(_STATE) and name.endswith(ending)), None)
-
-
-def true_events(contact: Floats) -> dict[str, Samples]:
-    """Samples at which each event happens, from where the foot stands, as in ``model.contact``."""
-    last = np.select([contact == state for state in _AFTER], list(_AFTER.values()))
-    return _begun(last)
-
-
-def known_events(record: Mapping[str, Floats]) -> dict[str, Samples]:
-    """Samples at which the controller knows of each event, from its rows (samples,) by path; {} where it has no phases.
-
-    A controller that predicts knows when its clock passes the event; else it is detected by force.
-    """
-    predicted = clock_row(record, EVENT_ROW)
-    if predicted is not None:
-        return _begun(predicted)
-    if f"{_STATE}phase.phase" not in record:
-        return {}
-    swing = record[f"{_STATE}phase.phase"] == SWING
-    heel, toe = (record[f"{_STATE}phase.{name}.loaded"] > 0.5 for name in ("heel", "toe"))
-    return dict(zip(EVENTS, (_rises(~swing), _rises(toe), _rises(~heel), _rises(swing)), strict=True))
-
-
-def _begun(last: Floats) -> dict[str, Samples]:
-    return {name: _rises(last == number) for number, name in enumerate(EVENTS)}
-
-
-def _rises(is_so: NDArray[np.bool_]) -> Samples:
-    # The sample at which it is so first; what is so from the start did not happen in the record.
-    return np.flatnonzero(is_so[1:] & ~is_so[:-1]) + 1
-
-
-def event_errors(true: Samples, known: Samples, interval: float, stride_time: float) -> EventErrors:
-    """Errors of the known events against the true ones of one kind; ``interval`` [s] of samples, stride time [s].
-
-    Each true event goes with the nearest known one within a quarter of a stride.
-    """
-    if not (true.size and known.size):
-        return EventErrors(np.empty(0), int(true.size), int(known.size))
-    # Every pair: a walk has some hundred events of a kind.
-    apart = known[np.newaxis, :] - true[:, np.newaxis]
-    nearest = np.argmin(np.abs(apart), axis=1)
-    errors = interval * np.take_along_axis(apart, nearest[:, np.newaxis], axis=1)[:, 0]
-    near = np.abs(errors) <= TOO_FAR * stride_time
-    return EventErrors(errors[near], int((~near).sum()), int(known.size - np.unique(nearest[near]).size))
-
-
-def within(events: Mapping[str, Samples], part: slice) -> dict[str, Samples]:
-    """Return the events that lie in a part of the samples, by name."""
-    return {name: times[(times >= part.start) & (times < part.stop)] for name, times in events.items()}
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,36 @@
+"""Mean stride of a recording or a gait file, as the checks of plausibility take it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from ppafo.signals.recording import Floats
+
+SignSource = Literal["map", "columns", "gait_file"]
+"""Source of the sign convention: a gait map, the file's own convention, or a gait file."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeanStride:
+    """The stride that is checked: mean curves (101 samples, SI) by name, stance fraction [-] and stride time [s]."""
+
+    file: Mapping[str, str]
+    curves: Mapping[str, Floats]
+    stance_share: float
+    stride_time: float
+    signs_from: SignSource
+    is_knee_one_marker: bool = False
+    """True if both coordinates of the knee are of one marker, which excludes a scale between them."""
+
+
+def other_sign(signs_from: SignSource, key: str, turned: str = "the other sign") -> str:
+    """Return how to reverse a curve: by its key in a gait map, or in the file."""
+    return {
+        "map": f"change {key} in the gait map",
+        "columns": f"correct it in the file, or change {key} in a gait map",
+        "gait_file": f"write mean, cosine and sine with {turned}",
+    }[signs_from]
+
+
+CLEARLY_BETTER = 2.0
+"""Times that a curve has to fit better, or be larger, with the other sign for its sign to be reversed."""

@@ -1,0 +1,157 @@
+"""Plausibility of shank and ankle angles: range, zero, and sign by the foot that stands in mid-stance."""
+
+import numpy as np
+
+from ppafo.errors import DataError
+from ppafo.gait.gait import Gait
+from ppafo.gait.mean_stride import CLEARLY_BETTER, MeanStride, SignSource, other_sign
+from ppafo.signals.recording import Floats
+
+SHANK_RANGE = (25.0, 120.0)
+ANKLE_RANGE = (5.0, 80.0)
+ANKLE_LIMITS = (40.0, 150.0)
+MIDSTANCE = slice(15, 41)
+"""Percent of the stride in which the foot stands: the ankle then turns as the shank does."""
+_TURNS = 2.0
+"""Degrees, RMS, by which a standing foot has to turn for a sign to show; recorded feet turn by 0.5 to 1.5."""
+_TURNED_BACK = 0.1
+"""Fraction of its range by which a shank has to rotate backwards over the standing foot for its sign to be reversed.
+
+Recorded shanks rotate forward by 0.15 to 0.25 of it.
+"""
+REMARKED_TILT, REFUSED_TILT = 5.0, 20.0
+"""Degrees that the standing foot may be tilted, on average over mid-stance, before it is remarked and refused.
+
+Recorded feet on level ground have 0.5 to 4.6: the sole of a shoe and the placing of markers. Nothing tilts a standing
+foot further than 20: a shoe with a heel of 6 cm on a foot of 17 cm from heel to ball, a walk on the toes, or a ramp of
+1 in 3. Beyond that the zero is another one.
+"""
+
+
+def check_shank(walk: MeanStride) -> None:
+    """Raise DataError for a shank angle that no leg has."""
+    phi = np.degrees(walk.curves["shank_angle"])
+    where = f"{walk.file['shank_angle']}: shank_angle"
+    # The range is free of the zero, so that a wrong unit shows before a wrong zero.
+    travel = float(np.ptp(phi))
+    check_angle_range(where, travel, SHANK_RANGE)
+    # Means of five samples at both ends: a single one may lie on a tremor.
+    growth = float(np.mean(phi[MIDSTANCE][-5:]) - np.mean(phi[MIDSTANCE][:5]))
+    if growth > _TURNED_BACK * travel:
+        raise DataError(
+            f"{where} grows by {growth:.2g} deg while the foot stands: the shank would rotate backwards over it; "
+            f"{other_sign(walk.signs_from, 'shank_angle.positive')}{_other_foot(walk)}"
+        )
+    if float(phi[0]) < -10.0 or float(np.mean(phi)) > 10.0 or float(np.mean(phi)) < -50.0:
+        raise DataError(
+            f"{where} is {phi[0]:.0f} deg at heel strike and {np.mean(phi):.0f} deg on average; plausible is above "
+            "-10 and -50 to 10 deg (0 is vertical, above 0 the ankle is in front); its zero or its columns are wrong"
+            f"{_other_foot(walk)}"
+        )
+
+
+def check_angle_range(where: str, travel: float, limits: tuple[float, float], is_whole: bool = False) -> None:
+    """Raise DataError for an angle over a range [deg] that no leg has; over a ``is_whole`` record it may be larger."""
+    low, high = limits
+    if low <= travel and (is_whole or travel <= high):
+        return
+    hint = "check unit and columns"
+    if low <= np.degrees(travel) <= high:
+        hint = "the numbers look like radians: give 'rad' as their unit"
+    elif low <= np.radians(travel) <= high:
+        hint = "the numbers look like degrees: give 'deg' as their unit"
+    raise DataError(
+        f"{where} covers a range of {travel:.3g} deg in a stride, plausible is {low:g} to {high:g} deg; {hint}"
+    )
+
+
+def check_ankle_range(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle over a range that no leg has."""
+    travel = float(np.ptp(np.degrees(walk.curves["ankle_angle"])))
+    check_angle_range(f"{walk.file['ankle_angle']}: ankle_angle", travel, ANKLE_RANGE)
+
+
+def check_ankle(walk: MeanStride) -> None:
+    """Raise DataError for an ankle angle that no leg has with this shank."""
+    theta = np.degrees(walk.curves["ankle_angle"])
+    where = f"{walk.file['ankle_angle']}: ankle_angle"
+    turned, reversed_turned = standing_turns(walk.curves["shank_angle"], walk.curves["ankle_angle"])
+    if turned > CLEARLY_BETTER * reversed_turned and turned > _TURNS:
+        raise DataError(
+            f"{where} goes into plantarflexion while the shank rotates forward over the standing foot, which would "
+            f"turn by {turned:.2g} deg (RMS), and by {reversed_turned:.2g} deg with the other sign: its sign is "
+            f"reversed; {other_sign(walk.signs_from, 'ankle_angle.positive', 'the other sign about 90 deg')}"
+        )
+    foot = standing_tilt(walk.curves["shank_angle"], walk.curves["ankle_angle"])
+    if abs(foot) > REFUSED_TILT or float(theta.min()) < ANKLE_LIMITS[0] or float(theta.max()) > ANKLE_LIMITS[1]:
+        raise DataError(
+            f"{where} would tilt the standing foot by {foot:.0f} deg, plausible is within {REFUSED_TILT:g} deg "
+            f"(angles from {theta.min():.0f} to {theta.max():.0f} deg, neutral 90); {_NEUTRAL[walk.signs_from]}"
+        )
+
+
+def standing_tilt(shank: Floats, ankle: Floats) -> float:
+    """Return the mean tilt [deg] of the foot from 15 to 40 % of the stride, above 0 with the toes down.
+
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package.
+    """
+    # On level ground the ankle is 90 deg plus the shank angle while the foot is flat.
+    foot = np.degrees(ankle - shank)[MIDSTANCE] - 90.0
+    return float(np.mean(foot))
+
+
+def standing_turns(shank: Floats, ankle: Floats) -> tuple[float, float]:
+    """Return how far the foot turns [deg, RMS] from 15 to 40 % of the stride, as it is and with the ankle reversed.
+
+    ``shank`` and ``ankle`` are curves [rad] of 101 samples in the signs of the package; a foot that stands turns by 0.
+    """
+    # A flat foot stands still while the shank leans: the ankle then follows the shank, with the sign as it is or
+    # reversed.
+    lean, stand = np.degrees(shank)[MIDSTANCE], np.degrees(ankle)[MIDSTANCE]
+    return float(np.std(stand - lean)), float(np.std(stand + lean))
+
+
+def sign_remarks(shank: Floats, ankle: Floats) -> list[str]:
+    """Return a remark on an ankle whose sign the standing foot does not show."""
+    turned, reversed_turned = standing_turns(shank, ankle)
+    if CLEARLY_BETTER * turned <= reversed_turned:
+        return []
+    return [
+        f"mid-stance does not show the sign of ankle_angle: the standing foot turns by {turned:.2g} deg (RMS), and by "
+        f"{reversed_turned:.2g} deg with the other sign; check that the angle grows into plantarflexion"
+    ]
+
+
+def zero_remarks(tilt: float, correction: str) -> list[str]:
+    """Return a remark on the zero of an ankle whose standing foot is tilted [deg]."""
+    if abs(tilt) <= REMARKED_TILT:
+        return []
+    way = "toes down" if tilt > 0.0 else "toes up"
+    return [
+        f"the zero of ankle_angle seems to be off by {abs(tilt):.1f} deg: the standing foot would be tilted {way} "
+        f"by as much (mean from 15 to 40 % of the stride; up to {REMARKED_TILT:g} is usual); "
+        f"on level ground {correction}"
+    ]
+
+
+def gait_file_remarks(gait: Gait) -> list[str]:
+    """Return a remark on the ankle's zero in a finished gait, with the new mean of its series."""
+    percent = np.linspace(0.0, 1.0, 101)
+    tilt = standing_tilt(gait.shank_angle.values_at(percent), gait.ankle_angle.values_at(percent))
+    mean = float(np.degrees(gait.ankle_angle.mean)) - tilt
+    return zero_remarks(tilt, f"the mean of [ankle_angle] in gait '{gait.name}' would be {mean:.1f} deg")
+
+
+_NEUTRAL: dict[SignSource, str] = {
+    "map": "give ankle_angle.neutral in the gait map: the reading of the file when the foot is "
+    "perpendicular to the shank",
+    "columns": "write it as 90 deg when the foot is perpendicular to the shank, or give a gait map with "
+    "ankle_angle.neutral",
+    "gait_file": "write its mean so that it is 90 deg when the foot is perpendicular to the shank",
+}
+
+
+def _other_foot(walk: MeanStride) -> str:
+    if walk.signs_from == "gait_file" or "vertical_force" not in walk.curves:
+        return ""
+    return ", or the force is of the other foot: choose the other side, or the column of this foot"

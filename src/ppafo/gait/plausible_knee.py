@@ -1,0 +1,196 @@
+"""Plausibility of knee accelerations: range, mean and sign, and how the knee turns about the ankle that stands."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from ppafo.constants import STANDARD_GRAVITY
+from ppafo.errors import DataError, check_all, raise_noted
+from ppafo.gait.gait import HARMONICS, KNEE, fit_curve
+from ppafo.gait.mean_stride import MeanStride, SignSource, other_sign
+from ppafo.signals.recording import Floats
+
+FOOT_FLAT = slice(15, 43)
+"""Percent of the stride in which the foot stands flat."""
+
+SHANK_LENGTHS = (0.25, 0.6)
+"""Metres; within these the length is the one that fits best, since a gait does not say it."""
+
+_FITS = 0.6
+"""Largest misfit of the turning, relative and root mean square: true recordings have 0.3 to 0.46."""
+_LEFT_BY_MISTAKE, _LEFT_BY_ONE = 0.7, 0.62
+"""A mistake is remarked where correcting it leaves less than the first fraction of the misfit, and refused below the
+second: true knees in units of g leave 0.48 to 0.57, and a true knee in its own unit has shown 0.68.
+"""
+
+Factors = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class _Mistake:
+    """A possible mistake, its remedy in words, and the corrected curves as fractions of the given (forward, up)."""
+
+    words: str
+    remedy: str
+    forward: Factors
+    up: Factors
+
+
+_G = STANDARD_GRAVITY
+
+
+def _too_small(factor: float, words: str) -> tuple[_Mistake, ...]:
+    """Return numbers that are too small by a factor; knee_up alone is too small over the flat foot to be recognised."""
+    return (
+        _Mistake(f"are {words}", f"multiply both by {factor:g}", (factor, 0.0), (0.0, factor)),
+        _Mistake(f"differ, knee_forward is {words}", f"multiply it by {factor:g}", (factor, 0.0), (0.0, 1.0)),
+    )
+
+
+def _too_large(factor: float) -> tuple[_Mistake, ...]:
+    """Return numbers that are too large by a factor; one alone is first, since knee_up divided is as good as none."""
+    words, fraction = f"{factor:g} times too large", 1.0 / factor
+    return (
+        _Mistake(f"differ, knee_forward is {words}", f"divide it by {factor:g}", (fraction, 0.0), (0.0, 1.0)),
+        _Mistake(f"differ, knee_up is {words}", f"divide it by {factor:g}", (1.0, 0.0), (0.0, fraction)),
+        _Mistake(f"are {words}", f"divide both by {factor:g}", (fraction, 0.0), (0.0, fraction)),
+    )
+
+
+_MISTAKES = (
+    _Mistake("are exchanged", "exchange them", (0.0, 1.0), (1.0, 0.0)),
+    _Mistake(
+        "are exchanged, and knee_up has the other sign", "exchange them and reverse knee_up", (0.0, -1.0), (1.0, 0.0)
+    ),
+    *_too_small(_G, "in units of g"),
+    *_too_small(1000.0, "1000 times too small"),
+    *_too_large(_G),
+    *_too_large(1000.0),
+    _Mistake("are exchanged and in units of g", f"exchange them and multiply both by {_G:g}", (0.0, _G), (_G, 0.0)),
+)
+"""The first that fits is named. A sign alone is recognised in the swing."""
+
+_WHERE: dict[SignSource, str] = {
+    "map": "in the gait map or the file",
+    "columns": "in the file",
+    "gait_file": "in every number of their tables",
+}
+
+
+def turning_remarks(walk: MeanStride) -> list[str]:
+    """Return a remark where a mistake would explain a part of how the knee misses the standing ankle."""
+    found = _mistaken_turning(walk)
+    return [] if found is None else [f"{found[0]}, which may be the walk itself"]
+
+
+def _mistaken_turning(walk: MeanStride) -> tuple[str, str, float] | None:
+    """Return a mistake that would explain the knee's turning, its remedy, and the fraction [-] of the misfit left."""
+    if any(name not in walk.curves for name in KNEE):
+        return None
+    expected = turning_about_ankle(walk.curves["shank_angle"], walk.stride_time)
+    # Over a stride that repeats the mean is 0; gravity in it is refused elsewhere and must not hide a unit here.
+    forward, up = (walk.curves[name] - np.mean(walk.curves[name][:-1]) for name in KNEE)
+    turned = np.stack([forward, up])[:, FOOT_FLAT]
+    missed = _misfit(turned, expected)
+    for mistake in _MISTAKES:
+        is_of_one_alone = mistake.forward[1] == mistake.up[0] == 0.0 and mistake.forward[0] != mistake.up[1]
+        if walk.is_knee_one_marker and is_of_one_alone:
+            continue
+        left = _misfit(np.array([mistake.forward, mistake.up]) @ turned, expected)
+        if left < _FITS and left < _LEFT_BY_MISTAKE * missed:
+            statement = (
+                f"knee_forward and knee_up {mistake.words}: while the foot is flat the knee turns about the resting "
+                f"ankle, which they miss by {100.0 * missed:.0f} %, and by {100.0 * left:.0f} % with that corrected"
+            )
+            return statement, mistake.remedy, left / missed
+    return None
+
+
+def turning_about_ankle(shank: Floats, stride_time: float) -> Floats:
+    """Return forward and up acceleration (2 x samples) of a knee over a resting ankle, per shank length [1/s^2].
+
+    ``shank`` is phi [rad] at 101 phases; the ankle stands at (L sin phi, -L cos phi) from the knee.
+    """
+    curve, _ = fit_curve(shank, HARMONICS["shank_angle"])
+    percent = np.linspace(0.0, 1.0, shank.size)[FOOT_FLAT]
+    rates = curve.derivative(stride_time)
+    phi, rate, acceleration = (series.values_at(percent) for series in (curve, rates, rates.derivative(stride_time)))
+    sine, cosine = np.sin(phi), np.cos(phi)
+    forward = sine * rate**2 - cosine * acceleration
+    # Centripetal and tangential acceleration of a point that turns about the ankle.
+    up = -cosine * rate**2 - sine * acceleration
+    return np.stack([forward, up])
+
+
+def _misfit(measured: Floats, expected: Floats) -> float:
+    """Return the misfit of the best shank as a fraction of its turning; infinite for a shank at rest."""
+    square = float(np.sum(expected**2))
+    if square == 0.0:
+        return float("inf")
+    # Least squares for the one unknown, the length of the shank.
+    length = float(np.clip(np.sum(measured * expected) / square, *SHANK_LENGTHS))
+    return float(np.sqrt(np.sum((measured - length * expected) ** 2) / square)) / length
+
+
+KNEE_TRAVEL = (0.5, 80.0)
+"""Range of a knee's acceleration over the stride, in m/s^2, that a walk may have."""
+KNEE_MEAN = 1.5
+"""Mean of a knee's acceleration over the stride, in m/s^2, that a walk may have: it comes back to where it was."""
+_HELD_BACK = 0.2
+"""Fraction of its range by which a knee has to decelerate where others are driven for its sign to be reversed.
+
+A measured knee is driven by 0.8 to 0.9 of it.
+"""
+
+_PARTS = {"knee_forward": ((-0.3, 0.0), (0.3, 0.6)), "knee_up": ((0.0, 0.3), (0.4, 0.7))}
+"""Parts of the swing, from toe-off, in which the knee is driven on and up, and in which it is held back and falls."""
+
+
+def check_knee(walk: MeanStride) -> None:
+    """Raise DataError for knee accelerations, where there are some, that no leg has."""
+    there = [name for name in KNEE if name in walk.curves]
+    if len(there) == 1:
+        (missing,) = set(KNEE) - set(there)
+        raise DataError(f"{walk.file[there[0]]}: {there[0]} is given without {missing}; give both, or neither")
+    found = _mistaken_turning(walk)
+    if found is not None and found[2] < _LEFT_BY_ONE:
+        statement, remedy, _ = found
+        raise DataError(f"{walk.file['knee_forward']}: {statement}; {remedy} {_WHERE[walk.signs_from]}")
+    check_knee_means(walk)
+    check_all([partial(_check_knee_curve, walk, name)] for name in there)
+
+
+def check_knee_means(walk: MeanStride) -> None:
+    """Raise DataError for accelerations of the knee, where there are some, that do not average to 0 over a stride."""
+    # Without the last sample, which is the first phase again.
+    means = {name: float(np.mean(walk.curves[name][:-1])) for name in KNEE if name in walk.curves}
+    raise_noted(
+        [
+            DataError(
+                f"{walk.file[name]}: {name} is {mean:.3g} m/s^2 on average, and a periodic stride has 0 (up to "
+                f"{KNEE_MEAN:g} is accepted); an accelerometer measures gravity too: subtract it"
+            )
+            for name, mean in means.items()
+            if abs(mean) > KNEE_MEAN
+        ]
+    )
+
+
+def _check_knee_curve(walk: MeanStride, name: str) -> None:
+    values, where = walk.curves[name], f"{walk.file[name]}: {name}"
+    travel, (low, high) = float(np.ptp(values)), KNEE_TRAVEL
+    if not low <= travel <= high:
+        raise DataError(
+            f"{where} covers a range of {travel:.3g} m/s^2 in a stride, plausible is {low:g} to {high:g} m/s^2; "
+            "is the unit right (m/s^2, or m for a position)?"
+        )
+    # Gait phase of the swing, below 0 before toe-off.
+    swung = (np.linspace(0.0, 1.0, values.size) - walk.stance_share) / (1.0 - walk.stance_share)
+    driven, held = (float(np.mean(values[(swung >= start) & (swung <= end)])) for start, end in _PARTS[name])
+    if held - driven > _HELD_BACK * travel:
+        raise DataError(
+            f"{where} is {driven:.3g} m/s^2 about toe-off and {held:.3g} m/s^2 in the middle of the swing, and it "
+            "is the other way round in walking: its sign is reversed, or it is of the other knee; "
+            f"{other_sign(walk.signs_from, f'the sign of knee.{name[5:]}')}"
+        )

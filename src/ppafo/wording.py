@@ -1,0 +1,85 @@
+"""Words of a message: the nearest name, counts, lists of names, texts of other programs on one line."""
+
+import difflib
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+
+def count_of(number: int, noun: str) -> str:
+    """Return a number with its noun, ``1 decay`` or ``3 decays``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def said_missing(names: Sequence[str]) -> str:
+    """Return a statement that all of these are missing: ``'a', 'b' and 'c' are missing``."""
+    quoted = [f"'{name}'" for name in names]
+    listed = " and ".join(filter(None, (", ".join(quoted[:-1]), quoted[-1])))
+    return f"{listed} is missing" if len(quoted) == 1 else f"{listed} are missing"
+
+
+_OF_DATA_SHEETS: Mapping[str, str] = {
+    "cv": "3.87 L/(s bar) for each Cv [US gal/min, psi]",
+    "kv": "4.48 L/(s bar) for each Kv [m^3/h, bar]",
+    "qn": "qn/254 L/(s bar) for qn [L/min] from 6 to 5 bar gauge",
+}
+"""Flow of a valve on data sheets, in C of ISO 6358 at b = 0.3; ``parameters/flow_coefficients.py`` derives it."""
+_C, _B = "sonic_conductance", "critical_ratio"
+_SPELT_OTHERWISE = {"kvs": "kv", "qnn": "qn", "nominal_flow": "qn", "flow_coefficient": "cv", "flow_factor": "kv"}
+
+
+def nearest_name(name: str, allowed: Iterable[str]) -> str:
+    """Return a hint such as ``, did you mean 'angle'?``, or an empty text where no allowed name is near.
+
+    One that is far from all in letters may be
+    short for one: its first word, or another.
+    """
+    word, known = str(name), list(allowed)
+    before, dot, last = word.rpartition(".")
+    sheet = _OF_DATA_SHEETS.get(_SPELT_OTHERWISE.get(last.lower(), last.lower()))
+    if sheet is not None and any(name.rpartition(".")[2] == _C for name in known):
+        return f", which is '{before}{dot}{_C}', {sheet}, with '{before}{dot}{_B}' 0.3"
+    # 0.6 finds a transposed or forgotten letter, and is difflib's own default.
+    near = difflib.get_close_matches(word, known, n=max(len(known), 1), cutoff=0.6)
+    if near:
+        # Of names that are as near, the one that begins like it: 'time_02' and not 'time_31' for 'time_01'.
+        alike = [name for name in known if name in near and _likeness(name, word) == _likeness(near[0], word)]
+        near = [max(alike, key=lambda name: _letters_shared(name, word))]
+    else:
+        # A word at the beginning of a name, else anywhere in it, as ``rms`` is in ``rms_error``.
+        words = [(re.split(r"[^0-9A-Za-z]+", name), name) for name in known]
+        near = [name for found, name in words if found[0] == word] or [
+            name for found, name in words if word in found[1:]
+        ]
+    return f", did you mean '{near[0]}'?" if near else ""
+
+
+def _likeness(name: str, word: str) -> float:
+    return difflib.SequenceMatcher(None, name, word).ratio()
+
+
+def _letters_shared(name: str, word: str) -> int:
+    """Number of letters with which both begin."""
+    pairs = enumerate(zip(name, word, strict=False))
+    return next((number for number, (own, other) in pairs if own != other), min(len(name), len(word)))
+
+
+def first_twice(names: Iterable[str]) -> str | None:
+    """Return the first name that was there before, None where all differ; quick for any number of names."""
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            return name
+        seen.add(name)
+    return None
+
+
+def one_line(text: object) -> str:
+    """Return a text for a message: on one line, with a mark for whatever cannot be printed."""
+    words = " ".join(str(text).split())
+    return "".join(character if character.isprintable() else "\N{REPLACEMENT CHARACTER}" for character in words)
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Return why a file could not be read or written, as the end of a sentence."""
+    text = error.strerror if isinstance(error, OSError) and error.strerror else one_line(error)
+    return text[:1].lower() + text[1:]
