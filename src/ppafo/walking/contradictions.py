@@ -15,7 +15,7 @@ from ppafo.control.walking.catalog import WALKING_CONTROLLERS
 from ppafo.errors import ScenarioError
 from ppafo.model.columns import Problem, at, larger, smaller
 from ppafo.parameters.plant import valve_settings, venting_valve
-from ppafo.simulation.declaration import DocumentReader, value_at
+from ppafo.simulation.document import DocumentReader, value_at
 from ppafo.simulation.scenario import Scenario
 from ppafo.units.shown import shown_text
 from ppafo.walking.declaration import OF_A_WALK
