@@ -7,7 +7,7 @@ the speed, stairs, stopping.
 from typing import Annotated, NamedTuple
 
 from ppafo.model.elementary import QUARTER_TURN, TURN, TURNS_OF_RADIAN, sine_and_cosine_of_turns
-from ppafo.model.leg import LegParameters, ShankNow, foot_inertia_about_ankle, foot_load, torque_of_shank
+from ppafo.model.leg import LegParameters, ShankNow, foot_load, torque_of_shank
 
 HARMONICS = 8
 """Harmonics that the engine follows; higher ones of the built-in gait are below 0.04 deg and 0.4 % of body weight."""
@@ -260,19 +260,12 @@ def gait_of(leg: LegParameters, now: GaitMeasured) -> GaitNow:
     """The measured gait with what follows from it for this leg."""
     sine_shank, cosine_shank = sine_and_cosine_of_turns(now.shank * TURNS_OF_RADIAN)
     sine_foot, cosine_foot = sine_and_cosine_of_turns((now.shank - now.ankle) * TURNS_OF_RADIAN + 0.25)
+    load, rate, acceleration = foot_load(leg), now.shank_rate, now.shank_acceleration
     carried = torque_of_shank(
-        foot_load(leg),
-        sine_shank,
-        cosine_shank,
-        sine_foot,
-        cosine_foot,
-        now.shank_rate,
-        now.shank_acceleration,
-        now.knee_forward,
-        now.knee_up,
+        load, sine_shank, cosine_shank, sine_foot, cosine_foot, rate, acceleration, now.knee_forward, now.knee_up
     )
     # What the measured motion itself takes, with the wearer's own damping.
-    moving = foot_inertia_about_ankle(leg) * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
+    moving = load.inertia * now.ankle_acceleration + leg.ankle_damping * now.ankle_rate
     return GaitNow(
         phase=now.phase,
         shank=now.shank,
@@ -526,6 +519,6 @@ def gait_in_task_sequence(
         sine_shank=sine_shank,
         cosine_shank=cosine_shank,
         sine_healthy_foot=sine_foot,
-        healthy_torque=torque + foot_inertia_about_ankle(leg) * ankle_acceleration + leg.ankle_damping * ankle_rate,
+        healthy_torque=torque + load.inertia * ankle_acceleration + leg.ankle_damping * ankle_rate,
     )
     return now, marks_at(timing, leg, phase, pace)

@@ -157,15 +157,7 @@ def torque_on_foot(load: FootLoad, now: ShankNow, angle: float) -> float:
     sine_phi, cosine_phi = sine_and_cosine_of_turns(now.angle * TURNS_OF_RADIAN)
     sine_alpha, cosine_alpha = sine_and_cosine_of_turns((now.angle - angle) * TURNS_OF_RADIAN + 0.25)
     return -torque_of_shank(
-        load,
-        sine_phi,
-        cosine_phi,
-        sine_alpha,
-        cosine_alpha,
-        now.rate,
-        now.acceleration,
-        now.knee_forward,
-        now.knee_up,
+        load, sine_phi, cosine_phi, sine_alpha, cosine_alpha, now.rate, now.acceleration, now.knee_forward, now.knee_up
     )
 
 

@@ -381,7 +381,7 @@ def next_observer(
     # While the chambers are joined, gas passes that no nominal flow describes.
     blind = begins | ((joined > 0.0) & (coil_1.position < 0.5))
     # The flow is reckoned in the volume before the sample, the reading in the volume after it.
-    before_1, before_2 = believed_volumes(nominal, last_angle, last_1, last_2)
+    was_1, was_2 = believed_volumes(nominal, last_angle, last_1, last_2)
     now_1, now_2 = believed_volumes(nominal, angle, pressure_1, pressure_2)
     mean_1, mean_2 = mean_volumes(nominal, pressure_1, pressure_2)
     # No line has more than its regulator gives, whatever it has lost on the way; at the start it has that.
@@ -398,7 +398,7 @@ def next_observer(
         fed_1,
         to_1,
         set_1,
-        before_1,
+        was_1,
         last_1,
         now_1,
         mean_1,
@@ -414,7 +414,7 @@ def next_observer(
         fed_2,
         to_2,
         set_2,
-        before_2,
+        was_2,
         last_2,
         now_2,
         mean_2,
