@@ -10,43 +10,20 @@ from ppafo.engine.step.lane import SAME_MOMENT
 from ppafo.exports import filled, in_comment, in_markdown, template
 from ppafo.exports.c_library.conditions import conditions_of_program, limits_in_c, relations_of_library
 from ppafo.exports.c_library.library import Library
-from ppafo.model.controlled import CONTROLLED
 from ppafo.model.declaration import Quantity
+from ppafo.signals import CHANNELS
 from ppafo.version import __version__
 
 _FOLDER = "ppafo.exports.c_library"
 """The package whose templates these are."""
 
-OUTPUTS = {
-    "angle": ("rad", "angle of the vane"),
-    "angular_velocity": ("rad/s", "its rate"),
-    "pressure_1": ("Pa", "pressure in chamber 1, absolute"),
-    "pressure_2": ("Pa", "pressure in chamber 2, absolute"),
-    "torque": ("N m", "torque of the actuator, above 0 turns the toes down"),
-    "command": ("-", "command to the valve, -1 to 1"),
-    **{kind.reference: (kind.unit, f"requested {kind.words}") for kind in CONTROLLED.values()},
-    "temperature_1": ("K", "temperature in chamber 1"),
-    "temperature_2": ("K", "temperature in chamber 2"),
-    "mass_1": ("kg", "gas in chamber 1"),
-    "mass_2": ("kg", "gas in chamber 2"),
-    "supplied_mass": ("kg", "gas from the supply so far"),
-    "vented_mass": ("kg", "gas to the atmosphere so far"),
-    "leaked_mass": ("kg", "gas leaked from chamber to chamber so far"),
+OUTPUTS = {name: (channel.unit, channel.summary) for name, channel in CHANNELS.items()} | {
     "strides": ("-", "heel strikes so far"),
     "phase": ("-", "gait phase, 0 at heel strike, in turns"),
-    "contact": ("-", "where the foot stands: 0 swing, 1 heel, 2 flat, 3 toes"),
-    "shank_angle": ("rad", "shank from the vertical, above 0 with the ankle before the knee"),
-    "healthy_angle": ("rad", "angle of the healthy ankle of this gait"),
-    "external_torque": ("N m", "torque T_ex of the device on the wearer"),
-    "heel_force": ("N", "force under the heel, as the sensor shows it without faults"),
-    "toe_force": ("N", "force under the toes, likewise"),
     "positive_push_off_work": ("J", "positive work of T_ex while the foot rolls over the toes, so far"),
     "net_push_off_work": ("J", "net work of T_ex while the foot rolls over the toes, so far"),
-    "controller_phase": ("-", "phase that the controller sees: 0 swing, 1 landing, 2 mid-stance, 3 push-off"),
-    "safe_state": ("-", "0 the controller helps, 1 lifts only, 2 pauses, 3 has stopped"),
-    "gait_fraction": ("-", "gait phase that the controller goes by, in turns"),
 }
-"""Unit and meaning of the outputs at each sample."""
+"""Unit and meaning of the outputs at each sample: channels of a recording, and totals of a walk."""
 SAME_METRIC = 1.0e-12
 """Difference of a metric in C from Python's, as a share of it: sums are rounded in another order."""
 UNITS = {"1": "-", "Pa_a": "Pa, absolute", "Pa_d": "Pa, a difference"}
