@@ -44,8 +44,8 @@ def library_files(library: Library) -> dict[str, bytes]:
 
     name, program = library.name, library.program
     words = _words(library, name)
-    surface = library.surface
-    sources = {surface.header: f"{name}.h", surface.main: "main.c", surface.page: "README.md", **_FILES}
+    api = library.api
+    sources = {api.header: f"{name}.h", api.main: "main.c", api.page: "README.md", **_FILES}
     texts = {target: filled(template(_FOLDER, source), words) for source, target in sources.items()}
     texts["LICENSE"] = template(_FOLDER, "LICENSE")
     head = f'#include "{name}.h"\n\n#include <string.h>\n\n'
@@ -53,7 +53,7 @@ def library_files(library: Library) -> dict[str, bytes]:
     further = [add for add in (library.further, library.following) if add is not None]
     settings = [setting.name for setting in library.settings]
     # The interface is written around the functions, whose names must not hide its own.
-    interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", surface.source))
+    interface = "".join(filled(template(_FOLDER, file), words) for file in ("interface.c", api.source))
     functions = c_text_of_run(program, title, name, settings, further, interface)
     texts[f"{name}.c"] = f"{head}{functions}\n{interface}"
     return {file: text.encode() for file, text in sorted(texts.items())}
@@ -74,7 +74,7 @@ def run_words(library: Library) -> dict[str, str]:
 
 def _words(library: Library, name: str) -> dict[str, str]:
     """Marks of the templates of a library, and the text in the place of each; words of its own go before these."""
-    settings, program, surface = library.settings, library.program, library.surface
+    settings, program, api = library.settings, library.program, library.api
     outputs = ("time", *program.outputs)
     # The last argument of the loop of a run in C, where it has both kinds of steps.
     in_parts = ", run->needs_parts" if program.program.chooses_parts else ""
@@ -122,10 +122,10 @@ def _words(library: Library, name: str) -> dict[str, str]:
         "in_parts": in_parts,
         "run": filled(template(_FOLDER, "run.h"), {"name": name}),
         "steps": filled(template(_FOLDER, "steps.c"), steps),
-        "first": "".join(f"    before.{setting} = before.{surface.step};\n" for setting in surface.as_step),
+        "first": "".join(f"    before.{setting} = before.{api.step};\n" for setting in api.as_step),
         "follow": "" if library.following is None else "    follow(&before, &all);",
         **library.words,
-        **surface.words,
+        **api.words,
     }
 
 
