@@ -7,7 +7,7 @@ from typing import Any
 
 from ppafo.analyses.walk.document import ShownNumber, csv_of, number_texts, toes
 from ppafo.errors import DataError
-from ppafo.gait.gait import Gait, speed_range
+from ppafo.gait.gait import speed_range
 from ppafo.report.display_units import si_unit
 from ppafo.report.finding import Column, Section
 from ppafo.simulation.scenario import Scenario
@@ -20,16 +20,16 @@ from ppafo.walking.task_sequence import TaskSequence
 from ppafo.walking.walk import WalkComparison
 
 _NUMBERS = (
-    ShownNumber(name="start", title="from", quantity="time", digits=1),
-    ShownNumber(name="end", title="to", quantity="time", digits=1),
-    ShownNumber(name="strides", title="strides", quantity="", digits=0),
-    ShownNumber(name="helped", title="helped", quantity="", digits=0),
-    ShownNumber(name="gas", title="gas", quantity="gas mass", digits=2),
-    ShownNumber(name="net_push_off_work", title="work", quantity="energy", digits=1),
-    ShownNumber(name="lowest_toes", title="lowest toes", quantity="body length", digits=1),
-    ShownNumber(name="without", title="... without", quantity="body length", digits=1),
-    ShownNumber(name="flat_push", title="push, heel loaded", quantity="torque", digits=1),
-    ShownNumber(name="safe_time", title="less help at", quantity="time", digits=2),
+    ShownNumber("start", "from", "time", 1),
+    ShownNumber("end", "to", "time", 1),
+    ShownNumber("strides", "strides", "", 0),
+    ShownNumber("helped", "helped", "", 0),
+    ShownNumber("gas", "gas", "gas mass", 2),
+    ShownNumber("net_push_off_work", "work", "energy", 1),
+    ShownNumber("lowest_toes", "lowest toes", "body length", 1),
+    ShownNumber("without", "... without", "body length", 1),
+    ShownNumber("flat_push", "push, heel loaded", "torque", 1),
+    ShownNumber("safe_time", "less help at", "time", 2),
 )
 """Numbers of a segment, and lowest toes without the device, as the table shows them."""
 _CAPTION = (
@@ -158,7 +158,9 @@ def trust_remark(configuration: Scenario) -> str:
         low, high = speed_range(gait)
     except DataError:
         return f"gait '{gait.name}' has no walking speed: how far its strides can be scaled is not known"
-    speeds = [*_given(sequence, "speed"), *(_speed_at(cadence, gait) for cadence in _given(sequence, "cadence"))]
+    # A cadence counts both feet; the speed goes with its square, as the walk ratio is constant.
+    ratios = [0.5 * cadence * gait.stride_time for cadence in _given(sequence, "cadence")]
+    speeds = [*_given(sequence, "speed"), *((gait.walking_speed or 0.0) * ratio * ratio for ratio in ratios)]
     # A speed at the edge, written in another unit, is not beyond it.
     beyond = [speed for speed in speeds if not low - _SAME_SPEED <= speed <= high + _SAME_SPEED]
     if not beyond:
@@ -173,12 +175,3 @@ def trust_remark(configuration: Scenario) -> str:
 def _given(sequence: TaskSequence, name: str) -> list[float]:
     """Return a number [SI] of all segments that state it."""
     return [segment.values[name] for segment in sequence.segments if name in segment.values]
-
-
-def _speed_at(cadence: float, gait: Gait) -> float:
-    """Return the speed [m/s] of a gait at a cadence [1/s] of steps, which counts both feet.
-
-    The speed goes with the square of the cadence, as the walk ratio is constant.
-    """
-    ratio = 0.5 * cadence * gait.stride_time
-    return (gait.walking_speed or 0.0) * ratio * ratio

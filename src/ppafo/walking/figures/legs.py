@@ -3,7 +3,7 @@
 import io
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,8 +200,7 @@ def _row(axes: "Axes", result: WalkResult, label: str, colour: str) -> None:
     axes.set_axis_off()
 
 
-@dataclass(frozen=True, slots=True)
-class _StateBand:
+class _StateBand(NamedTuple):
     """State of a row: name, its short form for a narrow block, colour, and the test of a channel's values for it."""
 
     name: str
@@ -390,7 +389,7 @@ def animation(comparison: WalkComparison) -> bytes:
             lamp.get_bbox_patch().set_facecolor(colour)
             cursor.axes.draw_artist(cursor)
             cursor.axes.draw_artist(lamp)
-            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").copy())
+            images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
         sheet = Image.fromarray(np.concatenate([np.asarray(image) for image in images[:: _PER_STRIDE // 5]]))
         palette = sheet.quantize(_COLOURS, dither=Image.Dither.NONE)
         tones = palette.getpalette() or []
